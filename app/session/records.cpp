@@ -112,18 +112,9 @@ void copy_text(std::string_view text, std::array<char, N>* out) noexcept {
 
 }  // namespace
 
-FrameReport FrameReport::of(const PoseSample& sample, float decode_ms,
-                            const std::optional<Transform>& T_reference_left) noexcept {
-  FrameReport r;
-  r.pose = sample;
-  r.decode_ms = decode_ms;
-  r.T_reference_left = T_reference_left;
-  return r;
-}
-
-FrameReport FrameReport::of(const ComparedPose& pose, float decode_ms) noexcept {
-  return {pose, decode_ms,
-          pose.ins_valid ? std::optional(pose.reference.T_enu_left) : std::nullopt};
+void FrameReport::set_comparison(const ComparedPose& with_ins) noexcept {
+  ComparedPose::operator=(with_ins);
+  if (ins_valid) T_reference_left = reference.T_enu_left;
 }
 
 std::array<double, 4> FrameReport::error() const noexcept {
@@ -161,10 +152,13 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
                           *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_message(text.data());
     if (format.field != nullptr) r.fields[0] = {format.field, event.value};
-    if (const calibration::ChangeEvidence& e = event.evidence; e.log_likelihood_ratio > 0) {
-      r.fields[1] = {"log_likelihood_ratio", e.log_likelihood_ratio};
-      r.fields[2] = {"shift_px", e.shift_px};
-      r.fields[3] = {"rotation_mrad", e.rotation_mrad};
+    std::size_t n = 1;
+    const ChangeEvidence& e = event.evidence;
+    if (e.log_likelihood_ratio > 0)
+      r.fields[n++] = {"log_likelihood_ratio", e.log_likelihood_ratio};
+    if (e.shift_px > 0) {
+      r.fields[n++] = {"shift_px", e.shift_px};
+      r.fields[n] = {"rotation_mrad", e.rotation_mrad};
     }
   }
   return r;

@@ -14,22 +14,25 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr int kMinHeldOut = 3;     // frames that say anything
-constexpr double kWorstFit = 1.5;  // px: matches of frames not in the solve, median
-// The residual of held-out frames may be kTimesUsed times that of the frames used, or kMinMisfit
-// px; on recorded drives both residuals are 0.08 to 0.25 px.
+// Held-out frames below which no test is made.
+constexpr int kMinHeldOut = 3;
+// Median distance from the epipolar lines, px, above which held-out frames contradict a solution.
+constexpr double kWorstFit = 1.5;
+// The distance on held-out frames may be kTimesUsed times that on the frames used, or kMinMisfit
+// px; on recorded drives both are 0.08 to 0.25 px.
 constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
-// rad, of the turn between two cameras that no epipolar line shows: what a calibration that does
-// not state its sigmas is off by when it is the rig's, and when it is not. Chosen: on the seven
-// recorded drives the first lets every published calibration be confirmed (robustness_bench
-// drives), the second is the size of a mounting error.
+// Sigma of the rotation between two cameras that no epipolar line shows, rad: of a calibration
+// without sigmas that is the rig's, and of one that is not. The first lets every published
+// calibration of the seven recorded drives be verified (robustness_bench drives), the second is the
+// size of a mounting error; both are chosen.
 constexpr double kMakersTurn = 1e-3, kOtherTurn = 15e-3;
-// That a calibration which is given is not the rig's, before the drive has begun; and the rate of
-// wrong decisions about it, either way. Chosen, not measured.
+// Prior probability that a supplied calibration is not the rig's, and the rate of wrong decisions
+// about it, either way; both are chosen.
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
-// Sigma of a measurement over the claim's, under which it may take the claim's place: it has nine
-// times the information, so what is adopted rests on the drive.
+// Ratio of sigmas below which a measurement may replace a supplied calibration: it then has nine
+// times the information, so the result rests on the drive.
 constexpr double kShareOfCurrent = 1.0 / 3;
+// Path that a solve needs, in baselines.
 constexpr double kMinBaselinesTravelled = 3.0;
 
 /// Median distance to the epipolar lines of one frame's matches of the left camera and camera k,
@@ -166,14 +169,15 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
 
 namespace {
 
-/// Log odds of a rig that is the one of the claim; x in percent of the depth.
+/// Log odds that the rig is the one of the calibration in use. `difference` of the depths and the
+/// sigmas of the measurement, of the calibration in use and of another rig, all in percent.
 double log_odds_of(double difference, double measured, double current, double other) noexcept {
   const double same = current * current + measured * measured,
                wrong = other * other + measured * measured;
   return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
 }
 
-/// Sigma of the relative depth of a calibration that is believed to be the rig's, percent.
+/// Sigma of the relative depth of a calibration, if it is the rig's, percent.
 double current_percent(const RigCalibration& current, int k, double depth,
                        const CalibrationOptions& o) noexcept {
   const double own = depth_error_percent(current, k, depth);
@@ -192,7 +196,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
                certain = std::log((1 - kErrorRate) / kErrorRate);
   Assessment a;
   a.confirmed = true;
-  bool sharper = true;  // of every camera the depth is held better than by the claim
+  bool sharper = true;  // every camera's depth is determined better than by the one in use
   double worst = 0;
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = reference_depth_m(measured, k, o, pixel_sigma);
@@ -202,7 +206,8 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
         100 * depth / measured.T_camera_left[static_cast<std::size_t>(k)].t.norm();
     const double m = current_percent(current, k, depth, o);
     const double odds = log_odds_of(difference, s, m, kOtherTurn * by_turn);
-    // Where the rig is that of the claim, its depth is off by the mean of both, weighted.
+    // If the rig is that of the calibration in use, the best estimate of its depth error is the
+    // weighted mean of both.
     const double weight = source == CalibrationOrigin::this_drive ? 1.0 : m * m / (m * m + s * s);
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
     a.confirmed =
@@ -219,6 +224,9 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     a.depth_m = depth;
     a.sigma_percent = s;
     a.difference_percent = difference;
+    const double turn = difference / by_turn;
+    a.evidence = {std::abs(odds), turn * measured.intrinsics[static_cast<std::size_t>(k)].fx,
+                  1e3 * turn};
   }
   a.worse = fits_better(log, after, current, measured);
   // In a full window a misfit to the epipolar lines cannot be an accident of where the structure

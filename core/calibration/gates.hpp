@@ -28,35 +28,46 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 /// a knocked camera is not outweighed by another one that a short drive determines slightly less
 /// well. Pure.
 inline constexpr double kChance = 2.0;
-inline constexpr double kRareChance = 3.0;  // for a test that is repeated with every solve
+/// For a test that is repeated with every solve.
+inline constexpr double kRareChance = 3.0;
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;
 
-/// Comparison of the calibration in use, the claim, with the drive's own measurement of the rig
-/// (METHOD §7).
+/// Comparison of the calibration in use with the drive's own measurement of the rig.
 ///
 /// The difference d of their depths at reference_depth_m() decides between two hypotheses: the rig
-/// is the one of the claim, whose error is that of a calibration of its kind (sigma m), or it is
+/// is the one of the calibration in use, whose error is usual for its kind (sigma m), or it is
 /// another one (sigma M). With s, the sigma of the measurement,
 ///
 ///     log_odds = log N(d; 0, m² + s²) − log N(d; 0, M² + s²).
 struct Assessment {
-  double depth_m = 0;             // where it is judged: reference_depth_m()
-  double sigma_percent = 0;       // of the measured calibration's depth there, 1 sigma
-  double difference_percent = 0;  // of the claimed one from the measured, root mean over the image
-  double log_odds = 0;            // that the rig is the one of the claim
-  bool nearer = false;            // the measured one is surely nearer to the rig in depth
-  bool better = false;     // it should be used instead: it is nearer and explains frames that were
-                           // not used no worse, or it does better where the claim misses them
-  bool worse = false;      // it explains them worse
-  bool confirmed = false;  // the rig is the one of the claim, whose depths hold to the tolerated
-                           // error
-  bool contradicted = false;  // the rig certainly is another one
+  /// Depth of the comparison: reference_depth_m().
+  double depth_m = 0;
+  /// Sigma of the measured calibration's depth there.
+  double sigma_percent = 0;
+  /// Difference of the depths there, root mean square over the image.
+  double difference_percent = 0;
+  /// Log odds that the rig is the one of the calibration in use.
+  double log_odds = 0;
+  /// Evidence for it, or against it if log_odds is negative.
+  ChangeEvidence evidence;
+  /// True if the measured calibration is significantly nearer to the rig in depth.
+  bool nearer = false;
+  /// True if the measured calibration should replace the one in use: it is nearer and fits
+  /// held-out frames no worse, or it fits them better where the one in use misses them.
+  bool better = false;
+  /// True if the measured calibration fits held-out frames worse.
+  bool worse = false;
+  /// True if the rig is the one of the calibration in use, and its depths are within the tolerated
+  /// error.
+  bool confirmed = false;
+  /// True if the rig is certainly another one.
+  bool contradicted = false;
 };
 
-/// Origin of a claim. The sigma of a claim that was solved from this drive is not independent of
-/// the measurement and is not used beside it.
+/// Origin of the calibration in use. The sigma of one that was solved from this drive is not
+/// independent of the measurement and is not combined with it.
 enum class CalibrationOrigin : std::uint8_t { elsewhere, this_drive };
 
 /// Assesses the worst of the rig's further cameras. `log` holds frames newer than frame number
@@ -74,9 +85,9 @@ enum class Gate : std::uint8_t {
   implausible_direction,
   implausible_rotation,
   out_of_sync,
-  does_not_fit,   // frames not in the solve contradict it
+  does_not_fit,   // held-out frames contradict it
   no_better,      // than the calibration in use: that one is kept
-  rig_changed,    // among the very frames it was solved from
+  rig_changed,    // among the frames it was solved from
   depth_unknown,  // the tracks do not determine the depth well enough yet
 };
 /// Message for events.jsonl and calibrations.csv; empty for `open`. A constant.
@@ -107,12 +118,14 @@ struct AcceptanceInput {
   const RigSolution* solution = nullptr;
   const RigCalibration* nominal = nullptr;
   const RigCalibration* in_use = nullptr;  // null: there is none
-  const TrackLog* log =
-      nullptr;  // with the frames since the snapshot; null: there are none to hold it against
-  double pixel_sigma = 0.15;     // px, of a tracked corner: reference_depth_m()
-  bool may_have_changed = true;  // a change of the rig among the frames used closes the gate; once,
-                                 // or a wrong one would for ever
-  bool must_be_better = true;    // than `in_use`, on frames that were not used
+  /// Log with the frames since the snapshot; null: none to compare with.
+  const TrackLog* log = nullptr;
+  double pixel_sigma = 0.15;  // px, of a tracked corner: reference_depth_m()
+  /// True if a change of the rig among the frames used closes the gate. It may do so once only:
+  /// a false one would close it indefinitely.
+  bool may_have_changed = true;
+  /// True if the solution must fit held-out frames better than `in_use`.
+  bool must_be_better = true;
 };
 
 /// Decides whether a solution may be used (METHOD §4). Returns the first gate that stops it, or

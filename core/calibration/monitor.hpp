@@ -5,29 +5,36 @@
 
 #include "core/geometry/observations.hpp"
 #include "core/memory/arena.hpp"
+#include "core/types/change_evidence.hpp"
 
 namespace vergence::calibration {
 
 /// Options of `monitor:`; the configuration's schema has a row for each field. docs/design.md
 /// describes what the defaults achieve.
 struct MonitorOptions {
-  double threshold = 45.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false
-                            // alarms, 20 … 500
-  double bias_px = 0.02;  // px rms over the image: minimum of the slowly varying error of vertical
-                          // differences that is tolerated, 0 … 1
-  // Expected value of the same error, until it is measured, for a calibration that was found from
-  // images and is verified, 0 … 2.
+  /// Value of the statistic that raises a knock or a drift, 20 … 500; the default gives at least
+  /// 80 h between false alarms.
+  double threshold = 45.0;
+  /// Minimum of the slowly varying error of vertical differences that is tolerated, px rms over the
+  /// image, 0 … 1.
+  double bias_px = 0.02;
+  /// Expected value of that error until it is measured, for a calibration that was estimated from
+  /// images and is verified, 0 … 2.
   double verified_bias_px = 0.12;
-  double unverified_bias_px = 0.3;  // expected with an unverified calibration, 0 … 5
-  int min_matches =
-      30;  // stereo matches under which a frame measures nothing (`needs_texture`), 12 … 1000
-  int short_window = 3;   // moving frames of the shortest window: large knocks, 1 … 10
-  int long_window = 300;  // moving frames of the longest window: drift, 60 … 1800
-  int collapse_frames =
-      5;  // frames in a row without the expected matches that raise `collapse`, 2 … 60
-  double collapse_share = 0.2;  // of the expected matches: fewer found is a collapse, 0.01 … 0.9
-  int collapse_expected =
-      40;  // matches that must be expected before their absence says anything, 10 … 1000
+  /// The same for an unverified calibration, 0 … 5.
+  double unverified_bias_px = 0.3;
+  /// Stereo matches below which a frame measures nothing (`needs_texture`), 12 … 1000.
+  int min_matches = 30;
+  /// Moving frames of the shortest window, which detects large knocks, 1 … 10.
+  int short_window = 3;
+  /// Moving frames of the longest window, which detects drift, 60 … 1800.
+  int long_window = 300;
+  /// Consecutive frames without the expected matches that raise `collapse`, 2 … 60.
+  int collapse_frames = 5;
+  /// Share of the expected matches below which a frame counts towards a collapse, 0.01 … 0.9.
+  double collapse_share = 0.2;
+  /// Matches that must be expected before their absence counts, 10 … 1000.
+  int collapse_expected = 40;
 };
 
 /// A point seen by the left camera and by camera k in one frame. Ideal pinhole pixels (distortion
@@ -48,14 +55,6 @@ struct MonitorFrame {
   int expected_stereo =
       0;  // matches a good pair of images would give; 0 where either image is poor by itself
   int found_stereo = 0;  // matches there are
-};
-
-/// What the images show of a change of the rig; zero where it is too large to be measured.
-struct ChangeEvidence {
-  double log_likelihood_ratio = 0;  // of a change against none
-  double shift_px = 0;       // of the matches across their epipolar lines (knock, drift) or along
-                             // them (disparity jump), rms since the onset
-  double rotation_mrad = 0;  // of camera k that moves its image by as much
 };
 
 /// Result of the monitor after one frame.

@@ -54,8 +54,8 @@ std::size_t RigSolver::memory_needed(const CalibrationOptions& options,
   const BundleCapacities c = capacities(options, cameras, features);
   const auto frames = static_cast<std::size_t>(options.max_frames);
   return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) +
-         (c.cameras - 1) * Monitor::memory_needed(monitor) +
-         PairingEvidence::memory_needed(features) + DisparityJumpDetector::memory_needed(features) +
+         Monitor::memory_needed(monitor) + PairingEvidence::memory_needed(features) +
+         DisparityJumpDetector::memory_needed(features) +
          c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) +
          (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) +
          c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) +
@@ -68,12 +68,12 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
     : options_(options),
       log_(static_cast<std::size_t>(options.max_frames), features, arena),
       adjuster_(capacities(options, cameras, features), arena),
+      monitor_(monitor, arena),
       expected_scatter_px_(monitor.verified_bias_px),
       pairing_(features, arena),
       jumps_(features, arena),
       max_frames_(static_cast<std::size_t>(options.max_frames)),
       count_(cameras) {
-  for (int k = 1; k < cameras; ++k) monitors_[static_cast<std::size_t>(k)].emplace(monitor, arena);
   const BundleCapacities c = capacities(options, cameras, features);
   poses_ = BoundedVector<Transform>(arena.make<Transform>(c.poses, "calibration poses"));
   held_ = BoundedVector<std::uint8_t>(arena.make<std::uint8_t>(c.poses, "calibration poses"));

@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <optional>
 
 #include "core/bundle/bundle.hpp"
 #include "core/calibration/disparity_jump.hpp"
@@ -127,7 +126,7 @@ class RigSolver {
   const CalibrationOptions& options_;
   TrackLog log_;
   BundleAdjuster adjuster_;
-  std::array<std::optional<Monitor>, kMaxCameras> monitors_;  // [k] of camera k ≥ 1
+  Monitor monitor_;
   double expected_scatter_px_;
   PairingEvidence pairing_;
   DisparityJumpDetector jumps_;

@@ -98,10 +98,9 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
   const auto other = static_cast<std::size_t>(k);
   const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[other].intrinsics();
   const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};
-  Monitor& monitor = *monitors_[other];
-  if (!monitor.set_reference(rig.T_camera_left[other], left, right, rig.covariance_total[other]))
+  if (!monitor_.set_reference(rig.T_camera_left[other], left, right, rig.covariance_total[other]))
     return seen;
-  monitor.expect_scatter(expected_scatter_px_);
+  monitor_.expect_scatter(expected_scatter_px_);
   pairing_.reset();
   jumps_.set_reference(rig.T_camera_left[other], left, right);
   for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -123,7 +122,7 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
     shown.frame = f.number;
     shown.moving = true;
     shown.stereo = stereo_.span();
-    const MonitorResult v = monitor.update(shown);
+    const MonitorResult v = monitor_.update(shown);
     pairing_.next(f.number, stereo_.span(), rig.T_camera_left[other], left, right);
     if (seen.lag_frames == 0) seen.lag_frames = pairing_.lag_frames();
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();

@@ -153,9 +153,6 @@ class Comparison {
 
   /// revision 0: none yet.
   [[nodiscard]] const EnuAlignment& alignment() const noexcept { return builder_.alignment(); }
-  /// Why the last attempt gave none, while the drive is too short or its way does not hold a
-  /// heading.
-  [[nodiscard]] EnuAlignmentStatus alignment_status() const noexcept { return builder_.status(); }
   [[nodiscard]] bool has_origin() const noexcept { return ins_.has_origin(); }
   [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return ins_.plane(); }
   [[nodiscard]] const ComparisonCounters& counters() const noexcept { return counters_; }

@@ -35,7 +35,6 @@ class EnuAlignmentBuilder {
   /// revision 0: none yet.
   [[nodiscard]] const EnuAlignment& alignment() const noexcept { return alignment_; }
   /// Why the last attempt gave none.
-  [[nodiscard]] EnuAlignmentStatus status() const noexcept { return status_; }
 
  private:
   void fit() noexcept;

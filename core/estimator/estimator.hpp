@@ -17,20 +17,17 @@
 
 namespace vergence {
 
-/// Origin of the calibration handed to the estimator, and with it how far it is trusted (METHOD
-/// §3).
+/// Origin of the calibration handed to the estimator.
 enum class CalibrationTrust : std::uint8_t {
-  given,  // in use from the first frame, poses `degraded: unverified_calibration` until the drive
-          // has confirmed it
+  given,       // in use from the first frame; poses are `degraded` until it is verified
   state_file,  // from the state file of the last run: handled like `given`
-  none,        // from scratch: of the rig only the intrinsics and the baseline length are read
+  none,        // from scratch: only intrinsics and baseline length of the rig are read
 };
 
-/// When a solved calibration is adopted.
+/// Time at which a solution is adopted or rejected.
 enum class Adoption : std::uint8_t {
-  after_fixed_frames,  // the estimator waits for the solver at the first of the frames at which a
-                       // solution is judged: deterministic
-  when_ready,          // live: once the solver is done
+  after_fixed_frames,  // deterministic: the estimator waits for the solver
+  when_ready,          // live: when the solver has finished
 };
 
 struct EstimatorOptions {
@@ -39,48 +36,43 @@ struct EstimatorOptions {
   calibration::MonitorOptions monitor{};
   CalibrationTrust trust = CalibrationTrust::given;
   Adoption adoption = Adoption::after_fixed_frames;
-  std::array<ImageView, kMaxCameras> masks{};  // by camera, of its images' size: where it is 0
-                                               // nothing is looked for; empty: everywhere
-  Duration frame_budget{};  // live: time that a frame may take before work is left out
-                            // (docs/deployment.md); zero: no limit
-  bool online =
-      true;  // watch the rig and calibrate it; false: the calibration given is used for ever
+  /// By camera, of its images' size; no point is placed where a mask is 0. Empty: no mask.
+  std::array<ImageView, kMaxCameras> masks{};
+  /// Live: time of a frame above which work is left out (docs/deployment.md); zero: no limit.
+  Duration frame_budget{};
+  /// False: the rig is not monitored, and the calibration given is used throughout.
+  bool online = true;
 };
 
 /// Event of the estimator: a line of events.jsonl. `why` points to a constant.
 struct EstimatorEvent {
-  Stamp stamp{};
+  /// The comment names the unit of `value`; where there is none it is 0.
   enum class Kind : std::uint8_t {
     state,
-    map_reset,
-    time_gap,
+    map_reset,  // s, of the gap
+    time_gap,   // s
     relocalised,
-    dropped,
-    rig_changed,  // the monitor found a change, or the user requested a calibration; value: frames
-                  // since the onset
-    out_of_sync,  // the cameras' images are not of the same instant; value: the lag in frames, 0
-                  // where it is not known
-    cameras_in_sync,            // cameras that were out of step are so no more
-    calibration_verified,       // the drive has confirmed the calibration in use; value: its depth
-                                // error, %
-    calibration_contradicted,   // the drive has shown that it is not the rig's; value: how far off
-                                // its depths are, %
-    focal_length_contradicted,  // the drive measures another focal length than was given; value:
-                                // the one measured, px
-    calibration_accepted,       // value: frames it was solved from
-    calibration_rejected,       // why: the reason; value: frames
-    calibration_taken_up,  // the scene is seen through the calibration that was accepted; value:
-                           // share of its points that fit it, %
-    calibration_pending,   // why: what is missing to calibrate
-    calibration_resumed,   // the one before the last, or from before an alarm, is in use again:
-                           // the scene was lost, and the images fit this one
-  } kind = Kind::state;
+    dropped,                    // s that the frame is older than the one before
+    rig_changed,                // frames since the onset; also when a calibration was requested
+    out_of_sync,                // lag in frames; 0 if it is not known
+    cameras_in_sync,            // after out_of_sync
+    calibration_verified,       // sigma of the depth, percent
+    calibration_contradicted,   // depth error of the one in use, percent
+    focal_length_contradicted,  // focal length measured, px
+    calibration_accepted,       // frames it was solved from
+    calibration_rejected,       // frames it was solved from
+    calibration_taken_up,  // share of the map's points that fit the calibration accepted, percent
+    calibration_pending,   // `why` names what is missing
+    calibration_resumed,   // tracking was lost, and the images fit an earlier calibration
+  };
+  Kind kind = Kind::state;
+  Stamp stamp{};
   State from = State::initialising;
   State to = State::initialising;
   const char* why = "";
-  double value =
-      0;  // seconds of a gap, count of what was dropped, frames; 0 where nothing is counted
-  calibration::ChangeEvidence evidence;  // with rig_changed, where the monitor measured the change
+  double value = 0;
+  /// Of a change, a verification or a contradiction that was measured.
+  ChangeEvidence evidence;
 };
 
 /// Estimates the pose of each rig frame, and the rig's calibration while it drives. This is the

@@ -70,8 +70,7 @@ void Estimator::Parts::start_estimation(CalibrationCause cause, std::uint64_t on
 }
 
 void Estimator::Parts::suspect_rig(CalibrationCause cause, std::uint64_t onset,
-                                   const RigFrame& frame,
-                                   const calibration::ChangeEvidence& evidence) noexcept {
+                                   const RigFrame& frame, const ChangeEvidence& evidence) noexcept {
   record(EstimatorEvent::Kind::rig_changed, frame.stamp, cause_message(cause),
          static_cast<double>(frame.number - std::min(onset, frame.number)), evidence);
   start_estimation(cause, onset, frame);
@@ -182,6 +181,7 @@ void Estimator::Parts::record_length_sigma(const CalibrationDecision& decision) 
 void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
   degradations.strike(Degradation::rig);
   verified_percent = decision.depth_sigma_percent;
+  verified_by = {};
   degradations.enter(Degradation::calibration, Reason::unverified_calibration, last_number,
                      decision.verified ? 1 : DegradationLedger::kUntilStruck);
   odometry.link(decision.calibration);
@@ -194,10 +194,12 @@ void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Sta
              contradicted = decision.cause == CalibrationCause::contradicted;
   if (contradicted && was_suspect)
     record(EstimatorEvent::Kind::calibration_contradicted, stamp,
-           "the calibration in use does not fit the rig", decision.depth_error_percent);
+           "the calibration in use does not fit the rig", decision.depth_error_percent,
+           decision.evidence);
   if (decision.accepted) {
     record(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
-           decision.calibration.frames);
+           decision.calibration.frames,
+           {0, decision.evidence.shift_px, decision.evidence.rotation_mrad});
     calibrator.refine(decision.calibration);
     adopt(decision);
   }
@@ -205,6 +207,7 @@ void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Sta
     // The poses until now are confirmed, too: they stand on what is refined, at most.
     degradations.strike(Degradation::calibration);
     verified_percent = decision.depth_sigma_percent;
+    if (!decision.accepted) verified_by = decision.evidence;
     if (was_suspect) notify_verified(stamp);
   } else if (!calibrator.verified() && !degradations.stands(Degradation::calibration)) {
     degradations.enter(Degradation::calibration, Reason::unverified_calibration, last_number);
@@ -213,7 +216,7 @@ void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Sta
 
 void Estimator::Parts::notify_verified(Stamp stamp) noexcept {
   record(EstimatorEvent::Kind::calibration_verified, stamp, "the calibration in use is verified",
-         verified_percent);
+         verified_percent, verified_by);
 }
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {

@@ -263,6 +263,7 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
     d.reference_depth_m = a.depth_m;
     d.depth_sigma_percent = a.sigma_percent;
     d.depth_error_percent = a.difference_percent;
+    d.evidence = a.evidence;
     if (a.contradicted) d.cause = CalibrationCause::contradicted;
     // At the end of a drive no frame is left that was not used; the solve of more frames is better.
     const calibration::TrackLog& log = frames_.log();

@@ -49,8 +49,7 @@ const Transform& transform(const RigCalibration& rig, int k) noexcept {
 }
 
 /// A rotation of σ about the axis that epipolar lines do not show moves all points by f σ.
-calibration::ChangeEvidence evidence_of(const calibration::DisparityJump& jump,
-                                        double focal_px) noexcept {
+ChangeEvidence evidence_of(const calibration::DisparityJump& jump, double focal_px) noexcept {
   const double sigmas = jump.px / jump.sigma_px, px = std::abs(jump.px);
   return {0.5 * sigmas * sigmas, px, 1e3 * px / focal_px};
 }

@@ -12,11 +12,11 @@ namespace vergence {
 /// Assessment of the rig after one frame: the worst result of all further cameras' monitors.
 struct RigAssessment {
   calibration::MonitorResult::Kind kind = calibration::MonitorResult::Kind::quiet;
-  std::uint64_t onset_frame = 0;         // of `kind`
-  calibration::ChangeEvidence evidence;  // of `kind`
-  int lag_frames = 0;                    // that a camera's images are late; negative: early
-  bool undecided = false;        // something of one camera is wrong, and it is not known what
-  bool cameras_in_sync = false;  // motion shows that all cameras' images are of the same instant
+  std::uint64_t onset_frame = 0;  // of `kind`
+  ChangeEvidence evidence;        // of `kind`
+  int lag_frames = 0;             // that a camera's images are late; negative: early
+  bool undecided = false;         // something of one camera is wrong, and it is not known what
+  bool cameras_in_sync = false;   // motion shows that all cameras' images are of the same instant
 };
 
 /// Checks, frame by frame, that the calibration still describes the rig (METHOD §4). Each further

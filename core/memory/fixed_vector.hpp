@@ -18,11 +18,6 @@ class VectorOn {
     storage_[size_++] = value;
     return true;
   }
-  /// Removes by moving the last into its place: order is not kept.
-  void remove_swapping(std::size_t i) noexcept {
-    assert(i < size_);
-    storage_[i] = storage_[--size_];
-  }
   /// Drops everything from n on. Precondition: n ≤ size().
   void truncate(std::size_t n) noexcept {
     assert(n <= size_);

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "core/types/calibration.hpp"
+#include "core/types/change_evidence.hpp"
 
 namespace vergence {
 
@@ -34,25 +35,35 @@ struct CalibrationDecision {
   Stamp stamp{};  // of the frame it was decided at
   CalibrationCause cause = CalibrationCause::from_scratch;
   bool accepted = false;
-  bool is_refinement = false;  // measured while the drive went on: not accepted is no rejection,
-                               // what is in use fits as well
-  const char* reason =
-      "";  // why it was rejected, a constant message without commas; empty when accepted
-  RigCalibration calibration{};   // the one found, also when rejected
-  int latency_frames = 0;         // from the alarm (or the start, or the request) to here
-  std::uint64_t onset_frame = 0;  // when the rig is thought to have changed; 0: does not apply
-  double held_out_before_px = 0;  // distance to the epipolar lines of frames that were not in the
-                                  // solve, median, of the camera that fits worst: with the one
-                                  // before
-  double held_out_after_px = 0;   // and with this one
-  double reference_depth_m =
-      0;  // METHOD §6.4: the depth that the next three are of; 0: nothing was measured
-  double depth_sigma_percent = 0;  // predicted depth error of the calibration found, 1 sigma
-  double depth_error_percent =
-      0;                     // how far off the one before was, by the one found; 0: there was none
-  bool verified = false;     // the calibration now in use holds to the tolerated depth error
-  FocalMeasurement focal{};  // the newest of the drive
-  double solve_ms = 0;       // on the solver's thread
+  /// True if a calibration was in use meanwhile. If such a decision is not accepted, the
+  /// calibration in use fits as well.
+  bool is_refinement = false;
+  /// Reason of a rejection, a constant without commas; empty when accepted.
+  const char* reason = "";
+  /// Calibration found, also when rejected.
+  RigCalibration calibration{};
+  /// Frames from the alarm, the start or the request to the decision.
+  int latency_frames = 0;
+  /// First frame of the changed rig; 0: does not apply.
+  std::uint64_t onset_frame = 0;
+  /// Median distance of held-out frames' matches from their epipolar lines, of the camera that fits
+  /// worst, with the calibration before and with this one.
+  double held_out_before_px = 0;
+  double held_out_after_px = 0;
+  /// Depth that the next two errors are of; 0: nothing was measured.
+  double reference_depth_m = 0;
+  /// Predicted depth error of the calibration found, 1 sigma.
+  double depth_sigma_percent = 0;
+  /// Depth error of the calibration before, by the one found; 0: there was none.
+  double depth_error_percent = 0;
+  /// True if depths of the calibration now in use are within the tolerated error.
+  bool verified = false;
+  /// That the rig is the one of the calibration before, or, with `contradicted`, another one.
+  ChangeEvidence evidence;
+  /// The newest of the drive.
+  FocalMeasurement focal{};
+  /// Time on the solver's thread.
+  double solve_ms = 0;
 };
 
 }  // namespace vergence

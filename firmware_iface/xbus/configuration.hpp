@@ -36,9 +36,6 @@ inline constexpr std::uint32_t kPeriodClock = 115200;  // Hz
 /// Period of message 04; nothing: the clock has no such rate, or correction by the receiver's pulse
 /// excludes it.
 [[nodiscard]] std::optional<std::uint16_t> period_of_rate(double rate_hz) noexcept;
-[[nodiscard]] constexpr double rate_of_period(std::uint16_t period) noexcept {
-  return period == 0 ? 0 : static_cast<double>(kPeriodClock) / period;
-}
 
 // ---- configuration message (0D) ----
 

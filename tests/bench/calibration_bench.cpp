@@ -1,9 +1,8 @@
-// Calibration on recorded drives: what comes of a nominal calibration, of a wrong one, of none;
-// whether anything is told that was not there; and knocks made on real images by turning the right
-// ones.
+// Calibration on recorded drives: results from a nominal, a wrong and no calibration, false alarms,
+// and knocks made by turning the right images.
 //
 //   drives [--only NAME]       every recorded drive: calibration given, wrong, found
-//   focal [--only NAME]        focal lengths that are off: told or not
+//   focal [--only NAME]        wrong focal lengths: contradicted or not
 //   stretches [--only NAME]    how far disjoint stretches of a drive agree
 //   solves [--only NAME]       a solve of so many frames against the one of the whole drive: the
 //                              difference of their depths (root mean over the image, at the depth
@@ -102,7 +101,7 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
              d.name, found.rig->frames, found.depth_m, found.depth_sigma_percent,
              found.rig->reprojection_px);
 
-  // Turned images are not the raw ones: a homography knows no distortion.
+  // Only undistorted images can be turned by a homography.
   if (d.sequence.calibration.intrinsics[1].has_distortion()) return;
   const test::TemporaryFolder folder;
   int index = 0;

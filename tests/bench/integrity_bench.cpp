@@ -124,7 +124,7 @@ void leave_out_what_is_no_truth(RecordedSequence* d) {
   if (d->name == "kitti00_151") d->truth.erase(d->truth.begin(), d->truth.begin() + kInterpolated);
 }
 
-/// Its own poses, where nobody measured where it was.
+/// The drive's own poses, where there is no ground truth.
 void take_own_poses_for_truth(const app::Configuration& c, const StartingCalibration& given,
                               RecordedSequence* d) {
   if (!d->truth.empty()) return;

@@ -1,5 +1,4 @@
-// Availability of poses on the recorded drives, whatever is done to them that an odometry
-// should bear.
+// Availability of poses on recorded drives under perturbations that an odometry should bear.
 //
 //   robustness_bench [drives|cold|windows|times|scenes|unseen|planar|all] [DRIVE|all]
 //   [variant=PART]

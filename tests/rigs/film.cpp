@@ -1,15 +1,14 @@
 #include "tests/rigs/film.hpp"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <iomanip>
-#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 
-#include "drivers/mock/rig_truth.hpp"
-#include "drivers/mock/world/renderer.hpp"
+#include "tests/support/rendered_drive.hpp"
 
 namespace vergence::test {
 namespace {
@@ -20,23 +19,6 @@ std::filesystem::path image_file(const std::filesystem::path& folder, std::size_
   return folder / ("camera" + std::to_string(camera) + ".raw");
 }
 
-RigCalibration rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
-  rig.baseline = 0.75;
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& lens = rig.intrinsics[k];
-    lens.width = kFilmWidth;
-    lens.height = kFilmHeight;
-    lens.fx = lens.fy = 0.72 * kFilmWidth;
-    lens.cx = 0.5 * (kFilmWidth - 1);
-    lens.cy = 0.5 * (kFilmHeight - 1);
-    lens.distortion = {-0.08, 0.02, 0, 0, 0};
-    rig.T_camera_left[k].t = {-0.75 * static_cast<double>(k), 0, 0};
-  }
-  return rig;
-}
-
 constexpr int kPairs = 100;
 constexpr double kRateHz = 10, kSpeed = 6;  // m/s, on the straights
 constexpr double kStart = 2;                // s of the drive, which stands for its first three
@@ -44,7 +26,7 @@ constexpr double kStart = 2;                // s of the drive, which stands for 
 /// Description of the film, in a file that is written last.
 std::string key() {
   std::ostringstream key;
-  key << "film 1: " << kPairs << " " << kRateHz << " " << kSpeed << " " << kStart;
+  key << "film 2: " << kPairs << " " << kRateHz << " " << kSpeed << " " << kStart;
   return key.str();
 }
 
@@ -59,36 +41,31 @@ bool there_already(const std::filesystem::path& folder) {
 void render_film(const std::filesystem::path& folder) {
   if (there_already(folder)) return;
   std::filesystem::create_directories(folder);
-  mock::DriveOptions way;
-  way.kind = mock::DriveKind::brief;
-  way.speed = kSpeed;
-  const mock::RigTruth truth(std::make_shared<const mock::World>(mock::WorldOptions{}), way, rig(),
-                             mock::default_T_body_left(), {}, {});
+  RenderedDriveOptions options;
+  options.rig = nominal_rig();
+  options.drive.kind = mock::DriveKind::brief;
+  options.drive.speed = kSpeed;
+  options.from_s = kStart;
+  options.rate = kRateHz;
+  RenderedDrive drive(options);
   std::ofstream poses(folder / "truth.txt");
   poses << std::setprecision(17);
-  const auto time = [&](int n) { return Duration::seconds(kStart + n / kRateHz); };
-  const Transform T_first_enu = truth.camera_in_enu(0, time(0)).inverse();
-  for (int n = 0; n < kPairs; ++n) {
-    const Transform T = T_first_enu * truth.camera_in_enu(0, time(n));
+  std::array<std::ofstream, 2> images;
+  for (std::size_t k = 0; k < 2; ++k) images[k].open(image_file(folder, k), std::ios::binary);
+  const Transform T_first_enu = drive.T_enu_left(0).inverse();
+  for (std::uint64_t n = 0; n < kPairs; ++n) {
+    const Transform T = T_first_enu * drive.T_enu_left(n);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) poses << T.R(i, j) << " ";
     poses << T.t.x() << " " << T.t.y() << " " << T.t.z() << "\n";
+    const RigFrame& frame = drive.frame(n);
+    for (std::size_t k = 0; k < 2; ++k)
+      for (int y = 0; y < kFilmHeight; ++y)
+        images[k].write(reinterpret_cast<const char*>(frame.images[k].row(y)), kFilmWidth);
   }
-  std::vector<std::uint8_t> image(kImageBytes);
-  for (std::size_t k = 0; k < 2; ++k) {
-    mock::Renderer renderer(truth.shared_world(), Camera(truth.mounted().intrinsics[k]));
-    std::ofstream out(image_file(folder, k), std::ios::binary);
-    for (int n = 0; n < kPairs; ++n) {
-      mock::RenderRequest shot;
-      shot.noise_seed = static_cast<std::uint32_t>(2 * n + 1) + static_cast<std::uint32_t>(k);
-      renderer.render(truth.camera_in_enu(static_cast<int>(k), time(n)).inverse(), shot,
-                      image.data(), kFilmWidth);
-      out.write(reinterpret_cast<const char*>(image.data()),
-                static_cast<std::streamsize>(image.size()));
-    }
-    if (!out.flush())
+  for (std::size_t k = 0; k < 2; ++k)
+    if (!images[k].flush())
       throw std::runtime_error(image_file(folder, k).string() + ": cannot be written");
-  }
   std::ofstream done(folder / "film.txt");
   done << key() << "\n";
   if (!poses.flush() || !done.flush())

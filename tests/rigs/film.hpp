@@ -18,8 +18,7 @@ void render_film(const std::filesystem::path& folder);
 /// cameraK.raw (8-bit images of one size, one after the other) and truth.txt (of every image
 /// T_first_left: rotation by rows and translation, metres).
 ///
-/// The rig is the one that `rig.nominal` of app/config/mock.yaml describes: two parallel cameras
-/// 0.75 m apart.
+/// The rig is nominal_rig() of tests/support/rendered_drive.hpp.
 class Film {
  public:
   explicit Film(const std::filesystem::path& folder);

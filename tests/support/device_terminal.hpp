@@ -49,7 +49,7 @@ class DeviceOnDescriptor {
         device_->produce(monotonic_now(), &out);
       if (!out.empty())
         (void)!::write(descriptor_, out.data(),
-                       out.size());  // a line that nobody reads drops bytes
+                       out.size());  // An unread line drops bytes.
       pollfd p{descriptor_, POLLIN, 0};
       if (::poll(&p, 1, patience()) <= 0) continue;
       std::array<std::uint8_t, 512> in{};
@@ -57,7 +57,7 @@ class DeviceOnDescriptor {
       if (n > 0)
         device_->receive(std::span(in).first(static_cast<std::size_t>(n)), monotonic_now());
       else
-        ::usleep(1000);  // nobody has the other end open: poll() does not wait
+        ::usleep(1000);  // While the other end is closed poll() does not wait.
     }
   }
   /// Until the device has something to say, in ms: a rig's kernel has better to do than to wake it

@@ -3,7 +3,7 @@
 
 namespace vergence::test {
 
-/// A camera that takes every call and gives no frame: what a test's own camera begins with.
+/// A camera that accepts every call and gives no frame: the base of a test's own cameras.
 class IdleCamera : public CameraDevice {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }

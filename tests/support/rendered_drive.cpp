@@ -44,6 +44,23 @@ RigCalibration paper_rig() {
   return rig;
 }
 
+RigCalibration nominal_rig() {
+  RigCalibration rig;
+  rig.cameras = 2;
+  rig.baseline = 0.75;
+  for (std::size_t k = 0; k < 2; ++k) {
+    Intrinsics& lens = rig.intrinsics[k];
+    lens.width = 640;
+    lens.height = 480;
+    lens.fx = lens.fy = 0.72 * lens.width;
+    lens.cx = 0.5 * (lens.width - 1);
+    lens.cy = 0.5 * (lens.height - 1);
+    lens.distortion = {-0.08, 0.02, 0, 0, 0};
+    rig.T_camera_left[k].t = {-rig.baseline * static_cast<double>(k), 0, 0};
+  }
+  return rig;
+}
+
 struct RenderedDrive::Parts {
   explicit Parts(const RenderedDriveOptions& o) : options(o), drive(o.drive, *world()) {
     for (int k = 0; k < o.rig.cameras; ++k) {
@@ -57,13 +74,7 @@ struct RenderedDrive::Parts {
   }
   /// Into the drive, of frame i.
   [[nodiscard]] Duration time(std::uint64_t i) const {
-    double t = static_cast<double>(i) / options.rate;
-    if (options.to_and_fro) {
-      const double length = drive.duration().to_seconds() - options.from_s;
-      t = std::fmod(t, 2 * length);
-      if (t > length) t = 2 * length - t;
-    }
-    return Duration::seconds(options.from_s + t);
+    return Duration::seconds(options.from_s + static_cast<double>(i) / options.rate);
   }
 
   RenderedDriveOptions options;
@@ -87,10 +98,6 @@ Transform RenderedDrive::T_camera_left(int k, std::uint64_t i) const {
 Transform RenderedDrive::T_enu_left(std::uint64_t i) const {
   return mock::camera_pose(parts_->drive.at(parts_->time(i)), mock::default_T_body_left())
       .inverse();
-}
-
-double RenderedDrive::speed(std::uint64_t i) const {
-  return parts_->drive.at(parts_->time(i)).velocity.norm();
 }
 
 const RigFrame& RenderedDrive::frame(std::uint64_t i) {

@@ -14,13 +14,15 @@ namespace vergence::test {
 /// The rig of the paper's experiment: 1024 × 768 px, 0.75 m, its published intrinsics and
 /// extrinsics, no distortion.
 [[nodiscard]] RigCalibration paper_rig();
+/// The rig that `rig.nominal` of app/config/mock.yaml describes: 640 × 480 px, parallel cameras
+/// 0.75 m apart.
+[[nodiscard]] RigCalibration nominal_rig();
 
 struct RenderedDriveOptions {
   RigCalibration rig = paper_rig();  // true
   mock::DriveOptions drive{};
-  double from_s = 8;        // into the drive, of frame 0
-  double rate = 30;         // Hz
-  bool to_and_fro = false;  // at the drive's end backwards to from_s, and so on; else it stands
+  double from_s = 8;  // into the drive, of frame 0
+  double rate = 30;   // Hz
   /// The true T_camera_left of camera k in frame i; empty: the rig's.
   std::function<Transform(int k, std::uint64_t frame)> placed;
 };
@@ -35,7 +37,6 @@ class RenderedDrive {
   /// Frame i; its images live until the next call.
   [[nodiscard]] const RigFrame& frame(std::uint64_t i);
   [[nodiscard]] Transform T_enu_left(std::uint64_t i) const;
-  [[nodiscard]] double speed(std::uint64_t i) const;  // m/s
   [[nodiscard]] Transform T_camera_left(int k, std::uint64_t i) const;
   [[nodiscard]] const RigCalibration& rig() const noexcept;
   /// Times into the drive at which the vehicle is faster than `speed` for `seconds` on end, spread

@@ -66,16 +66,4 @@ std::string imu_message(Wire wire, std::int64_t stamp, const std::array<double, 
   return w.bytes();
 }
 
-std::string odometry_message(Wire wire, std::int64_t stamp, const OdometryMessage& odometry) {
-  const auto& [p, q, v, variance] = odometry;
-  return RosWriter(wire)
-      .header(stamp, "odom")
-      .text("base_link")
-      .put_all<double>({p[0], p[1], p[2], q[0], q[1], q[2], q[3]})
-      .put_all(diagonal({variance, variance, variance, 0, 0, 0}))
-      .put_all<double>({v[0], v[1], v[2], 0, 0, 0})
-      .put_all(diagonal({0, 0, 0, 0, 0, 0}))
-      .bytes();
-}
-
 }  // namespace vergence::test

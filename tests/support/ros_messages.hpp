@@ -42,13 +42,4 @@ struct FixMessage {
 [[nodiscard]] std::string imu_message(Wire wire, std::int64_t stamp, const std::array<double, 4>& q,
                                       double variance = 0);
 
-struct OdometryMessage {
-  std::array<double, 3> p{};            // m
-  std::array<double, 4> q{0, 0, 0, 1};  // x y z w
-  std::array<double, 3> v{};            // m/s, body
-  double variance = 0;                  // m², of the position
-};
-[[nodiscard]] std::string odometry_message(Wire wire, std::int64_t stamp,
-                                           const OdometryMessage& odometry);
-
 }  // namespace vergence::test

@@ -7,16 +7,21 @@
 
 namespace vergence::test {
 
-/// Tiny pictures of an almost empty town: for tests of what devices do, not of what is seen.
-[[nodiscard]] inline std::shared_ptr<const mock::RigTruth> small_truth(
-    const std::vector<std::string>& faults = {}, int cameras = 2,
-    mock::DriveKind kind = mock::DriveKind::brief) {
+/// A town of roads alone.
+[[nodiscard]] inline std::shared_ptr<const mock::World> empty_town() {
   static const auto town = [] {
     mock::WorldOptions o;
     o.texture_detail = 0;
     o.built_fraction = o.tree_fraction = o.car_fraction = 0;
     return std::make_shared<const mock::World>(o);
   }();
+  return town;
+}
+
+/// Tiny pictures of an almost empty town: for tests of what devices do, not of what is seen.
+[[nodiscard]] inline std::shared_ptr<const mock::RigTruth> small_truth(
+    const std::vector<std::string>& faults = {}, int cameras = 2,
+    mock::DriveKind kind = mock::DriveKind::brief) {
   RigCalibration calibration;
   calibration.cameras = cameras;
   for (Intrinsics& lens : calibration.intrinsics) {
@@ -32,7 +37,7 @@ namespace vergence::test {
   mock::DriveOptions drive;
   drive.kind = kind;
   return std::make_shared<const mock::RigTruth>(
-      town, drive, calibration, mock::default_T_body_left(), Transform{}, std::move(parsed));
+      empty_town(), drive, calibration, mock::default_T_body_left(), Transform{}, std::move(parsed));
 }
 
 /// Configuration of its cameras: triggered, 8 ms.

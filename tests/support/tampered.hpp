@@ -11,7 +11,7 @@
 
 namespace vergence::test {
 
-/// A device whose bytes somebody tampers with on their way to the host.
+/// A device whose bytes a test changes or drops on their way to the host.
 class Tampered final : public DeviceModel {
  public:
   using Tamper =

@@ -7,8 +7,8 @@
 
 namespace vergence::test {
 
-/// A mock's camera that is watched: knows of every slot it hands out when the image was exposed, by
-/// the arrival less the least delay.
+/// A mock's camera that records for every slot it hands out when the image was exposed: the arrival
+/// less the least delay.
 ///
 /// Ownership  The camera outlives it. Threads: CameraDevice's; edge_of_slot by the consumer, while
 ///            it has the slot.

@@ -44,7 +44,7 @@ struct Estimator::Parts {
     state = t->to;
   }
   void record(EstimatorEvent::Kind kind, Stamp stamp, const char* why, double value,
-              const calibration::ChangeEvidence& evidence = {}) noexcept {
+              const ChangeEvidence& evidence = {}) noexcept {
     EstimatorEvent e;
     e.stamp = stamp;
     e.kind = kind;
@@ -60,7 +60,7 @@ struct Estimator::Parts {
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void record_length_sigma(const CalibrationDecision& decision) noexcept;
   void suspect_rig(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame,
-                   const calibration::ChangeEvidence& evidence = {}) noexcept;
+                   const ChangeEvidence& evidence = {}) noexcept;
   void restart_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
                           const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
@@ -93,6 +93,7 @@ struct Estimator::Parts {
   std::uint64_t last_number = 0;
   bool any = false;
   double verified_percent = 0;      // depth error of the calibration that was confirmed
+  ChangeEvidence verified_by;       // that it is the rig's
   bool focal_contradicted = false;  // an event has reported it
   bool moves = false;  // this frame's pose differs from the last one by more than its uncertainty
   int without_pose = 0;

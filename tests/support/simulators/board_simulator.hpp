@@ -60,7 +60,7 @@ struct BoardSimulatorOptions {
 /// Threads  As DeviceModel; the PulseSource is called on that thread.
 class BoardSimulator final : public DeviceModel {
  public:
-  /// `pulses` may be empty: nobody wants to know, and no camera exposes.
+  /// `pulses` may be empty: no camera exposes.
   BoardSimulator(PulseSource pulses, const BoardSimulatorOptions& options);
 
   void receive(std::span<const std::uint8_t> bytes, HostStamp at) override;

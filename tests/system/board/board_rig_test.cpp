@@ -88,7 +88,7 @@ class BoardRig : public ::testing::Test {
   trigger_board::Driver driver_;
 };
 
-TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
+TEST_F(BoardRig, everyPulseIsReportedWithEitherLatencyTimer) {
   for (const int timer : {16, 1}) {
     auto device = open();
     ASSERT_NE(device, nullptr);
@@ -110,7 +110,7 @@ TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
   }
 }
 
-TEST_F(BoardRig, aPortThatVanishesWhileItIsListedIsLeftOut) {
+TEST_F(BoardRig, portRemovedDuringListingIsLeftOut) {
   const auto there = [] {
     const auto ports = list_serial_ports();
     return std::any_of(ports.begin(), ports.end(),

@@ -69,7 +69,7 @@ std::size_t messages(const std::string& text) {
   return n;
 }
 
-TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
+TEST_F(Calibrate, pairIsCalibratedFromFilesForAReplay) {
   const fs::path out = file("calibration.yaml");
   const Outcome o = run_vergence("calibrate target --quiet --json --baseline 0.121" + images() +
                                  kArguments + " --out '" + out.string() + "'");
@@ -109,7 +109,7 @@ TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
   EXPECT_TRUE(fs::exists(file("session") / "summary.json")) << replay.err;
 }
 
-TEST_F(Calibrate, oneCameraAlone) {
+TEST_F(Calibrate, singleCameraGivesIntrinsicsAndWarning) {
   const fs::path out = file("one.yaml");
   const Outcome o = run_vergence("calibrate target --quiet --left '" + file("left").string() +
                                  "/*.png'" + kArguments + " --out '" + out.string() + "'");
@@ -118,7 +118,7 @@ TEST_F(Calibrate, oneCameraAlone) {
   EXPECT_TRUE(test::mentions(o.err, "one camera makes no rig"));
 }
 
-TEST_F(Calibrate, anotherBoardIsSaidOnceAndNotForEveryView) {
+TEST_F(Calibrate, wrongCheckerboardIsReportedOnce) {
   const Outcome o =
       run_vergence("calibrate target --quiet" + images() +
                    " --checkerboard 8x5 --square 0.04 --out '" + file("b.yaml").string() + "'");
@@ -127,7 +127,7 @@ TEST_F(Calibrate, anotherBoardIsSaidOnceAndNotForEveryView) {
   EXPECT_TRUE(test::mentions(o.err, "no view has the board of 8x5 inner corners"));
 }
 
-TEST_F(Calibrate, badArgumentsAreOneSentence) {
+TEST_F(Calibrate, badArgumentsGiveOneMessageAndExitTwo) {
   const std::string out = " --out '" + file("n.yaml").string() + "'",
                     target = "target --quiet" + images(), good = target + kArguments;
   for (const std::string& bad :
@@ -146,7 +146,7 @@ TEST_F(Calibrate, badArgumentsAreOneSentence) {
   }
 }
 
-TEST_F(Calibrate, anOptionOfAnotherSubcommandIsRefused) {
+TEST_F(Calibrate, optionOfAnotherSubcommandIsRefused) {
   for (const auto& [words, option] : std::vector<std::pair<std::string, std::string>>{
            {"target --left l.png --keep-views d", "--keep-views"},
            {"live config.yaml --left l.png", "--left"},
@@ -159,7 +159,7 @@ TEST_F(Calibrate, anOptionOfAnotherSubcommandIsRefused) {
   }
 }
 
-TEST_F(Calibrate, theFormWithoutASubcommandIsRefusedWithTheSubcommand) {
+TEST_F(Calibrate, missingSubcommandIsSuggested) {
   for (const auto& [words, subcommand] : std::vector<std::pair<std::string, std::string>>{
            {"--quiet --checkerboard 9x6 --left l.png --right r.png", "target"},
            {"rig.yaml --checkerboard 9x6", "live"},
@@ -174,7 +174,7 @@ TEST_F(Calibrate, theFormWithoutASubcommandIsRefusedWithTheSubcommand) {
   }
 }
 
-TEST_F(Calibrate, conversionsSayWhatTheyLeaveOutAndOverwriteNothingUnasked) {
+TEST_F(Calibrate, conversionReportsLossesAndNeedsForce) {
   const std::string f = folder_->path().string();
   app::CalibrationFile c;
   c.rig = known_rig(2, CameraModelKind::pinhole_equidistant);
@@ -194,7 +194,7 @@ TEST_F(Calibrate, conversionsSayWhatTheyLeaveOutAndOverwriteNothingUnasked) {
   EXPECT_TRUE(test::mentions(o.err, "back.txt: written as a Kalibr camchain"));
 }
 
-TEST_F(Calibrate, withoutTheToolTheSentenceNamesItsPackageAndADriveNeedsNone) {
+TEST_F(Calibrate, missingToolNamesItsPackage) {
   fs::copy_file(VERGENCE_PROGRAM, file("alone"));
   const auto alone = [](const std::string& arguments) {
     const std::string command = fmt::format("'{}' {} >'{}' 2>&1 </dev/null", file("alone").string(),

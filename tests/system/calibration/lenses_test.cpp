@@ -49,7 +49,7 @@ class RecordedLenses : public testing::TestWithParam<Reach> {};
 
 // Figures of calibration_bench with a fifth of margin: the bounds are what a regression would
 // break, not what is reached.
-TEST_P(RecordedLenses, aDriveCalibratedFromItselfIsRightInScaleAndTellsNoKnock) {
+TEST_P(RecordedLenses, selfCalibratedDriveHasScaleAndNoKnock) {
   const Reach& reach = GetParam();
   const auto d = open_recorded(reach.name);
   if (!d) GTEST_SKIP() << missing(reach.name);
@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(Drives, RecordedLenses,
                                          Reach{"euroc_mh01", 0, 0.0041, 0.008}),
                          [](const auto& drive) { return std::string(drive.param.name); });
 
-TEST(RecordedClaims, aNominalCalibrationThatIsWrongIsNeverOkAndMended) {
+TEST(RecordedCalibration, wrongNominalCalibrationIsReplacedBeforeOk) {
   const auto d = open_recorded("kitti01_51");
   if (!d) GTEST_SKIP() << missing("kitti01_51");
   const DriveOutcome o =
@@ -91,7 +91,7 @@ TEST(RecordedClaims, aNominalCalibrationThatIsWrongIsNeverOkAndMended) {
   EXPECT_NEAR(log_so3(o.rig->T_camera_left[1].R).y(), 26.5e-3, 2e-3);
 }
 
-TEST(RecordedClaims, aCameraTurnedFromTheStartIsNoKnockAndFoundTurned) {
+TEST(RecordedCalibration, rotationFromTheStartIsEstimatedAndNoKnock) {
   const auto d = open_recorded("kitti06_51");
   if (!d) GTEST_SKIP() << missing("kitti06_51");
   const TemporaryFolder folder;
@@ -114,7 +114,7 @@ TEST(RecordedClaims, aCameraTurnedFromTheStartIsNoKnockAndFoundTurned) {
   }
 }
 
-TEST(RecordedClaims, aFocalLengthThatIsAFifthOffIsNeverOk) {
+TEST(RecordedCalibration, focalLengthOffByAFifthIsNeverOk) {
   const auto d = open_recorded("kitti06_51");
   if (!d) GTEST_SKIP() << missing("kitti06_51");
   const StartingCalibration given = app::replayed_calibration(configuration(), d->sequence, false);
@@ -128,20 +128,20 @@ TEST(RecordedClaims, aFocalLengthThatIsAFifthOffIsNeverOk) {
   }
 }
 
-TEST(RecordedClaims, aHeldCalibrationThatIsWrongKeepsTheShapeOfThePath) {
+TEST(RecordedCalibration, wrongFixedCalibrationKeepsShapeOfPath) {
   const auto d = open_recorded("kitti01_51");
   if (!d) GTEST_SKIP() << missing("kitti01_51");
   const app::Configuration held = app::load_configuration(std::nullopt, {"calibration.online=off"});
   const DriveOutcome o =
       drive_recorded(*d, d->sequence, held, app::replayed_calibration(held, d->sequence, false));
   EXPECT_EQ(o.lost, 0);
-  EXPECT_EQ(o.contradicted_at, -1) << "nobody was asked";
+  EXPECT_EQ(o.contradicted_at, -1) << "online calibration is off";
   // Held as exact, 6.2 % and 0.34 m after one scale; the best peer, 4.7 % and 0.05 m.
   EXPECT_LT(o.segments_percent, 1.1);
   EXPECT_LT(o.ate_scaled_m, 0.05);
 }
 
-TEST(RecordedKnocks, onRealImagesAreToldAndMended) {
+TEST(RecordedKnocks, knockOfRealImagesIsDetectedAndRecalibrated) {
   const auto d = open_recorded("kitti00_151");
   if (!d) GTEST_SKIP() << missing("kitti00_151");
   const app::DriveCalibration found = calibrated(d->sequence);
@@ -162,7 +162,7 @@ TEST(RecordedKnocks, onRealImagesAreToldAndMended) {
   }
 }
 
-TEST(RecordedStretches, agreeWithinTheirSigmas) {
+TEST(RecordedStretches, disjointSegmentsAgreeWithinTheirSigmas) {
   const auto d = open_recorded("kitti00_151");
   if (!d) GTEST_SKIP() << missing("kitti00_151");
   const app::DriveCalibration found = calibrated(d->sequence);
@@ -177,7 +177,7 @@ TEST(RecordedStretches, agreeWithinTheirSigmas) {
   EXPECT_LT(depth, 3);
 }
 
-TEST(RecordedBadInput, rightImagesLeftForRightAreNeverOk) {
+TEST(RecordedBadInput, mirroredRightImagesAreNeverOk) {
   const auto d = open_recorded("kitti06_51");
   if (!d) GTEST_SKIP() << missing("kitti06_51");
   const TemporaryFolder folder;

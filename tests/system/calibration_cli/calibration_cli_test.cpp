@@ -63,7 +63,7 @@ class CalibrationCli : public ::testing::Test {
 constexpr const char* kLongEnough =
     "--duration 9";  // three seconds of standing, a calibration needs some two of motion
 
-TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
+TEST_F(CalibrationCli, fromScratchCalibrationIsInEveryFile) {
   const Outcome o = drive("s", std::string("--from-scratch ") + kLongEnough);
   ASSERT_EQ(o.code, 0) << o.err;
   const auto rows = lines("s", "calibrations.csv");
@@ -104,7 +104,7 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
       << "what is kept is what is in use, and what it was found under";
 }
 
-TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreOthers) {
+TEST_F(CalibrationCli, stateFileIsUsedUnlessTheRigDiffers) {
   ASSERT_EQ(drive("first", std::string("--from-scratch ") + kLongEnough).code, 0);
   const std::string kept = read_file(state());
 
@@ -118,7 +118,7 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
 
   const Outcome other = drive("other", "--duration 1 --set cameras.1.serial=another");
   EXPECT_EQ(other.code, 0);
-  EXPECT_TRUE(test::mentions(other.err, "another")) << "told why it is not used";
+  EXPECT_TRUE(test::mentions(other.err, "another")) << "the reason why it is not used";
   EXPECT_TRUE(test::mentions(lines("other", "calibrations.csv").at(1), ",accepted,given,"));
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
 
@@ -128,7 +128,7 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
   EXPECT_TRUE(test::mentions(lenses.err, "rig.nominal.focal_px")) << "why it is not used";
 }
 
-TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEnd) {
+TEST_F(CalibrationCli, unwritableStateFileIsReportedAndRunContinues) {
   folder_.write("state", "a file where the folder should be");
   const Outcome o = drive("s", std::string("--from-scratch ") + kLongEnough);
   EXPECT_EQ(o.code, 0) << o.err;
@@ -137,7 +137,7 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
   EXPECT_TRUE(test::mentions(o.err, "the next run will not use"));
 }
 
-TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) {
+TEST_F(CalibrationCli, suppliedFilePrecedesStateUnlessSizeDiffers) {
   ASSERT_EQ(drive("first", "--duration 1").code, 0);
   const fs::path mine = session("first") / "calibration.yaml";
   fs::create_directories(state().parent_path());
@@ -154,7 +154,7 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
   EXPECT_TRUE(test::mentions(refused.err, "cameras.0.size is 640 x 480"));
 }
 
-TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {
+TEST_F(CalibrationCli, sigusr1RequestsRecalibration) {
   // In real time; the signal comes once the first poses are in the file.
   const std::string command = arguments("s", "--duration 5");
   const std::string script = fmt::format(
@@ -171,7 +171,7 @@ TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {
   EXPECT_GT(frames_with("s", "recalibrating"), 0U);
 }
 
-TEST_F(CalibrationCli, aBaselineTwiceTooLongDisagreesWithTheIns) {
+TEST_F(CalibrationCli, doubledBaselineDisagreesWithIns) {
   const Outcome o = drive("s",
                           "--duration 29 --set mock.ins=ideal --set "
                           "mock.calibration_error.length_percent=100 --set rig.state_dir=none");

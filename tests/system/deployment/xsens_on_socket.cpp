@@ -26,7 +26,7 @@ int connect_to(const std::string& path) {
   for (int i = 0; i < 600; ++i) {
     const int line = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (line < 0) return -1;
-    // A line holds next to nothing: what nobody reads is dropped, not kept until somebody does.
+    // A serial line buffers next to nothing: unread bytes are dropped.
     const int bytes = 1024;
     (void)::setsockopt(line, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
     if (::connect(line, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)

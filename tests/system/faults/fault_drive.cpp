@@ -176,7 +176,7 @@ std::string unsaid(const FaultCase& c, const FaultDrive& drive, const FaultDrive
 }
 
 bool is_bad(const FaultDrive& drive, const FaultResult& result) {
-  // Exit 1: it ended before it was usable again, and says so.
+  // Exit 1: the drive ended before a pose was usable again.
   const bool failed = drive.code != 0 && !(drive.code == 1 && !result.recovery_s);
   return failed || !drive.whole || result.integrity.wrong > 0 || result.integrity.not_evaluated > 0;
 }

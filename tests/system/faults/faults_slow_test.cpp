@@ -11,7 +11,7 @@ namespace vergence::test {
 namespace {
 
 // A drift of millimetres a second is normal on the way and a hundred metres in an hour's stand.
-TEST(LongFaults, aStandOfTenMinutesMovesThePoseByCentimetres) {
+TEST(LongFaults, tenMinutesOfStandingMovePoseByCentimetres) {
   constexpr double kMax = 0.1;  // m
   const FaultCase& c = long_faults().front();
   ASSERT_EQ(c.name, "standing 10 minutes");

@@ -40,7 +40,7 @@ Driven expect_honest(const FaultCase& c) {
 
 class Faults : public ::testing::TestWithParam<FaultCase> {};
 
-TEST_P(Faults, areSaidAndOverSoonAndNoWrongPoseIsOk) {
+TEST_P(Faults, faultIsReportedAndRecoveredWithoutFalseOk) {
   const FaultCase& c = GetParam();
   const Driven d = expect_honest(c);
   SCOPED_TRACE(described(c, d.drive, d.result));
@@ -60,7 +60,7 @@ INSTANTIATE_TEST_SUITE_P(Alone, Faults, ::testing::ValuesIn(single_faults()), []
 // The end of a lag is an event of its own: who waits for a calibration to be confirmed must not
 // take it for that. The one in use was confirmed before, and no frame of the lag has spoken against
 // it.
-TEST(FaultEvents, camerasThatAreInStepAgainConfirmNoCalibration) {
+TEST(FaultEvents, camerasBackInSyncVerifyNoCalibration) {
   const auto& alone = single_faults();
   const auto lag = std::find_if(alone.begin(), alone.end(), [](const FaultCase& c) {
     return c.name == "one camera a frame late";
@@ -74,7 +74,7 @@ TEST(FaultEvents, camerasThatAreInStepAgainConfirmNoCalibration) {
 
 // Where the image that would come twice is lost, only how uncertain the motions become tells at
 // once that a camera is an exposure behind.
-TEST(FaultPairs, anImageLateFromALostOneOnIsNotOk) {
+TEST(FaultPairs, imageLateAfterALostOneIsNotOk) {
   const auto pairs = fault_pairs();
   const auto pair = std::find_if(pairs.begin(), pairs.end(), [](const FaultCase& c) {
     return c.name == "30 % of the frames lost; one camera a frame late";
@@ -85,7 +85,7 @@ TEST(FaultPairs, anImageLateFromALostOneOnIsNotOk) {
 
 class RandomFaults : public ::testing::TestWithParam<std::uint64_t> {};
 
-TEST_P(RandomFaults, leaveNoWrongOkAndAWholeSession) {
+TEST_P(RandomFaults, sessionIsCompleteWithoutFalseOk) {
   (void)expect_honest(random_faults(GetParam()));
 }
 

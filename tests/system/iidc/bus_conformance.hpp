@@ -10,7 +10,7 @@
 
 namespace vergence::test {
 
-/// One emulated camera on a real stack, as the conformance suite wants it.
+/// One emulated camera on a real stack, for the conformance suite.
 class BusConformance final : public ConformanceRig {
  public:
   BusConformance(std::unique_ptr<CameraDriver> driver, const std::string& program,

@@ -26,7 +26,7 @@ struct BusUnderTest {
 namespace vergence::test {
 namespace {
 
-TEST_F(IidcRig, ACameraThatFindsNoRoomOnTheBusSaysSo) {
+TEST_F(IidcRig, missingBusBandwidthIsReported) {
   CameraConfiguration wide = usual();
   wide.width = 1280;
   wide.height = 960;
@@ -40,7 +40,7 @@ TEST_F(IidcRig, ACameraThatFindsNoRoomOnTheBusSaysSo) {
   (void)end();
 }
 
-TEST_F(IidcRig, TheBusClockIsOneForBothCamerasThroughItsWrap) {
+TEST_F(IidcRig, busClockIsSharedAcrossItsWrap) {
   ASSERT_NO_FATAL_FAILURE(begin(usual()));
   ASSERT_NO_FATAL_FAILURE(start());
   // Fifteen seconds: with the card's clock at 100 s the wrap at 128 s comes in between, whatever
@@ -66,7 +66,7 @@ TEST_F(IidcRig, TheBusClockIsOneForBothCamerasThroughItsWrap) {
     }
   }
   EXPECT_GT(compared, frames / 2);
-  // Against the host's clock: 50 ppm fast where the card says so, and never a leap.
+  // Against the host's clock the card's runs 50 ppm fast and never jumps.
   const double host = static_cast<double>(a.middles.back() - a.middles.front());
   const double bus = static_cast<double>(a.starts.back() - a.starts.front());
   EXPECT_NEAR(bus / host - 1, wraps ? 50e-6 : 0, 1e-6);

@@ -23,7 +23,7 @@ namespace vergence::test {
 class IidcRig : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!inside_rig()) GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+    if (!inside_rig()) GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
   }
   /// The emulator, and its two cameras configured.
   void begin(const CameraConfiguration& requested, std::vector<std::string> arguments = {}) {
@@ -63,7 +63,7 @@ class IidcRig : public ::testing::Test {
   std::unique_ptr<Taker> taker_;
 };
 
-TEST_F(IidcRig, TwoCamerasAreListedWithIdsThatOpenThem) {
+TEST_F(IidcRig, camerasAreListedAndOpenedBySerial) {
   ASSERT_NO_FATAL_FAILURE(begin(usual()));
   const auto found = driver_->enumerate();
   ASSERT_EQ(found.size(), 2U);
@@ -80,7 +80,7 @@ TEST_F(IidcRig, TwoCamerasAreListedWithIdsThatOpenThem) {
   (void)end();
 }
 
-TEST_F(IidcRig, EveryPulseIsOneFrameAndTheEmulatorsAccountsAgree) {
+TEST_F(IidcRig, everyPulseGivesOneFrameOrIsCountedLost) {
   ASSERT_NO_FATAL_FAILURE(begin(usual(CameraTrigger::hardware)));
   ASSERT_NO_FATAL_FAILURE(start());
   pulse(5);
@@ -111,7 +111,7 @@ TEST_F(IidcRig, EveryPulseIsOneFrameAndTheEmulatorsAccountsAgree) {
       << "one pulse, one instant";
 }
 
-TEST_F(IidcRig, ATornFrameIsMarkedAndNoOther) {
+TEST_F(IidcRig, onlyTruncatedFrameIsMarkedIncomplete) {
   ASSERT_NO_FATAL_FAILURE(begin(usual(CameraTrigger::hardware)));
   ASSERT_NO_FATAL_FAILURE(start());
   pulse(4);
@@ -131,7 +131,7 @@ TEST_F(IidcRig, ATornFrameIsMarkedAndNoOther) {
   EXPECT_EQ(taker_->account(1).complete, 16U);
 }
 
-TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
+TEST_F(IidcRig, replugWhileStreamingLeaksNothing) {
   ASSERT_NO_FATAL_FAILURE(begin(usual()));
   ASSERT_NO_FATAL_FAILURE(start());
   ASSERT_TRUE(taker_->take(10));

@@ -18,6 +18,7 @@
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/thread_allocations.hpp"
 #include "tests/support/xsens_terminal.hpp"
+#include "tests/system/run/session.hpp"
 
 namespace vergence::test {
 namespace {
@@ -118,10 +119,10 @@ struct Bus {
 
 class IidcRun : public ::testing::TestWithParam<Bus> {};
 
-TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
+TEST_P(IidcRun, exampleConfigurationPosesEveryPair) {
   const char* film_folder = std::getenv("VERGENCE_FILM");
   if (!inside_rig() || film_folder == nullptr)
-    GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+    GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
   const Film film(film_folder);
   std::vector<std::string> arguments{"--cameras", "2", "--film", film_folder, "--film-hz", "10"};
   if (GetParam().pulses) arguments.insert(arguments.end(), {"--trigger-hz", "10"});
@@ -132,7 +133,7 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
 
   const auto out = run_film(GetParam().name, GetParam().configuration, 9, {});
   const std::string report = emulator.finish();
-  const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
+  const auto summary = test::summary_of(out);
   const auto& frames = summary.at("frames");
   const auto& devices = summary.at("devices");
   SCOPED_TRACE(summary.dump(1) + report);
@@ -156,10 +157,10 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
   }
 }
 
-TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
+TEST(BoardRun, triggerBoardCamerasAndInsMakeOneSession) {
   const char* film_folder = std::getenv("VERGENCE_FILM");
   if (!inside_rig() || film_folder == nullptr)
-    GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+    GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
   const Film film(film_folder);
   auto driver = iidc::make_usb_driver();
   // Slower than the other drives: two serial lines cost the one processor as much as the
@@ -188,7 +189,7 @@ TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
                              "ins.port=/dev/ttyUSB1", "ins.baud=115200", "ins.rate=20"});
   wired = false;
   const std::string report = cameras.finish();
-  const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
+  const auto summary = test::summary_of(out);
   SCOPED_TRACE(summary.dump(1) + report);
   expect_a_drive(out, summary, film);
   const auto& pairing = summary.at("time").at("pairing");

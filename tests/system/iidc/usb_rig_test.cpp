@@ -24,7 +24,7 @@ struct BusUnderTest {
 namespace vergence::test {
 namespace {
 
-TEST_F(IidcRig, ACameraIsOpenedByTheNumberThatUsbCallsItsSerial) {
+TEST_F(IidcRig, cameraIsOpenedByItsUsbSerial) {
   const Emulator emulator("sim_usb_iidc", {"--cameras", "1"});
   DeviceStatus status = DeviceStatus::failed;
   std::unique_ptr<CameraDevice> camera;

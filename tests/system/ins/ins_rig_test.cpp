@@ -65,7 +65,7 @@ class InsRig : public ::testing::Test {
   std::unique_ptr<test::DeviceOnDescriptor> sensor_;
 };
 
-TEST_F(InsRig, streamsThroughTheRealDriverWithEitherLatencyTimer) {
+TEST_F(InsRig, samplesAreCompleteWithEitherLatencyTimer) {
   const auto ports = list_serial_ports();
   const auto port = std::find_if(ports.begin(), ports.end(),
                                  [](const SerialPortInfo& p) { return p.port == kPort; });
@@ -88,7 +88,7 @@ TEST_F(InsRig, streamsThroughTheRealDriverWithEitherLatencyTimer) {
   }
 }
 
-TEST_F(InsRig, comesBackAfterTheConverterWasUnplugged) {
+TEST_F(InsRig, reconnectsAfterConverterWasUnplugged) {
   const auto device = open(115200);
   ASSERT_NE(device, nullptr);
   ASSERT_EQ(device->configure(100, nullptr), DeviceStatus::ok) << device->last_error();

@@ -5,7 +5,7 @@
 
 #include "core/math/random.hpp"
 #include "core/odometry/odometry.hpp"
-#include "tests/system/odometry/mock_drive.hpp"
+#include "tests/system/odometry/stereo_drive.hpp"
 
 namespace vergence::test {
 namespace {
@@ -85,12 +85,8 @@ class DirtyDrive {
     return {masks_[0].view(), masks_[1].view()};
   }
   [[nodiscard]] RigFrame frame(std::size_t i, bool dirty) const {
-    RigFrame f;
-    f.number = i;
-    f.stamp = drive_.stamps[i];
-    f.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k)
-      f.images[k] = (dirty ? pairs_[i] : drive_.pairs[i])[k].view();
+    RigFrame f = drive_.frame(i);
+    for (std::size_t k = 0; dirty && k < 2; ++k) f.images[k] = pairs_[i][k].view();
     return f;
   }
   [[nodiscard]] const StereoDrive& drive() const { return drive_; }
@@ -140,7 +136,7 @@ Passed pass(bool dirty, std::span<const ImageView> masks) {
   return passed;
 }
 
-TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
+TEST(MaskedOdometry, usesNothingUnderMaskAndStaysAccurate) {
   const double way =
       (dirty_drive().drive().truth[kFrames - 1].t - dirty_drive().drive().truth[0].t).norm();
   ASSERT_GT(way, 15.0);
@@ -155,7 +151,7 @@ TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
     EXPECT_GT(bare.painted[k], static_cast<int>(kFrames)) << "camera " << k;
   }
   EXPECT_EQ(masked.posed, static_cast<int>(kFrames));
-  // As accuracy_test.cpp has it for clean pictures: 4 per mille of the way, and the first metre's
+  // As in accuracy_test.cpp for clean images: 4 per mille of the path, and the first metre's
   // share of a keyframe.
   EXPECT_LT(clean.error, 0.004 * way + 0.02);
   EXPECT_LT(masked.error, 0.004 * way + 0.02);

@@ -7,7 +7,7 @@
 
 namespace vergence::test {
 
-/// A recorded stretch with truth that the tests know.
+/// A recorded sequence with ground truth.
 struct Excerpt {
   const char* name;
   const char* folder;  // below the shared root
@@ -17,7 +17,7 @@ struct Excerpt {
 inline constexpr Excerpt kKitti{"kitti", "data/kitti06_51", app::SequenceFormat::kitti, 51};
 inline constexpr Excerpt kEuroc{"euroc", "data/euroc_mh01", app::SequenceFormat::euroc, 80};
 
-/// The frames that have a truth, decoded. Throws what the readers of files throw.
+/// The frames that have a ground truth, decoded. Throws what the readers of files throw.
 [[nodiscard]] StereoDrive load(const Excerpt& excerpt, const std::filesystem::path& folder);
 
 }  // namespace vergence::test

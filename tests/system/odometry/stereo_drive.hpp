@@ -2,13 +2,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <string>
 #include <vector>
 
-#include "core/estimator/estimator.hpp"
-#include "core/types/stamped_pose.hpp"
+#include "core/types/calibration.hpp"
+
+#include "core/types/image.hpp"
+#include "core/types/time.hpp"
+#include "tests/support/rendered_drive.hpp"
 
 namespace vergence::test {
 
@@ -23,7 +23,7 @@ struct OwnedImage {
   [[nodiscard]] ImageView view() const noexcept { return {bytes.data(), width, height, stride}; }
 };
 
-/// A stereo drive in memory with the truth: T_reference_left of every frame, in any world.
+/// A stereo drive in memory with its ground truth: T_reference_left of every frame, in any world.
 struct StereoDrive {
   RigCalibration rig;
   std::vector<Stamp> stamps;
@@ -31,59 +31,18 @@ struct StereoDrive {
   std::vector<Transform> truth;  // T_reference_left
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size(); }
+  /// Frame i as a camera driver delivers it; the images live as long as the drive.
+  [[nodiscard]] RigFrame frame(std::size_t i) const;
 };
 
-/// Estimate of one frame, and the true pose of the left camera when its image was
-/// taken.
-struct Answer {
-  PoseSample sample;
-  Transform T_reference_left{};
-  bool restarted = false;  // an event said that the scene was rebuilt
-};
+/// Frames [0, frames) of a rendered drive of two cameras.
+[[nodiscard]] StereoDrive render(const RenderedDriveOptions& options, std::size_t frames);
 
-/// A change of one frame before the estimator sees it. False: the frame never comes.
-using Edit = std::function<bool(std::size_t index, RigFrame* frame)>;
-
-struct Replay {
-  std::vector<Answer> answers;
-  std::uint64_t allocations = 0;  // on sealed threads, from the first frame to the last
-};
-
-/// `ok`, or nothing stands against it but that the drive has not confirmed its calibration yet:
-/// what is asked of the odometry itself.
-[[nodiscard]] inline bool good(const PoseSample& s) noexcept {
-  return s.status == PoseStatus::ok ||
-         (s.status == PoseStatus::degraded && s.reason == Reason::unverified_calibration);
-}
-
-/// Every frame of the drive through a new estimator. `threads`: 1 or 2. `online`: it may find the
-/// rig's calibration anew.
-[[nodiscard]] Replay replay(const StereoDrive& drive, const Edit& edit = {}, int threads = 1,
-                            bool online = true);
-
-/// Difference of two relative motions over the same pair of frames.
-struct MotionError {
-  double translation = 0;  // m
-  double rotation = 0;     // rad
-};
-[[nodiscard]] MotionError motion_error(const Answer& from, const Answer& to);
-
-/// Maximum error of an `ok` pose relative to the first `ok` pose since the
-/// drive's start or the last marked restart.
-struct OkBound {
-  double translation = 0.05;  // m
-  double per_metre = 0.015;   // m of the way driven since
-  double rotation = 0.01;     // rad
-};
-
-/// The worst breach of the bound among poses called `ok`, in words; empty when there is none.
-[[nodiscard]] std::string wrong_ok(const std::vector<Answer>& answers, const OkBound& bound);
-
-/// Frames of [first, last) that were called `ok`.
-[[nodiscard]] int count_ok(const std::vector<Answer>& answers, std::size_t first, std::size_t last);
-
-/// One line for every run of frames with the same status and reason: for the message of a failed
-/// expectation.
-[[nodiscard]] std::string story(const std::vector<Answer>& answers);
+/// 640×480 px, 60° wide, radtan lenses, 0.75 m baseline with the right camera turned a little.
+[[nodiscard]] RigCalibration distorted_rig();
+/// The short drive at 9 m/s from `from_s` on, 20 pairs a second.
+[[nodiscard]] RenderedDriveOptions brief_options(const RigCalibration& rig, double from_s);
+/// 12 s of it through distorted_rig(): standing, starting and a corner. Rendered once a process.
+[[nodiscard]] const StereoDrive& brief_drive();
 
 }  // namespace vergence::test

@@ -80,7 +80,7 @@ class RecordedDrive : public ::testing::Test {
   static inline TemporaryFolder* folder_ = nullptr;
 };
 
-TEST_F(RecordedDrive, replaysBitForBit) {
+TEST_F(RecordedDrive, recordingReplaysBitForBit) {
   const Outcome o = replay(session(), out("again"));
   EXPECT_LE(o.code, 1) << o.err;
   expect_same_poses(session(), out("again"));
@@ -89,7 +89,7 @@ TEST_F(RecordedDrive, replaysBitForBit) {
   EXPECT_EQ(summary_of(out("again"))["runtime_allocations"], 0);
 }
 
-TEST_F(RecordedDrive, holdsEveryMessageOnceAndIsFinished) {
+TEST_F(RecordedDrive, recordingHasEveryMessageOnceAndIsFinished) {
   const auto file = test::read_mcap(session() / "drive.mcap");
   EXPECT_TRUE(file.scan.finished);
   std::map<std::string, int> count;
@@ -105,7 +105,7 @@ TEST_F(RecordedDrive, holdsEveryMessageOnceAndIsFinished) {
   EXPECT_EQ(summary_of(session())["devices"]["recording_dropped"], 0);
 }
 
-TEST_F(RecordedDrive, aDamagedImageIsSaidAndTheRestReplays) {
+TEST_F(RecordedDrive, damagedImagesAreReportedAndOthersReplay) {
   const auto damaged = changed("damaged", [](std::string* bytes) {
     // In the middle of three images.
     for (std::size_t n = 0, at = 0; n < 30; ++n) {
@@ -122,7 +122,7 @@ TEST_F(RecordedDrive, aDamagedImageIsSaidAndTheRestReplays) {
             summary_of(session())["frames"]["read"]);
 }
 
-TEST_F(RecordedDrive, recordingsOfOtherVersionsAndProgramsAreRefusedWithASentence) {
+TEST_F(RecordedDrive, foreignOrNewerRecordingIsRefused) {
   const auto newer = changed("newer", [](std::string* bytes) {
     const std::string word = "\"version\": 1";
     const auto at = bytes->find(word);
@@ -144,7 +144,7 @@ TEST_F(RecordedDrive, recordingsOfOtherVersionsAndProgramsAreRefusedWithASentenc
   EXPECT_EQ(o.code, 2) << o.err;
 }
 
-TEST_F(RecordedDrive, isExportedForOtherPrograms) {
+TEST_F(RecordedDrive, recordingIsExportedToFolderAndEuroc) {
   const auto to = [&](const std::string& format) {
     return export_to(out(format), session(), "--format " + format);
   };
@@ -170,7 +170,7 @@ TEST_F(RecordedDrive, isExportedForOtherPrograms) {
 }
 
 // In real time: images are dropped as this machine is busy, and the solver answers when it is done.
-TEST(Recorded, aLiveDriveReplaysBitForBit) {
+TEST(Recorded, realTimeRunReplaysBitForBit) {
   const TemporaryFolder folder;
   const Outcome o = drive(folder / "live", "--from-scratch --duration 12 --set trigger.rate=10");
   ASSERT_LE(o.code, 1) << o.err;
@@ -195,7 +195,7 @@ void drive_with_truth(const std::filesystem::path& session, std::int64_t short_n
 }
 
 // The stamps of frames are measured, those of the truth exact: 8 µs are 0.3 mm.
-TEST(RecordedTruth, reachesAFrameThatIsStampedMicrosecondsAfterItsEnd) {
+TEST(RecordedTruth, truthEndingMicrosecondsEarlyIsExtrapolated) {
   const TemporaryFolder folder;
   constexpr std::int64_t kShort = 8'000;  // ns
   drive_with_truth(folder / "s", kShort);
@@ -212,7 +212,7 @@ TEST(RecordedTruth, reachesAFrameThatIsStampedMicrosecondsAfterItsEnd) {
   }
 }
 
-TEST(Recorded, thePulsesOfATriggerBoardAreRecordedAndTheDriveIsTheSame) {
+TEST(Recorded, recordedPulsesLeaveThePosesUnchanged) {
   const TemporaryFolder folder;
   const std::string chain = "run '" + std::string(VERGENCE_SOURCE_DIR) +
                             "/app/config/mock_board.yaml' --fast --duration 4" + kSmall;

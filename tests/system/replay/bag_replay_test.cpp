@@ -9,7 +9,7 @@
 namespace vergence::test {
 namespace {
 
-TEST_F(ReplayedFolder, aBagGivesThePosesOfTheSameImages) {
+TEST_F(ReplayedFolder, bagGivesThePosesOfTheSameImages) {
   ASSERT_EQ(replay().code, 0);
   const std::string poses = read_file(session() / "trajectory.tum");
   for (const BagKind& kind : {BagKind{"mcap", "zstd"}, BagKind{"rosbag", "bz2"}}) {

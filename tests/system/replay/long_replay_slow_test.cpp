@@ -50,7 +50,7 @@ double children_peak_mb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-TEST(LongReplay, tenThousandFramesTakeNoMoreMemoryThanTheirListsAndGiveOnePage) {
+TEST(LongReplay, memoryOfTenThousandFramesIsThatOfTheirLists) {
   const TemporaryFolder work;
   const std::string recorded = (work / "recorded").string(), once = (work / "once").string();
   ASSERT_LE(run_vergence("run '" VERGENCE_SOURCE_DIR "/app/config/mock.yaml' --fast --duration 25 "

@@ -13,7 +13,7 @@ namespace vergence::test {
 
 namespace fs = std::filesystem;
 
-/// The program on somebody's images.
+/// A replay of images of unknown origin.
 class QuickStart : public ::testing::Test {
  protected:
   [[nodiscard]] Outcome replay(const fs::path& data, const std::string& more) const {

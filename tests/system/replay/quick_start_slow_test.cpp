@@ -10,7 +10,7 @@
 namespace vergence::test {
 namespace {
 
-TEST_F(QuickStart, focalLengthAndBaselineAreEnoughOnEurocsDistortedImages) {
+TEST_F(QuickStart, focalLengthAndBaselineCalibrateEuroc) {
   const auto folder = shared_data("data/euroc_mh01");
   if (!folder) GTEST_SKIP() << shared_data_missing("data/euroc_mh01");
   const Outcome o = replay(*folder, "--focal 460 --baseline 0.11");
@@ -20,7 +20,7 @@ TEST_F(QuickStart, focalLengthAndBaselineAreEnoughOnEurocsDistortedImages) {
   std::printf("euroc from focal length and baseline: ATE %.1f mm\n", 1e3 * ate);
   EXPECT_LT(ate, 0.006) << "4 mm with the data set's own calibration";
   const app::CalibrationFile found = app::read_calibration(session() / "calibration.yaml");
-  EXPECT_NEAR(found.rig.intrinsics[0].distortion[0], -0.283, 0.02) << "which nobody had told";
+  EXPECT_NEAR(found.rig.intrinsics[0].distortion[0], -0.283, 0.02) << "without an initial value";
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ std::string times_at_ten_hertz(int count) {
   return times;
 }
 
-TEST_F(QuickStart, rawImagesWithoutTheirDistortionAreNotToBeUsed) {
+TEST_F(QuickStart, missingDistortionExitsOneAndIsNamed) {
   const auto folder = shared_data(kRaw);
   if (!folder) GTEST_SKIP() << shared_data_missing(kRaw);
   // Focal lengths, centres and transform of calib_cam_to_cam.txt, but no distortion.
@@ -58,7 +58,7 @@ std::string euroc_times() {
   return times;
 }
 
-TEST_F(QuickStart, aRotationGivenTransposedIsCalledThat) {
+TEST_F(QuickStart, transposedRotationIsReportedAsInverted) {
   const auto folder = shared_data("data/euroc_mh01/mav0");
   if (!folder) GTEST_SKIP() << shared_data_missing("data/euroc_mh01/mav0");
   const fs::path data = plain(
@@ -72,7 +72,7 @@ TEST_F(QuickStart, aRotationGivenTransposedIsCalledThat) {
   EXPECT_TRUE(test::mentions(o.err, "T_camera_left or its rotation may be inverted"));
 }
 
-TEST_F(QuickStart, aTransformGivenAsItsInverseIsRefused) {
+TEST_F(QuickStart, inverseTransformIsRefused) {
   const auto folder = shared_data("data/euroc_mh01/mav0");
   if (!folder) GTEST_SKIP() << shared_data_missing("data/euroc_mh01/mav0");
   const fs::path data = plain(

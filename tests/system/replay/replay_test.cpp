@@ -19,7 +19,7 @@
 namespace vergence::test {
 namespace {
 
-TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
+TEST_F(ReplayedFolder, everyFrameIsPosedAndSessionIsComplete) {
   const Outcome o = replay();
   ASSERT_EQ(o.code, 0) << o.err;
   for (const char* file : {"trajectory.tum", "poses.csv", "calibration.yaml", "calibrations.csv",
@@ -32,7 +32,7 @@ TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
   EXPECT_TRUE(s["metrics"].is_null());  // a plain folder has no truth
 }
 
-TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
+TEST_F(ReplayedFolder, shortSequenceReportsUnverifiedCalibration) {
   // A calibration that is given is judged with 20 frames for the first time.
   const Outcome o = run_vergence("replay '" + data().string() + "' --format folder --frames 18 " +
                                  "--out '" + session().string() + "'");
@@ -45,7 +45,7 @@ TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
   EXPECT_TRUE(test::mentions(read_file(session() / "report.html"), "not verified"));
 }
 
-TEST_F(ReplayedFolder, fromScratchIntrinsicsAndALengthAreEnough) {
+TEST_F(ReplayedFolder, fromScratchNeedsOnlyIntrinsicsAndLength) {
   std::string text = read_file(data() / "calibration.yaml");
   const auto at = text.find("    T_camera_left: [");
   ASSERT_NE(at, std::string::npos);
@@ -75,7 +75,7 @@ bool shows(int terminal, const std::string& words) {
   return true;
 }
 
-TEST_F(ReplayedFolder, whoStopsTheCalibrationStopsTheReplay) {
+TEST_F(ReplayedFolder, signalDuringCalibrationStopsTheReplay) {
   for (const int number : {SIGINT, SIGTERM}) {
     ChildProgram program(
         {"replay", data(), "--format", "folder", "--calibrate-first", "--out", session()},
@@ -86,7 +86,7 @@ TEST_F(ReplayedFolder, whoStopsTheCalibrationStopsTheReplay) {
   }
 }
 
-TEST_F(ReplayedFolder, swappedFoldersAreNotToBeUsedAndSaySo) {
+TEST_F(ReplayedFolder, swappedFoldersExitOneAndAreReported) {
   fs::rename(data() / "left", data() / "other");
   fs::rename(data() / "right", data() / "left");
   fs::rename(data() / "other", data() / "right");
@@ -99,7 +99,7 @@ TEST_F(ReplayedFolder, swappedFoldersAreNotToBeUsedAndSaySo) {
       << "nothing is, but what is so by design";
 }
 
-TEST_F(ReplayedFolder, aReferenceBesideTheImagesIsComparedWith) {
+TEST_F(ReplayedFolder, referenceNextToTheImagesIsCompared) {
   ASSERT_EQ(replay().code, 0);
   EXPECT_FALSE(fs::exists(session() / "reference.tum")) << "there was none";
   fs::copy(session() / "trajectory.tum", data() / "truth.tum");
@@ -109,7 +109,7 @@ TEST_F(ReplayedFolder, aReferenceBesideTheImagesIsComparedWith) {
   EXPECT_TRUE(fs::exists(session() / "reference.tum"));
 }
 
-TEST_F(ReplayedFolder, focalLengthAndBaselineNeedEachOther) {
+TEST_F(ReplayedFolder, incompleteFocalLengthOptionsAreRefused) {
   for (const char* bad : {"--focal 500", "--focal 5 --baseline 0.5",
                           "--focal 500 --baseline 0.5 --calibration c.yaml"}) {
     const Outcome o = replay(bad);
@@ -119,7 +119,7 @@ TEST_F(ReplayedFolder, focalLengthAndBaselineNeedEachOther) {
   }
 }
 
-TEST_F(ReplayedFolder, aBaselineGivenScalesTheWay) {
+TEST_F(ReplayedFolder, suppliedBaselineScalesThePath) {
   ASSERT_EQ(replay().code, 0);
   const double way = summary()["path_m"], length = summary()["calibration"]["baseline_m"];
   fs::remove_all(session());
@@ -130,7 +130,7 @@ TEST_F(ReplayedFolder, aBaselineGivenScalesTheWay) {
   EXPECT_EQ(run_vergence("replay x --format folder --out y --baseline 0").code, 2);
 }
 
-TEST_F(ReplayedFolder, ofImagesThatAreMissingAThousandAreListedAndTheRestCounted) {
+TEST_F(ReplayedFolder, thousandMissingImagesAreListedOthersCounted) {
   constexpr std::size_t kMissing = 1300;
   std::string times;
   for (std::size_t i = 0; i < kFrames + kMissing; ++i)

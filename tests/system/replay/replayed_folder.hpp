@@ -11,7 +11,7 @@
 
 #include "app/config/calibration_file.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/system/odometry/mock_drive.hpp"
+#include "tests/system/odometry/stereo_drive.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {
@@ -24,14 +24,17 @@ inline std::string image_name(int camera, std::size_t pair) {
   return fmt::format("{}/{:03d}.png", camera == 0 ? "left" : "right", pair);
 }
 
-/// A rendered stretch in the layout of `--format folder`: what a newcomer brings.
+/// A rendered sequence in the layout of `--format folder`.
 class ReplayedFolder : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     master_ = new TemporaryFolder;
-    mock::DriveOptions options;
-    options.kind = mock::DriveKind::brief;
-    const StereoDrive drive = render_drive(options, Duration::seconds(6), kFrames);
+    RenderedDriveOptions options;
+    options.rig = distorted_rig();
+    options.drive.kind = mock::DriveKind::brief;
+    options.from_s = 6;
+    options.rate = 20;
+    const StereoDrive drive = render(options, kFrames);
     std::string times;
     for (std::size_t i = 0; i < drive.size(); ++i) {
       times += fmt::format("{}\n", drive.stamps[i].ns());
@@ -51,7 +54,7 @@ class ReplayedFolder : public ::testing::Test {
   }
   static void TearDownTestSuite() { delete master_; }
 
-  /// A copy of the stretch, to be spoilt.
+  /// A copy of the sequence, which a test may change.
   ReplayedFolder() { fs::copy(*master_ / ".", data(), fs::copy_options::recursive); }
 
   [[nodiscard]] fs::path data() const { return work_ / "data"; }

@@ -15,7 +15,7 @@ std::string readme() {
   return test::read_file(std::filesystem::path(VERGENCE_SOURCE_DIR) / "README.md");
 }
 
-TEST(Readme, itsCalibrationIsRead) {
+TEST(Readme, calibrationExampleIsRead) {
   const std::string text = readme();
   const std::string open = "```yaml\n";
   const std::size_t begin = text.find(open);
@@ -27,19 +27,6 @@ TEST(Readme, itsCalibrationIsRead) {
   EXPECT_EQ(file.rig.intrinsics[1].width, 752);
   EXPECT_LT(file.rig.T_camera_left[1].t.x(), 0) << "the camera to the right";
   EXPECT_NEAR(file.rig.T_camera_left[1].t.norm(), file.rig.baseline, 1e-5);
-}
-
-TEST(Readme, theScriptsAndPapersItNamesExist) {
-  const std::string text = readme();
-  const std::filesystem::path root(VERGENCE_SOURCE_DIR);
-  int scripts = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(root / "scripts"))
-    if (entry.is_regular_file() &&
-        text.find("scripts/" + entry.path().filename().string()) != std::string::npos)
-      ++scripts;
-  EXPECT_GE(scripts, 4) << "demo, test, bench and the list of packages";
-  for (const char* named : {"docs/configuration.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"})
-    EXPECT_TRUE(std::filesystem::exists(root / named)) << named;
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ using test::lines_of;
 using test::within;
 
 // Devices take seconds to open, a mock's world to build: who stops it then has no session.
-TEST(Stop, beforeTheDriveBeganLeavesNoFolder) {
+TEST(Stop, sigtermBeforeTheRunLeavesNoDirectory) {
   const test::TemporaryFolder folder;
   Drive drive(folder / "s", false, 600);
   std::this_thread::sleep_for(100ms);
@@ -30,7 +30,7 @@ TEST(Stop, beforeTheDriveBeganLeavesNoFolder) {
   EXPECT_FALSE(fs::exists(folder / "s"));
 }
 
-TEST(Hangup, closesTheSession) {
+TEST(Hangup, sighupOrClosedTerminalClosesSession) {
   const test::TemporaryFolder folder;
   for (const bool terminal : {false, true}) {
     const fs::path session = folder / (terminal ? "terminal" : "none");

@@ -1,5 +1,4 @@
 #pragma once
-#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -34,10 +33,5 @@ class Drive : public ChildProgram {
     return words;
   }
 };
-
-[[nodiscard]] inline std::size_t lines_of(const std::filesystem::path& file) {
-  const std::string text = text_of(file);
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-}
 
 }  // namespace vergence::test

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -13,11 +14,17 @@ namespace vergence::test {
 inline const std::string kSmall =
     " --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0";
 
+/// All bytes of a file; empty while there is none.
 [[nodiscard]] inline std::string text_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream all;
   all << in.rdbuf();
   return all.str();
+}
+
+[[nodiscard]] inline std::size_t lines_of(const std::filesystem::path& file) {
+  const std::string text = text_of(file);
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
 [[nodiscard]] inline nlohmann::json summary_of(const std::filesystem::path& session) {

@@ -21,7 +21,7 @@ void expect_whole(const fs::path& session) {
   EXPECT_TRUE(fs::exists(session / "report.html"));
 }
 
-TEST(Run, aDriveInRealTimeEndsByTheClockWhereEveryCameraIsGone) {
+TEST(Run, runEndsOnTimeWithoutAnyCamera) {
   const test::TemporaryFolder folder;
   Drive drive(folder / "s", false, 4,
               {"--quiet", "--fault", "camera_gone@2 camera=-1 duration_s=0"});

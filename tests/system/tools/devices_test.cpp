@@ -19,7 +19,7 @@ using nlohmann::json;
 using test::Outcome;
 using test::run_vergence;
 
-TEST(Devices, aCameraOnTheNetworkIsListedWithWhatToPaste) {
+TEST(Devices, networkCameraIsListedWithItsConfiguration) {
   test::GigeCameraOptions o;
   o.address = test::GigeCamera::address(60);
   o.serial = "TOOL-60";
@@ -44,7 +44,7 @@ TEST(Devices, aCameraOnTheNetworkIsListedWithWhatToPaste) {
   EXPECT_FALSE(all.contains("udev_rules"));
 }
 
-TEST(Devices, udevRulesGoWhereTheyAreAskedFor) {
+TEST(Devices, udevRulesAreWrittenToFileJsonOrStdout) {
   const Outcome out = run_vergence("devices --write-udev");
   EXPECT_EQ(out.code, 0);
   EXPECT_TRUE(out.out.starts_with("# Devices of this rig")) << out.out;

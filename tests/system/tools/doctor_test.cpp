@@ -27,7 +27,7 @@ json of(const json& all, const std::string& check) {
   return some;
 }
 
-TEST(Doctor, aDriveOfTheMockNeedsNoDevice) {
+TEST(Doctor, simulatedRigNeedsNoDevice) {
   const Outcome o = run_vergence("doctor '" + kConfigurations + "mock.yaml' --json");
   const json all = json::parse(o.out);
   EXPECT_EQ(o.code, all["problems"] == 0 ? 0 : 1);
@@ -37,7 +37,7 @@ TEST(Doctor, aDriveOfTheMockNeedsNoDevice) {
             static_cast<int>(all["findings"].size()));
 }
 
-TEST(Doctor, missingCamerasAreAProblemAndTheExitCodeSaysSo) {
+TEST(Doctor, missingCamerasAreProblemsAndExitOne) {
   const Outcome o =
       run_vergence("doctor '" + kConfigurations +
                    "gige.yaml' --set cameras.0.serial=NOT-HERE --set cameras.1.serial=NOR-HERE");
@@ -48,7 +48,7 @@ TEST(Doctor, missingCamerasAreAProblemAndTheExitCodeSaysSo) {
   EXPECT_FALSE(contains(o.out, "\033")) << "no colours but on a terminal";
 }
 
-TEST(Doctor, aCameraThatIsThereIsMatchedAndItsLinkJudged) {
+TEST(Doctor, connectedCameraAndItsLinkAreEvaluated) {
   test::GigeCameraOptions options;
   options.address = test::GigeCamera::address(61);
   options.serial = "TOOL-61";
@@ -63,7 +63,7 @@ TEST(Doctor, aCameraThatIsThereIsMatchedAndItsLinkJudged) {
   EXPECT_TRUE(contains(of(all, "camera_network").dump(), options.address + " through lo"));
 }
 
-TEST(Doctor, whatCannotBeReadIsRefusedInASentence) {
+TEST(Doctor, invalidArgumentsExitTwo) {
   EXPECT_EQ(run_vergence("doctor /no/such/file.yaml").code, 2);
   EXPECT_EQ(run_vergence("doctor --set threads=1").code, 2);
   EXPECT_EQ(

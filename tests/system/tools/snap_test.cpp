@@ -1,9 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <array>
 #include <chrono>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,7 +11,7 @@
 
 #include "app/datasets/image_file.hpp"
 #include "core/math/random.hpp"
-#include "tests/support/gige_camera.hpp"
+#include "tests/support/gige_pair.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -23,7 +22,6 @@ namespace {
 using test::contains;
 
 using nlohmann::json;
-using test::GigeCamera;
 using test::Outcome;
 using test::run_vergence;
 using test::TemporaryFolder;
@@ -46,7 +44,7 @@ app::ImageSize size_of(const std::filesystem::path& file) {
   return size;
 }
 
-TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
+TEST(SnapMock, imageOfEachCameraAndItsStatistics) {
   const TemporaryFolder folder;
   const Outcome o = snap(folder, "mock.yaml", "");
   ASSERT_EQ(o.code, 0) << o.err;
@@ -65,7 +63,7 @@ TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
   }
 }
 
-TEST(SnapMock, aCapOnALensIsNoticed) {
+TEST(SnapMock, coveredLensIsReportedAndExitsOne) {
   const TemporaryFolder folder;
   const Outcome o = snap(folder, "mock.yaml", "--set 'faults.0=cover@0 camera=1'");
   EXPECT_EQ(o.code, 1) << o.err;
@@ -73,7 +71,7 @@ TEST(SnapMock, aCapOnALensIsNoticed) {
   EXPECT_EQ(report(folder)["sets"][0]["findings"][0]["unusable"], true);
 }
 
-TEST(SnapMock, nothingIsOverwrittenAndNonsenseIsRefused) {
+TEST(SnapMock, existingDirectoryAndBadOptionsExitTwo) {
   const TemporaryFolder folder;
   (void)folder.write("s/precious", "x");
   EXPECT_EQ(snap(folder, "mock.yaml", "").code, 2);
@@ -86,60 +84,30 @@ TEST(SnapMock, nothingIsOverwrittenAndNonsenseIsRefused) {
   }
 }
 
-/// The two cameras of app/config/gige.yaml, simulated; the second sees the same scene from further
-/// right, as it should.
-struct Wires {
-  Wires() {
-    for (int k = 0; k < 2; ++k) {
-      scenes.push_back(scene(12 * k));
-      test::GigeCameraOptions o;
-      o.address = GigeCamera::address(70 + k);
-      o.serial = "SNAP-" + std::to_string(k);
-      o.sensor_width = kWidth;
-      o.sensor_height = kHeight;
-      o.number_images = false;
-      o.discoverable = false;
-      o.images = [pixels = scenes.back().data()](std::uint64_t) { return pixels; };
-      cameras.push_back(std::make_unique<GigeCamera>(o));
+/// A scene of random squares, moved by `shift` px.
+std::vector<std::uint8_t> scene(int shift) {
+  constexpr int kSquare = 8;
+  std::vector<std::uint8_t> pixels;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      Random level(static_cast<std::uint64_t>((y / kSquare) * 1000 + (x + shift) / kSquare));
+      pixels.push_back(static_cast<std::uint8_t>(40 + level.below(150)));
     }
-  }
-  static std::vector<std::uint8_t> scene(int shift) {
-    constexpr int kSquare = 8;
-    std::vector<std::uint8_t> pixels;
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) {
-        Random level(static_cast<std::uint64_t>((y / kSquare) * 1000 + (x + shift) / kSquare));
-        pixels.push_back(static_cast<std::uint8_t>(40 + level.below(150)));
-      }
-    return pixels;
-  }
-  [[nodiscard]] std::string settings() const {
-    std::string s = "--set trigger.rate=10";
-    for (int k = 0; k < 2; ++k) {
-      const std::string at = " --set cameras." + std::to_string(k);
-      s += at + ".serial=" + cameras[static_cast<std::size_t>(k)]->options().address + at +
-           ".size=[320,240]";
-    }
-    return s;
-  }
-  std::vector<std::vector<std::uint8_t>> scenes;
-  std::vector<std::unique_ptr<GigeCamera>> cameras;
+  return pixels;
+}
+
+/// The two cameras of app/config/gige.yaml; the right one sees the same scene from further right.
+struct SnapGige : testing::Test {
+  std::array<std::vector<std::uint8_t>, 2> shown{scene(0), scene(12)};
+  test::GigePair cameras{"SNAP", 70, kWidth, kHeight,
+                         [this](std::size_t k, std::uint64_t) { return shown[k].data(); }};
+  std::string settings = "--set trigger.rate=10" + cameras.settings();
 };
 
-TEST(SnapGige, pulsesGivePairsAndThePicturesAreThoseThatWereSent) {
-  const Wires wires;
-  std::atomic<bool> quit{false};
-  std::thread pulses([&] {
-    for (std::uint64_t n = 0; !quit; ++n) {
-      const HostStamp now(std::chrono::steady_clock::now().time_since_epoch().count());
-      for (const auto& camera : wires.cameras) camera->pulse(n, now);
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-  });
+TEST_F(SnapGige, pulsesGivePairsOfTheSentImages) {
+  const std::jthread pulses = cameras.pulses(10);
   const TemporaryFolder folder;
-  const Outcome o = snap(folder, "gige.yaml", wires.settings());
-  quit = true;
-  pulses.join();
+  const Outcome o = snap(folder, "gige.yaml", settings);
   ASSERT_EQ(o.code, 0) << o.err;
   const json all = report(folder);
   EXPECT_EQ(all["trigger"], "hardware");
@@ -150,18 +118,17 @@ TEST(SnapGige, pulsesGivePairsAndThePicturesAreThoseThatWereSent) {
               app::ImageFileStatus::ok);
     ASSERT_EQ(app::decode_grey(bytes, {kWidth, kHeight}, pixels.data(), kWidth),
               app::ImageFileStatus::ok);
-    EXPECT_EQ(pixels, wires.scenes[k]);
+    EXPECT_EQ(pixels, shown[k]);
   }
 }
 
-TEST(SnapGige, aCameraThatSendsNothingEndsWithThreeAndItsName) {
-  const Wires wires;
-  wires.cameras[1]->silence(true);
+TEST_F(SnapGige, silentCameraIsNamedAndExitsThree) {
+  cameras[1].silence(true);
   const TemporaryFolder folder;
   const auto begin = std::chrono::steady_clock::now();
   const Outcome o =
       snap(folder, "gige.yaml",
-           wires.settings() +
+           settings +
                " --wait 2 --set cameras.0.trigger=software --set cameras.1.trigger=software");
   EXPECT_EQ(o.code, 3) << o.err;
   EXPECT_TRUE(contains(o.err, "right (gige SNAP-1) sent no image within 2 s")) << o.err;

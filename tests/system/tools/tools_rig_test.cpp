@@ -74,7 +74,7 @@ class ToolsRig : public ::testing::Test {
   std::unique_ptr<DeviceOnDescriptor> sensor_;
 };
 
-TEST_F(ToolsRig, everythingThatIsPluggedInIsListedOnce) {
+TEST_F(ToolsRig, everyConnectedDeviceIsListedOnce) {
   Emulator usb("sim_usb_iidc", {"--cameras", "2"});
   Emulator firewire("sim_1394", {"--cameras", "2"});
   json all;
@@ -97,7 +97,7 @@ TEST_F(ToolsRig, everythingThatIsPluggedInIsListedOnce) {
   EXPECT_TRUE((*converter)["latency_timer_ms"].is_number());
 }
 
-TEST_F(ToolsRig, theRulesThatAreWrittenWork) {
+TEST_F(ToolsRig, writtenUdevRulesTakeEffect) {
   Emulator usb("sim_usb_iidc", {"--cameras", "1"});
   std::size_t cameras = 0;  // those of the test before are on their way out, this one on its way in
   for (int i = 0; i < 15 && cameras != 1; ++i) cameras = cameras_of(devices(), "iidc-usb");
@@ -125,7 +125,7 @@ TEST_F(ToolsRig, theRulesThatAreWrittenWork) {
   EXPECT_EQ(awake, 1U) << rules;
 }
 
-TEST_F(ToolsRig, aRigsRulesNameThePortByWhatTheConfigurationHasOnIt) {
+TEST_F(ToolsRig, rigRulesNamePortAfterItsConfiguredDevice) {
   const TemporaryFolder folder;
   fs::create_directories("/run/udev/rules.d");
   const auto linked_as = [&](const std::string& group, const std::string& driver) {
@@ -148,7 +148,7 @@ TEST_F(ToolsRig, aRigsRulesNameThePortByWhatTheConfigurationHasOnIt) {
   fs::remove("/run/udev/rules.d/98-vergence-rig.rules");
 }
 
-TEST_F(ToolsRig, whatTheDoctorPrintsMends) {
+TEST_F(ToolsRig, doctorFixForLatencyTimerWorks) {
   Emulator usb("sim_usb_iidc", {"--cameras", "2"});
   std::ofstream("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer") << 1 << std::flush;
   const json slow = finding("", "latency_timer");

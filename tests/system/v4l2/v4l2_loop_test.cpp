@@ -45,7 +45,7 @@ class V4l2Loop : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists("/dev/video3"))
-      GTEST_SKIP() << "no looped video nodes: this test runs inside the rig's kernel";
+      GTEST_SKIP() << "needs looped video nodes of the rig's kernel: run it by ctest -L rig";
     for (int k = 0; k < 2; ++k) test::loop(node(2 * k), node(2 * k + 1));
   }
   static std::string node(int number) { return "/dev/video" + std::to_string(number); }
@@ -83,7 +83,7 @@ std::pair<std::int64_t, std::int64_t> shown_to(const Kept& frame, const VividPla
   return all;
 }
 
-TEST_F(V4l2Loop, thinnedCamerasSeeTheSameImagesAndEveryOne) {
+TEST_F(V4l2Loop, decimatedCamerasDeliverEveryLoopedImage) {
   constexpr int kFrames = 40;
   VividPlayer player({node(1), node(3)}, kInterval_ns, draw_number);
   CameraConfiguration c = configuration(10);

@@ -40,7 +40,7 @@ class V4l2Rig : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists("/dev/video0"))
-      GTEST_SKIP() << "no video nodes: this test runs inside the rig's kernel";
+      GTEST_SKIP() << "needs the video nodes of the rig's kernel: run it by ctest -L rig";
     for (const DeviceInfo& d : driver_->enumerate()) serials_.push_back(d.serial);
     ASSERT_EQ(serials_.size(), 2U) << "two test cameras";
   }
@@ -81,7 +81,7 @@ TEST_F(V4l2Rig, camerasAreListedAndOpenedBySerialOrPath) {
   EXPECT_NE(driver_->last_error().find("/dev/null"), std::string::npos);
 }
 
-TEST_F(V4l2Rig, withoutPermissionItSaysSo) {
+TEST_F(V4l2Rig, missingPermissionIsReportedWithTheGroup) {
   const std::string path = node(0);
   ASSERT_EQ(::setegid(65534), 0);
   ASSERT_EQ(::seteuid(65534), 0);
@@ -95,7 +95,7 @@ TEST_F(V4l2Rig, withoutPermissionItSaysSo) {
   EXPECT_NE(said.find("group video"), std::string::npos) << said;
 }
 
-TEST_F(V4l2Rig, everyFormatGivesTheSameGrey) {
+TEST_F(V4l2Rig, everyPixelFormatGivesTheSameGrey) {
   set_control(node(0), "test_pattern", 20);  // a ramp of grey: the weights of colours do not matter
   set_control(node(0), "osd_text_mode", 2);
   std::vector<std::uint8_t> reference;
@@ -134,7 +134,7 @@ TEST_F(V4l2Rig, everyFormatGivesTheSameGrey) {
   set_control(node(0), "test_pattern", 0);
 }
 
-TEST_F(V4l2Rig, whatItCannotDoIsSaidWithWhatItOffers) {
+TEST_F(V4l2Rig, unsupportedSettingIsReportedWithTheOffer) {
   auto camera = open(0);
   using C = CameraConfiguration;
   for (const auto& [change, word] : {
@@ -160,7 +160,7 @@ TEST_F(V4l2Rig, whatItCannotDoIsSaidWithWhatItOffers) {
       << "this camera has none that can be set";
 }
 
-TEST_F(V4l2Rig, aRateItDoesNotHaveIsRoundedAndRemarked) {
+TEST_F(V4l2Rig, unsupportedRateIsRoundedAndRemarked) {
   auto camera = open(0);
   CameraConfiguration c = webcam(), actual;
   c.rate_hz = 22;
@@ -184,7 +184,7 @@ TEST_F(V4l2Rig, controlsAreSetByName) {
   set_control(node(0), "brightness", 128);
 }
 
-TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
+TEST_F(V4l2Rig, startOfExposureStampsAreUnchanged) {
   // The test camera delivers at the start of a frame; the end of frame it stamps lies nine tenths
   // of a period later.
   const Duration exposure = Duration::milliseconds(8), later = Duration::milliseconds(36);
@@ -209,7 +209,7 @@ TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
       << "the exposure is taken off the end of frame";
 }
 
-TEST_F(V4l2Rig, oneThatStaysSilentIsGoneAndStreamsAgain) {
+TEST_F(V4l2Rig, silentCameraDisconnectsAndStreamsAgain) {
   auto camera = streaming(0);
   set_control(node(0), "percentage_of_dropped_buffers", 100);
   Frame frame;
@@ -226,7 +226,7 @@ TEST_F(V4l2Rig, oneThatStaysSilentIsGoneAndStreamsAgain) {
   EXPECT_EQ(camera->statistics().starts, 2U);
 }
 
-TEST_F(V4l2Rig, aBufferWithTheErrorFlagIsTorn) {
+TEST_F(V4l2Rig, bufferWithErrorFlagIsIncomplete) {
   auto camera = streaming(0);
   Frame frame;
   ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
@@ -242,7 +242,7 @@ TEST_F(V4l2Rig, aBufferWithTheErrorFlagIsTorn) {
   EXPECT_EQ(camera->statistics().torn, 1U);
 }
 
-TEST_F(V4l2Rig, aQueueInErrorIsGoneAndStartMendsIt) {
+TEST_F(V4l2Rig, queueErrorDisconnectsUntilStart) {
   auto camera = streaming(0);
   Frame frame;
   ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
@@ -261,14 +261,14 @@ TEST_F(V4l2Rig, aQueueInErrorIsGoneAndStartMendsIt) {
   camera->release(held);
 }
 
-TEST_F(V4l2Rig, anotherProgramsStreamIsBusy) {
+TEST_F(V4l2Rig, cameraStreamedByAnotherProgramIsBusy) {
   const auto first = streaming(0);
   const auto second = open(0);
   EXPECT_EQ(second->configure(webcam(), nullptr), DeviceStatus::busy);
   EXPECT_NE(second->last_error().find("another program"), std::string::npos);
 }
 
-TEST_F(V4l2Rig, stopsAndStartsUnderLoadLeakNothing) {
+TEST_F(V4l2Rig, repeatedStopAndStartLeaksNoDescriptor) {
   const auto open_files = [] {
     return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
   };

@@ -9,8 +9,6 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,6 +20,7 @@
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/child_program.hpp"
 #include "tests/support/thread_allocations.hpp"
+#include "tests/system/run/session.hpp"
 
 namespace vergence {
 namespace {
@@ -30,23 +29,11 @@ using namespace std::chrono_literals;
 
 constexpr std::int64_t kInterval_ns = 100'000'000;
 
-std::size_t lines_of(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream all;
-  all << in.rdbuf();
-  return all.str();
-}
-
 class V4l2Run : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists("/dev/video3"))
-      GTEST_SKIP() << "no looped video nodes: this test runs inside the rig's kernel";
+      GTEST_SKIP() << "needs looped video nodes of the rig's kernel: run it by ctest -L rig";
     std::filesystem::remove_all(session_);
   }
   static std::string node(int number) { return "/dev/video" + std::to_string(number); }
@@ -76,7 +63,7 @@ class V4l2Run : public ::testing::Test {
   };
   void drive(test::ChildProgram* program, Roll* roll, const test::Film& film) const {
     for (const auto end = std::chrono::steady_clock::now() + 60s;
-         lines_of(session_ + "/poses.csv") < 6;) {
+         test::lines_of(session_ + "/poses.csv") < 6;) {
       ASSERT_LT(std::chrono::steady_clock::now(), end) << "no pose in a minute";
       std::this_thread::sleep_for(100ms);
     }
@@ -85,9 +72,6 @@ class V4l2Run : public ::testing::Test {
                                 (static_cast<int>(film.pairs()) + 20));
     program->signal(SIGINT);
     EXPECT_EQ(program->wait(30s), 130) << "ended by the signal, session closed";
-  }
-  nlohmann::json summary() const {
-    return nlohmann::json::parse(text_of(session_ + "/summary.json"));
   }
   /// Nothing that came was lost, and the trajectory is the film's.
   void expect_the_drive(const test::Film& film, const nlohmann::json& summary) const {
@@ -132,7 +116,7 @@ class V4l2Run : public ::testing::Test {
   std::string session_ = ::testing::UnitTest::GetInstance()->current_test_info()->name();
 };
 
-TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
+TEST_F(V4l2Run, trajectoryIsThatOfTheFilm) {
   for (int k = 0; k < 2; ++k) test::loop(node(2 * k), node(2 * k + 1));
   const char* folder = std::getenv("VERGENCE_FILM");
   ASSERT_NE(folder, nullptr);
@@ -146,7 +130,7 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
       });
   test::ChildProgram program(words());
   ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
-  const nlohmann::json s = summary();
+  const nlohmann::json s = test::summary_of(session_);
   expect_the_drive(film, s);
   EXPECT_EQ(s["devices"]["frames_incomplete"], 0);
   for (const char* name : {"camera0_underruns", "camera1_underruns"})
@@ -156,7 +140,7 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
 }
 
 /// The film's two images beside one another in the middle of a larger picture's rows.
-TEST_F(V4l2Run, theSameDriveComesOutOfOneCameraWithBothImagesInItsPicture) {
+TEST_F(V4l2Run, sideBySideCameraGivesTrajectoryOfTheFilm) {
   constexpr test::LoopSize kSize = test::LoopSize::hd;
   test::loop(node(0), node(1), kSize);
   const char* folder = std::getenv("VERGENCE_FILM");
@@ -181,7 +165,7 @@ TEST_F(V4l2Run, theSameDriveComesOutOfOneCameraWithBothImagesInItsPicture) {
       kSize);
   test::ChildProgram program(side_by_side());
   ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
-  const nlohmann::json s = summary();
+  const nlohmann::json s = test::summary_of(session_);
   expect_the_drive(film, s);
   EXPECT_EQ(s["devices"]["sets_ambiguous"], 0) << s["devices"].dump(1);
   EXPECT_EQ(s["devices"]["sets_incomplete"], 0) << "one picture has both";

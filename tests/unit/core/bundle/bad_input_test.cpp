@@ -29,7 +29,7 @@ struct Defect {
   BundleTermination termination = BundleTermination::invalid_input;
 };
 
-TEST(BadBundle, isRefusedAndNothingOfTheCallersIsChanged) {
+TEST(BadBundle, invalidProblemIsRefusedAndUnchanged) {
   constexpr BundleTermination kUndetermined = BundleTermination::rank_deficient;
   static const std::vector<std::uint8_t> none_constant(4, 0);
   for (const Defect& d : {
@@ -107,7 +107,7 @@ TEST(BadBundle, isRefusedAndNothingOfTheCallersIsChanged) {
   }
 }
 
-TEST(BadBundle, pointSeenNeverIsLeftAlone) {
+TEST(BadBundle, unobservedPointIsUnchanged) {
   SimulatedRig rig = make();
   OwnAdjuster own(capacities_for(small()));
   std::erase_if(rig.observations, [](const BundleObservation& o) { return o.point == 5; });
@@ -116,7 +116,7 @@ TEST(BadBundle, pointSeenNeverIsLeftAlone) {
   EXPECT_EQ(rig.points[5], before);
 }
 
-TEST(BadBundle, moreThanTheCapacityIsRefused) {
+TEST(BadBundle, problemBeyondTheCapacityIsRefused) {
   SimulatedRig rig = make();
   for (const int what : {0, 1, 2, 3, 4, 5}) {
     BundleCapacities c = capacities_for(small());
@@ -136,7 +136,7 @@ TEST(BadBundle, moreThanTheCapacityIsRefused) {
   }
 }
 
-TEST(BadBundle, aPoseSeenByTwoPointsIsRankDeficient) {
+TEST(BadBundle, poseWithTwoPointsIsRankDeficient) {
   SimulatedRig rig = make();
   OwnAdjuster own(capacities_for(small()));
   std::erase_if(rig.observations, [](const BundleObservation& o) {
@@ -148,8 +148,8 @@ TEST(BadBundle, aPoseSeenByTwoPointsIsRankDeficient) {
   EXPECT_TRUE(rig.T_left_world[3].finite());
 }
 
-/// Problems that nobody would pose: whatever comes out has a name and is finite.
-TEST(BundleFuzz, hostileProblemsEndAndNeverWithNaN) {
+/// Random invalid problems give a named termination and finite results.
+TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
   SimulationOptions s;
   s.points = 20;
   s.poses = 5;

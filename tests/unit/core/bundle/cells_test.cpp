@@ -82,7 +82,7 @@ Vec2 no_field(const Vec2&) { return Vec2::Zero(); }
 
 // A variance from 36 clusters of which five parameters have taken up theirs scatters by √(2/31) =
 // 25 %, from three blocks of frames by 100 %; the mean over 40 draws by 4 % and 16 %.
-TEST(BundleCells, withIndependentErrorsTheyAgreeWithTracksOnAverage) {
+TEST(BundleCells, independentErrorsGiveTheVarianceOfTracks) {
   struct Frames {
     int poses, life;
   };
@@ -101,7 +101,7 @@ TEST(BundleCells, withIndependentErrorsTheyAgreeWithTracksOnAverage) {
 // Errors that eleven tracks of a cell share add up there: their variance counts eleven times as
 // much as by tracks. Of the field, 0.3 px in the corners and 0.1 px over the image, tracks of eight
 // images see 0.1²/(0.1² + 0.2²/8), two thirds.
-TEST(BundleCells, aFieldOverTheImageIsSeenByThemAndNotByTracks) {
+TEST(BundleCells, errorFieldOfTheImageWidensTheVariance) {
   constexpr int kRuns = 10;
   double mean = 0;
   for (std::uint64_t seed = 0; seed < kRuns; ++seed)

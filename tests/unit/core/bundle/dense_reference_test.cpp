@@ -152,7 +152,7 @@ void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
 class DenseReference : public ::testing::TestWithParam<Case> {};
 
-TEST_P(DenseReference, oneStepIsTheDenseStep) {
+TEST_P(DenseReference, oneStepMatchesTheDenseStep) {
   const Case& c = GetParam();
   SimulationOptions s;
   s.cameras = c.cameras;

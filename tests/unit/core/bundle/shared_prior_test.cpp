@@ -90,19 +90,22 @@ struct TwoHalves {
 /// √(2/300) = 8 %, some more in the worst of six directions. That shifts the weight between the
 /// halves by no more, and their distance is √2 of each one's sigma, twice that of both: 0.3 of the
 /// latter is several times the shift.
-void halves_one_after_the_other(const BundleOptions& first, const BundleOptions& second,
-                                int intrinsic) {
+TEST(BundleSharedPrior, sequentialHalvesMatchBothTogether) {
+  BundleOptions first = to_the_minimum();
+  first.intrinsics[1].free = 0b1;
+  first.intrinsics[1].prior_mean[0] = 886;
+  first.intrinsics[1].prior_sigma[0] = 20;
   TwoHalves h(73);
   SimulatedRig one, alone, two, both;
   const BundleResult r1 = h.solve(1, first, &one), r2 = h.solve(2, first, &alone),
                      r = h.solve(3, first, &both);
   ASSERT_TRUE(r1.converged() && r2.converged() && r.converged());
   const RigCalibration known = calibration_of(one, r1.covariance);
-  BundleOptions o = second;
-  o.shared_prior.rig = &known;
-  const BundleResult after = h.solve(2, o, &two);
+  BundleOptions second = first;
+  second.intrinsics[1].prior_sigma[0] = 0;  // the first half's covariance holds it instead
+  second.shared_prior.rig = &known;
+  const BundleResult after = h.solve(2, second, &two);
   ASSERT_TRUE(after.converged() && after.has_covariance);
-  const Vec6 off = way(both.T_camera_left[1], two.T_camera_left[1]);
   const auto compare = [&](int row, double difference) {
     const double variance = r.covariance(row, row);
     EXPECT_LT(std::abs(difference), 0.3 * std::sqrt(variance)) << row;
@@ -110,33 +113,17 @@ void halves_one_after_the_other(const BundleOptions& first, const BundleOptions&
     EXPECT_LT(after.covariance(row, row), r2.covariance(row, row)) << row;
     EXPECT_NEAR(after.covariance(row, row) / variance, 1.0, 0.3) << row;
   };
+  const Vec6 off = way(both.T_camera_left[1], two.T_camera_left[1]);
   for (int i = 0; i < 6; ++i) {
-    if (i == 3) continue;  // along the baseline: its length is exact
+    if (i == 3) continue;  // Along the baseline, whose length is exact.
     compare(extrinsic_row(1) + i, off[i]);
   }
-  if (intrinsic < 0) return;
-  const Intrinsics &found = two.cameras[1].intrinsics(), &requested = both.cameras[1].intrinsics();
-  ASSERT_EQ(intrinsic, 0);
-  compare(intrinsic_row(1), found.fx - requested.fx);
-}
-
-TEST(BundleSharedPrior, twoHalvesOneAfterTheOtherSayWhatBothTogetherSay) {
-  halves_one_after_the_other(to_the_minimum(), to_the_minimum(), -1);
-}
-
-TEST(BundleSharedPrior, ofAFreeFocalLengthTooTwoHalvesSayWhatBothTogetherSay) {
-  BundleOptions first = to_the_minimum();
-  first.intrinsics[1].free = 0b1;
-  first.intrinsics[1].prior_mean[0] = 886;
-  first.intrinsics[1].prior_sigma[0] = 20;
-  BundleOptions second = first;
-  second.intrinsics[1].prior_sigma[0] = 0;  // what the first half told holds it
-  halves_one_after_the_other(first, second, 0);
+  compare(intrinsic_row(1), two.cameras[1].intrinsics().fx - both.cameras[1].intrinsics().fx);
 }
 
 // Seen twice with the same tracks: at a weight of two they count half as much as what is known, so
 // that where the solve ends moves from the middle to a third of the way.
-TEST(BundleSharedPrior, itsWeightSaysHowMuchItPulls) {
+TEST(BundleSharedPrior, weightSetsTheShareOfThePrior) {
   Alone a(74);
   ASSERT_TRUE(a.result.converged() && a.result.has_covariance);
   const Vec6 sigma = a.result.covariance_noise[1].diagonal().cwiseSqrt();
@@ -162,7 +149,7 @@ TEST(BundleSharedPrior, itsWeightSaysHowMuchItPulls) {
   }
 }
 
-TEST(BundleCovariance, theJointOneHoldsTheWideOneAndGivenWhatIsHeldTheOneOfNoise) {
+TEST(BundleCovariance, jointCovarianceContainsTotalAndNoise) {
   Alone a(75);
   SimulatedRig rig = a.start;
   BundleOptions o = a.options;
@@ -205,7 +192,7 @@ TEST(BundleCovariance, theJointOneHoldsTheWideOneAndGivenWhatIsHeldTheOneOfNoise
       << "otherwise nothing was shown";
 }
 
-TEST(BundleSharedPrior, numbersThatAreNoneDoNoHarm) {
+TEST(BundleSharedPrior, invalidPriorKeepsTheResultFinite) {
   Alone a(77);
   a.options.intrinsics[1].free = 0b1111;
   a.options.intrinsics[1].prior_sigma = {1, 1, 1, 1};

@@ -73,7 +73,7 @@ RigCalibration moved(const RigCalibration& from, const FreeVector& by) {
   return r;
 }
 
-TEST(Agreement, ofACalibrationWithItselfIsNothing) {
+TEST(Agreement, calibrationAgreesWithItself) {
   Random random(81);
   RigCalibration r = rig();
   r.covariance = published(covariance_of_noise(random));
@@ -86,7 +86,7 @@ TEST(Agreement, ofACalibrationWithItselfIsNothing) {
   }
 }
 
-TEST(Agreement, theConditionalCovarianceHoldsNothingOfWhatIsHeld) {
+TEST(Agreement, conditionalCovarianceIsTheNoise) {
   Random random(82);
   const Free noise = covariance_of_noise(random);
   const RigCovariance left = noise_only(with_held(noise, random));
@@ -102,7 +102,7 @@ TEST(Agreement, theConditionalCovarianceHoldsNothingOfWhatIsHeld) {
 }
 
 // Where the lenses of all cameras are estimated, camera 0's go with each other.
-TEST(Agreement, theConditionalCovarianceTakesWhatGoesTogetherOnce) {
+TEST(Agreement, conditionalCovarianceOfCorrelatedIntrinsics) {
   Random random(86);
   using All = Eigen::Matrix<double, kFree + 4, kFree + 4>;
   All root;
@@ -123,7 +123,7 @@ TEST(Agreement, theConditionalCovarianceTakesWhatGoesTogetherOnce) {
           << i << ' ' << j;  // of numbers near 20
 }
 
-TEST(Agreement, whatIsNotHeldStaysAsItIs) {
+TEST(Agreement, covarianceWithoutFixedIntrinsicsIsUnchanged) {
   Random random(83);
   const RigCovariance noise = published(covariance_of_noise(random)), left = noise_only(noise);
   for (int i = 0; i < kRigSize; ++i)
@@ -133,7 +133,7 @@ TEST(Agreement, whatIsNotHeldStaysAsItIs) {
 // Both calibrations drawn about one truth. 1000 draws: the mean of χ²(5)/5 has a standard error of
 // 0.02; a depth at one place is one of χ²(1), all places of an image together hardly more, 0.045.
 // The truth's gradient serves for rigs that are a sigma off: some hundredths.
-TEST(Agreement, differencesOfOneSigmaAreOneOnAverage) {
+TEST(Agreement, oneSigmaDifferencesAverageToOne) {
   Random random(84);
   const RigCalibration truth = rig();
   const Free noise_a = covariance_of_noise(random), noise_b = covariance_of_noise(random);
@@ -168,7 +168,7 @@ TEST(Agreement, differencesOfOneSigmaAreOneOnAverage) {
   for (std::size_t d = 0; d < Agreement::kDepths; ++d) EXPECT_NEAR(mean.depth[d], 1, 0.2) << d;
 }
 
-TEST(Agreement, ofSigmasThatAreTooSmallIsAsMuchMore) {
+TEST(Agreement, halvedSigmasQuadrupleTheDifference) {
   Random random(85);
   RigCalibration a = rig();
   const Free noise = covariance_of_noise(random);

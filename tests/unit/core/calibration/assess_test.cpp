@@ -37,7 +37,7 @@ struct Measured {
 };
 
 // At 20 m and 0.75 m of baseline a yaw ψ is 26.7 ψ of the depth: 2 % are 0.75 mrad.
-TEST(Assessment, theSameRigIsConfirmedByASmallSigma) {
+TEST(Assessment, sameRigIsConfirmedWithASmallSigma) {
   Measured m(1e-4);
   const Assessment a = m.of(Vec3::Zero());
   EXPECT_EQ(a.depth_m, 20);
@@ -50,7 +50,7 @@ TEST(Assessment, theSameRigIsConfirmedByASmallSigma) {
 }
 
 // A calibration that does not state its sigmas is off by 1 mrad where it is the rig's.
-TEST(Assessment, aYawThatIsOffIsContradicted) {
+TEST(Assessment, wrongYawIsContradicted) {
   for (const double yaw : {8e-3, -8e-3, 20e-3}) {
     Measured m(1e-4);
     const Assessment a = m.of({0, yaw, 0});
@@ -64,7 +64,7 @@ TEST(Assessment, aYawThatIsOffIsContradicted) {
   }
 }
 
-TEST(Assessment, aClaimFromElsewhereCountsBesideAMeasurementAndOneOfTheSameFramesDoesNot) {
+TEST(Assessment, onlyIndependentSourceAddsEvidence) {
   Measured sharp(1e-4);
   EXPECT_TRUE(sharp.of({0, 0.5e-3, 0}).confirmed);   // 1.3 %
   EXPECT_FALSE(sharp.of({0, 1.5e-3, 0}).confirmed);  // 4 %
@@ -74,7 +74,7 @@ TEST(Assessment, aClaimFromElsewhereCountsBesideAMeasurementAndOneOfTheSameFrame
   EXPECT_FALSE(blunt.of({0, 0.6e-3, 0}).confirmed);
 }
 
-TEST(Assessment, aLargeSigmaSaysNeither) {
+TEST(Assessment, largeSigmaDecidesNothing) {
   for (const double yaw : {0.0, 1.5e-3, 5e-3}) {
     Measured m(10e-3);  // 27 %: no evidence about a rig that may be 15 mrad off
     const Assessment a = m.of({0, yaw, 0});
@@ -84,7 +84,7 @@ TEST(Assessment, aLargeSigmaSaysNeither) {
   }
 }
 
-TEST(Assessment, aPitchIsSeenOnFramesThatWereNotUsed) {
+TEST(Assessment, wrongPitchIsDetectedOnHeldOutFrames) {
   Measured m(1e-4);
   const Assessment a = m.of({2e-3, 0, 0});  // 2.4 px of row, hardly anything of depth
   EXPECT_TRUE(a.better);
@@ -115,7 +115,7 @@ RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_
 }
 
 // 0.2° are 4.4 px; a solve over both rigs ends between them.
-TEST(GateRigChanged, aCameraThatIsTurnedOnTheWayIsDated) {
+TEST(GateRigChanged, rotationDuringTheFramesIsDated) {
   for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 0, 1), Vec3(0, 1, 0), Vec3(0.6, 0.6, 0.5)}) {
     RigCalibration nominal;
     const RigSolution s = solve_with({{30, 0.2 * kDegree * axis, Vec3::Zero(), 0}}, 11, &nominal);
@@ -129,7 +129,7 @@ TEST(GateRigChanged, aCameraThatIsTurnedOnTheWayIsDated) {
   }
 }
 
-TEST(GateRigChanged, oneRigIsOne) {
+TEST(GateRigChanged, unchangedRigHasNoChange) {
   for (const std::uint64_t seed : {11U, 12U, 13U, 14U}) {
     RigCalibration nominal;
     const RigSolution s = solve_with({}, seed, &nominal);

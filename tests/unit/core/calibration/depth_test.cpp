@@ -30,7 +30,7 @@ void turn(RigCalibration* rig, const Vec3& angle) {
   rig->T_camera_left[1].R = exp_so3(angle) * rig->T_camera_left[1].R;
 }
 
-TEST(DepthDifference, ofARigFromItselfIsNone) {
+TEST(DepthDifference, identicalRigsHaveNoDifference) {
   RigCalibration rig = wide_rig();
   turn(&rig, {0.01, -0.02, 0.005});
   rig.intrinsics[0].distortion = {-0.1, 0.02, 1e-3, -5e-4, 0};
@@ -43,7 +43,7 @@ TEST(DepthDifference, ofARigFromItselfIsNone) {
 // A yaw δ moves what is straight ahead by f δ, at the edge of the image (x/z = 0.41) by f (1 + x²)
 // δ; the disparity is f b / Z. So the inverse depth is off by Z δ (1 + x²) / b, relative, whatever
 // the depth: of the root mean square over the image x² takes 6 %.
-TEST(DepthDifference, ofAYawGrowsWithTheDepth) {
+TEST(DepthDifference, yawErrorGrowsWithTheDepth) {
   for (const double yaw : {1e-3, -2e-3})
     for (const double z : {5.0, 10.0, 20.0, 50.0}) {
       const RigCalibration rig = wide_rig();
@@ -55,7 +55,7 @@ TEST(DepthDifference, ofAYawGrowsWithTheDepth) {
 }
 
 // The remaining error is f x² δ; the rms of x² is 0.056 over an image 0.41 to each side.
-TEST(DepthDifference, ofAYawThatACentreMakesUpForIsSmall) {
+TEST(DepthDifference, yawAndPrincipalPointCancel) {
   const RigCalibration rig = wide_rig();
   RigCalibration yaw = rig;
   turn(&yaw, {0, 2e-3, 0});
@@ -68,7 +68,7 @@ TEST(DepthDifference, ofAYawThatACentreMakesUpForIsSmall) {
               0.1 * depth_error_percent(rig, yaw, 1, 20));
 }
 
-TEST(DepthDifference, ofALengthIsItsShareAtEveryDepth) {
+TEST(DepthDifference, lengthErrorIsItsShareAtEveryDepth) {
   const RigCalibration rig = wide_rig();
   RigCalibration longer = rig;
   longer.T_camera_left[1].t *= 1.01;
@@ -77,12 +77,12 @@ TEST(DepthDifference, ofALengthIsItsShareAtEveryDepth) {
     EXPECT_NEAR(depth_error_percent(rig, longer, 1, z), 100 * (1 - 1 / 1.01), 1e-6) << z;
 }
 
-TEST(DepthDifference, ofWhatCannotBeSeenByBothIsNotSaid) {
+TEST(DepthDifference, depthUnseenByBothCamerasIsZero) {
   const RigCalibration rig = wide_rig();
   EXPECT_EQ(depth_error_percent(rig, rig, 1, 0.5), 0) << "1870 px of disparity";
 }
 
-TEST(DepthError, ofAYawAndACentreThatAreKnownTogetherIsSmall) {
+TEST(DepthError, correlatedYawAndPrincipalPointCancel) {
   const double sigma = 1e-3;
   const int yaw = extrinsic_row(1) + 1, centre = intrinsic_row(1) + 2;
   RigCalibration alone = wide_rig();
@@ -101,7 +101,7 @@ TEST(DepthError, ofAYawAndACentreThatAreKnownTogetherIsSmall) {
 
 // The gradient against the difference that it predicts, parameter by parameter: one small step of
 // each.
-TEST(DepthError, ofOneSigmaIsTheDifferenceThatItMakes) {
+TEST(DepthError, gradientMatchesTheDifferencePerParameter) {
   RigCalibration rig = wide_rig();
   turn(&rig, {0.01, -0.02, 0.005});
   for (std::size_t k = 0; k < 2; ++k)
@@ -137,7 +137,7 @@ TEST(DepthError, ofOneSigmaIsTheDifferenceThatItMakes) {
     }
 }
 
-TEST(EvaluatedDepth, isNearerWhereASingleMatchIsNoBetter) {
+TEST(EvaluatedDepth, referenceDepthIsBoundedByTheDisparity) {
   const CalibrationOptions options;
   // A match of 0.15 px in both images is off by 0.21 px, 1 % of a disparity of 21.2 px.
   const double px = std::sqrt(2.0) * 0.15 / 0.01;

@@ -82,7 +82,7 @@ class Street {
   std::uint64_t frame_ = 0;
 };
 
-TEST(DisparityJump, ATurnOfYawIsSeenInItsFrameAndConfirmedInTheNext) {
+TEST(DisparityJump, yawKnockIsConfirmedInTheNextFrame) {
   for (const double yaw : {0.1, -0.1, 0.3, 1.0}) {
     Street street(rig(0));
     for (int i = 0; i < 20; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << yaw << ", " << i;
@@ -99,21 +99,21 @@ TEST(DisparityJump, ATurnOfYawIsSeenInItsFrameAndConfirmedInTheNext) {
   }
 }
 
-TEST(DisparityJump, AWrongCalibrationThatDoesNotChangeIsNoJump) {
+TEST(DisparityJump, constantWrongYawIsNoJump) {
   for (const double yaw : {0.3, -1.0}) {
     Street street(rig(yaw));
     for (int i = 0; i < 300; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << yaw << ", " << i;
   }
 }
 
-TEST(DisparityJump, NoiseRaisesNothingInAThousandFrames) {
+TEST(DisparityJump, noiseIsNoJumpInAThousandFrames) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     Street street(rig(0), seed);
     for (int i = 0; i < 200; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << seed << ", " << i;
   }
 }
 
-TEST(DisparityJump, OneSpoiltImageIsSuspectedAndNotConfirmed) {
+TEST(DisparityJump, singleWrongImageIsNotConfirmed) {
   Street street(rig(0));
   for (int i = 0; i < 20; ++i) (void)street.drive(rig(0));
   EXPECT_TRUE(street.drive(rig(0.3)).suspected);
@@ -123,7 +123,7 @@ TEST(DisparityJump, OneSpoiltImageIsSuspectedAndNotConfirmed) {
   EXPECT_FALSE(street.drive(rig(0)).confirmed);
 }
 
-TEST(DisparityJump, AMissingImageAfterASpoiltOneIsNoChangeAndDoesNotHideOne) {
+TEST(DisparityJump, missingImageNeitherConfirmsNorHidesAJump) {
   Street spoilt(rig(0));
   for (int i = 0; i < 20; ++i) (void)spoilt.drive(rig(0));
   EXPECT_TRUE(spoilt.drive(rig(0.3)).suspected);
@@ -139,7 +139,7 @@ TEST(DisparityJump, AMissingImageAfterASpoiltOneIsNoChangeAndDoesNotHideOne) {
   EXPECT_EQ(jump.onset_frame, 20U);
 }
 
-TEST(DisparityJump, ATurnWhileTheImageIsMissingIsSeenAfterIt) {
+TEST(DisparityJump, knockDuringMissingImagesIsConfirmed) {
   Street street(rig(0));
   for (int i = 0; i < 20; ++i) (void)street.drive(rig(0));
   for (int i = 0; i < 2; ++i) street.drive_unseen();
@@ -149,7 +149,7 @@ TEST(DisparityJump, ATurnWhileTheImageIsMissingIsSeenAfterIt) {
 
 // 0.03° are 0.38 px: shaken by that, 1 px is within five times the scatter (1.9 px), and eight calm
 // frames later still, for (19/20)^8 of its square are left (1.5 px).
-TEST(DisparityJump, WhatADriveShakesByIsRememberedForSomeTwentyFrames) {
+TEST(DisparityJump, vibrationRaisesTheThresholdForTwentyFrames) {
   Street street(rig(0));
   for (int i = 0; i < 40; ++i) EXPECT_FALSE(street.drive(rig(i % 2 == 0 ? 0 : 0.03)).suspected);
   for (int i = 0; i < 8; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected);
@@ -158,7 +158,7 @@ TEST(DisparityJump, WhatADriveShakesByIsRememberedForSomeTwentyFrames) {
   EXPECT_TRUE(street.drive(rig(0)).suspected) << "calm for long, it is a jump";
 }
 
-TEST(DisparityJump, TooFewTracksMeasureNothing) {
+TEST(DisparityJump, tooFewTracksMeasureNothing) {
   Arena arena(DisparityJumpDetector::memory_needed(10));
   DisparityJumpDetector detector(10, arena);
   detector.set_reference(rig(0), kPinhole, kPinhole);

@@ -43,7 +43,7 @@ RigSolution measure(const FeatureDriveOptions& drive_options, const RigCalibrati
   return s.solver.solve(request);
 }
 
-TEST(FocalCheck, aTrueFocalLengthIsNotContradicted) {
+TEST(FocalCheck, trueFocalLengthIsNotContradicted) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     FeatureDriveOptions drive;
     drive.seed = seed;
@@ -56,7 +56,7 @@ TEST(FocalCheck, aTrueFocalLengthIsNotContradicted) {
 }
 
 // On a road that winds: two seconds straight on hold the focal length to a seventh only.
-TEST(FocalCheck, oneThatIsAQuarterOffIsContradictedAndTheTrueOneMeasured) {
+TEST(FocalCheck, wrongFocalLengthIsContradictedAndMeasured) {
   for (const double factor : {0.8, 1.25}) {
     FeatureDriveOptions drive;
     drive.rocking = 6;
@@ -78,7 +78,7 @@ RigSolution found(RigSolveStatus status, double fx, double sigma) {
 }
 
 // 4 % are what measurements are off by on recorded drives, whatever their sigma.
-TEST(FocalCheck, certainIsBeyondFourPercentAndThreeSigmas) {
+TEST(FocalCheck, contradictionNeedsFourPercentAndThreeSigmas) {
   RigCalibration given;
   given.intrinsics[0].fx = 1000;
   const auto contradicts = [&](double fx, double sigma) {
@@ -91,7 +91,7 @@ TEST(FocalCheck, certainIsBeyondFourPercentAndThreeSigmas) {
   EXPECT_TRUE(contradicts(1130, 25));
 }
 
-TEST(FocalCheck, aSolveThatIsStillOnItsWayContradictsOnlyWhenItIsFar) {
+TEST(FocalCheck, unconvergedSolveContradictsOnlyIfFar) {
   RigCalibration given;
   given.intrinsics[0].fx = 1000;
   const auto at = [&](double fx) {
@@ -103,7 +103,7 @@ TEST(FocalCheck, aSolveThatIsStillOnItsWayContradictsOnlyWhenItIsFar) {
   EXPECT_EQ(at(1110).sigma_px, 0);
 }
 
-TEST(FocalCheck, withoutASolutionNothingIsMeasured) {
+TEST(FocalCheck, failedSolveMeasuresNothing) {
   RigCalibration given;
   given.intrinsics[0].fx = 1000;
   for (const RigSolveStatus status : {RigSolveStatus::too_few_tracks, RigSolveStatus::no_candidate,

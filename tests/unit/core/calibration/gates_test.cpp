@@ -53,9 +53,9 @@ struct Case {
   [[nodiscard]] Transform& found() { return solution.rig.T_camera_left[1]; }
 };
 
-TEST(Gates, aSoundSolutionPassesThem) { EXPECT_EQ(Case().ask(), Gate::open); }
+TEST(Gates, soundSolutionIsAccepted) { EXPECT_EQ(Case().ask(), Gate::open); }
 
-TEST(Gates, whatWasNotSolvedIsNotAdopted) {
+TEST(Gates, failedSolveIsRejected) {
   for (const RigSolveStatus status :
        {RigSolveStatus::too_few_tracks, RigSolveStatus::no_candidate, RigSolveStatus::not_converged,
         RigSolveStatus::not_observable}) {
@@ -66,7 +66,7 @@ TEST(Gates, whatWasNotSolvedIsNotAdopted) {
 }
 
 // At 20 m, where f b / z is 27 px, a yaw of 1 mrad makes the depth wrong by 2.7 %: usable are 5 %.
-TEST(Gates, depthSigmaAboveUsableKeepsClosed) {
+TEST(Gates, depthErrorAboveUsableIsRefused) {
   for (const double share : {0.9, 1.1}) {
     Case c;
     c.options.reference_depth_m = 20;
@@ -79,7 +79,7 @@ TEST(Gates, depthSigmaAboveUsableKeepsClosed) {
   }
 }
 
-TEST(Gates, tooLittleWayNeedsMotion) {
+TEST(Gates, shortPathNeedsMotion) {
   Case c;
   c.solution.travelled_m = 2.24;  // three baselines are 2.25 m
   EXPECT_EQ(c.ask(), Gate::needs_motion);
@@ -87,7 +87,7 @@ TEST(Gates, tooLittleWayNeedsMotion) {
   EXPECT_EQ(c.ask(), Gate::open);
 }
 
-TEST(Gates, tooFewNearPointsNeedNearStructure) {
+TEST(Gates, fewNearPointsNeedNearStructure) {
   Case c;
   c.solution.near = c.options.min_near_points - 1;
   EXPECT_EQ(c.ask(), Gate::needs_near_structure);
@@ -95,13 +95,13 @@ TEST(Gates, tooFewNearPointsNeedNearStructure) {
   EXPECT_EQ(c.ask(), Gate::open);
 }
 
-TEST(Gates, aRightCameraOnTheLeftIsAnExchange) {
+TEST(Gates, inverseTransformIsCamerasSwapped) {
   Case c;
   c.found() = c.found().inverse();
   EXPECT_EQ(c.ask(), Gate::cameras_swapped);
 }
 
-TEST(Gates, aDirectionFarFromTheConfiguredOneIsImplausible) {
+TEST(Gates, directionBeyondTenDegreesIsImplausible) {
   Case c;
   for (const double degrees : {9.9, 10.1}) {
     const double a = degrees * kDegree;
@@ -110,7 +110,7 @@ TEST(Gates, aDirectionFarFromTheConfiguredOneIsImplausible) {
   }
 }
 
-TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
+TEST(Gates, rotationBeyondTenDegreesIsImplausible) {
   for (const double degrees : {9.9, 10.1}) {
     Case c;
     c.nominal.T_camera_left[1].R = exp_so3(degrees * kDegree * Vec3(0, 0.6, 0.8)) * c.found().R;
@@ -122,13 +122,13 @@ TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
   }
 }
 
-TEST(Gates, camerasOutOfStepHaveNoCalibration) {
+TEST(Gates, lagIsOutOfSync) {
   Case c;
   c.solution.lag_frames = 1;
   EXPECT_EQ(c.ask(), Gate::out_of_sync);
 }
 
-TEST(Gates, whatFramesNotUsedContradictIsNotAdopted) {
+TEST(Gates, heldOutFramesRejectAWrongSolution) {
   Case c;
   c.turn(&c.solution.rig, {0.2, 0, 0});  // 4.4 px of row, against 1.5 allowed
   EXPECT_EQ(c.ask(), Gate::does_not_fit);
@@ -142,7 +142,7 @@ TEST(Gates, whatFramesNotUsedContradictIsNotAdopted) {
   EXPECT_TRUE(held_out_enough(c.log, 46));
 }
 
-TEST(Gates, framesNotUsedAreTheNewestTwelve) {
+TEST(Gates, heldOutFramesAreTheNewestTwelve) {
   const Case c;
   EXPECT_EQ(held_out(c.log, 29, c.solution.rig).frames, static_cast<int>(kHeldOutFrames));
   EXPECT_EQ(held_out(c.log, 44, c.solution.rig).frames, 5);
@@ -150,7 +150,7 @@ TEST(Gates, framesNotUsedAreTheNewestTwelve) {
   EXPECT_EQ(held_out(c.log, 49, c.solution.rig).median_px, 0);
 }
 
-TEST(Gates, oneThatIsNoBetterThanTheOneInUseIsNotAdopted) {
+TEST(Gates, solutionNoBetterThanInUseIsRejected) {
   Case c;
   c.question.in_use = &c.in_use;
   EXPECT_EQ(c.ask(), Gate::no_better) << "the same";
@@ -163,7 +163,7 @@ TEST(Gates, oneThatIsNoBetterThanTheOneInUseIsNotAdopted) {
 
 const test::FurtherCamera kThird{2, {exp_so3({-6e-3, 4e-3, 2e-3}), {-0.6, -0.05, 0.01}}};
 
-TEST(Gates, aKnockOfTheThirdCameraAloneIsMended) {
+TEST(Gates, knockOfTheThirdCameraIsAccepted) {
   Case c(kThird);
   c.question.in_use = &c.in_use;
   EXPECT_EQ(c.ask(), Gate::no_better) << "the same";
@@ -184,7 +184,7 @@ TEST(Gates, aKnockOfTheThirdCameraAloneIsMended) {
 
 // A short drive holds every camera less well than a long one before it did: by what the gates take
 // of a full window, 0.45 mrad, which is 0.56 px and no chance over twelve frames.
-TEST(Gates, aKnockOfOneCameraIsMendedThoughAnotherOneIsHeldALittleLessWell) {
+TEST(Gates, knockIsAcceptedDespiteALessCertainCamera) {
   for (const std::size_t knocked : {1U, 2U}) {
     Case c(kThird);
     c.question.in_use = &c.in_use;
@@ -196,7 +196,7 @@ TEST(Gates, aKnockOfOneCameraIsMendedThoughAnotherOneIsHeldALittleLessWell) {
   }
 }
 
-TEST(Gates, whatContradictsOneCameraIsNotHiddenByWhatIsNotKnownOfAnother) {
+TEST(Gates, uncertainCameraHidesNoContradiction) {
   for (const std::size_t wrong : {1U, 2U}) {
     Case c(kThird);
     const std::size_t poor = 3 - wrong;
@@ -214,14 +214,14 @@ TEST(Gates, whatContradictsOneCameraIsNotHiddenByWhatIsNotKnownOfAnother) {
   }
 }
 
-TEST(Gates, aThirdCameraThatFramesNotUsedContradictIsNotAdopted) {
+TEST(Gates, heldOutFramesRejectAWrongThirdCamera) {
   Case c(kThird);
   EXPECT_EQ(c.ask(), Gate::open);
   c.turn(&c.solution.rig, {0.2, 0, 0}, 2);
   EXPECT_EQ(c.ask(), Gate::does_not_fit);
 }
 
-TEST(Gates, aThirdCameraWithoutMatchesIsNoWitness) {
+TEST(Gates, thirdCameraWithoutMatchesDecidesNothing) {
   Case c(kThird);
   for (std::size_t i = 0; i < c.log.size(); ++i)
     for (LoggedObservation& o : c.log.frame(i).observations) o.cameras = 0b011;

@@ -27,7 +27,7 @@ void know(RigCalibration* rig, std::size_t k, int what, double sigma) {
   rig->covariance_total[k](what, what) = sigma * sigma;
 }
 
-TEST(Health, correlatedErrorsCancelAsTheyDoInTheDepth) {
+TEST(Health, correlatedErrorsCancelInTheDepth) {
   RigCalibration rig = narrow_rig();
   const double z = 20, yaw = 1e-4;
   // A shift that moves what is straight ahead at 20 m back to where a yaw of the same sign took it
@@ -40,7 +40,7 @@ TEST(Health, correlatedErrorsCancelAsTheyDoInTheDepth) {
   EXPECT_LT(depth_error_percent(rig, 1, z), 0.01 * depth_error_percent(alone, 1, z));
 }
 
-TEST(Health, withoutACovarianceTheSigmasServeAndWithoutThoseNothing) {
+TEST(Health, sigmasServeWithoutACovariance) {
   RigCalibration rig = narrow_rig();
   EXPECT_EQ(depth_error_percent(rig, 1, 20), 0);
   rig.sigma_total[1][1] = 1e-4;
@@ -49,7 +49,7 @@ TEST(Health, withoutACovarianceTheSigmasServeAndWithoutThoseNothing) {
   EXPECT_DOUBLE_EQ(depth_error_percent(rig, 1, 20), depth_error_percent(full, 1, 20));
 }
 
-TEST(Health, theWordFollowsTheErrorAtTwentyMetres) {
+TEST(Health, ratingFollowsTheErrorAtTwentyMetres) {
   const CalibrationOptions options;
   const auto word = [&](double percent) {
     RigCalibration rig = narrow_rig();
@@ -62,7 +62,7 @@ TEST(Health, theWordFollowsTheErrorAtTwentyMetres) {
   EXPECT_EQ(word(5.01), "poor");
 }
 
-TEST(Health, aRigIsAsGoodAsItsBestPair) {
+TEST(Health, rigIsRatedByItsBestPair) {
   RigCalibration rig = narrow_rig();
   rig.cameras = 3;
   rig.intrinsics[2] = rig.intrinsics[1];

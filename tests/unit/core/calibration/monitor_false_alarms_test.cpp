@@ -45,7 +45,7 @@ double quantile(std::vector<double> v, double share) {
   return *at;
 }
 
-TEST(MonitorModes, haveTheStatisticsOfWholeTracks) {
+TEST(MonitorModes, modesHaveTheStatisticsOfTracks) {
   const FeatureDriveOptions o = street(8);
   std::vector<double> tracks, modes;
   for (const std::uint64_t seed : {11U, 12U, 13U, 14U}) {
@@ -74,7 +74,7 @@ TEST(MonitorModes, haveTheStatisticsOfWholeTracks) {
   }
 }
 
-TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
+TEST(MonitorFalseAlarms, hundredHoursHaveAtMostFourAlarms) {
   constexpr std::array<double, 3> kSpeeds{3, 8, 15};
   std::vector<std::unique_ptr<ModeDrive>> drives;
   std::vector<FiveReference> references;

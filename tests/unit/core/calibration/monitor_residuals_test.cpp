@@ -53,7 +53,7 @@ double misfit(const Evidence& e, const Vec5& theta) {
   return std::sqrt(gain(e.A, e.g - e.A * theta) / gain(e.A, e.g));
 }
 
-TEST(MonitorLooks, gradientsPointFromTheReferenceToTheTruthInEveryParameter) {
+TEST(MonitorLooks, gradientsPointToTheTruthInEveryParameter) {
   for (int i = 0; i < kTheta; ++i) {
     SCOPED_TRACE(i);
     Vec5 theta = Vec5::Zero();
@@ -67,7 +67,7 @@ TEST(MonitorLooks, gradientsPointFromTheReferenceToTheTruthInEveryParameter) {
   }
 }
 
-TEST(MonitorLooks, spreadOfWhiteErrorsIsOneAndOfLastingOnesTheLifeOfATrack) {
+TEST(MonitorLooks, spreadIsTheLifeOfATrackForLastingErrors) {
   FeatureDriveOptions o = exact_street();
   o.white_px = 0.5;
   o.sigma_px = 0.5;
@@ -83,7 +83,7 @@ TEST(MonitorLooks, spreadOfWhiteErrorsIsOneAndOfLastingOnesTheLifeOfATrack) {
   EXPECT_LT(lasting.spread_life / lasting.frames, 15.0);
 }
 
-TEST(MonitorLooks, outliersWeighNothing) {
+TEST(MonitorLooks, outliersHaveNoWeight) {
   FeatureDriveOptions clean;
   clean.outliers = clean.movers = 0;
   FeatureDriveOptions dirty = clean;
@@ -94,7 +94,7 @@ TEST(MonitorLooks, outliersWeighNothing) {
   EXPECT_NEAR(b.spread_now / b.frames, a.spread_now / a.frames, 0.15);
 }
 
-TEST(MonitorLooks, tooFewTracksSayNothing) {
+TEST(MonitorLooks, tooFewTracksAreNotUsable) {
   FeatureDriveOptions o;
   o.tracks = 20;
   const Sums sums = watch(o, o.T_right_left, 60);

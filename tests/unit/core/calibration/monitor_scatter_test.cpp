@@ -55,7 +55,7 @@ class Blocks {
   Evidence past_;
 };
 
-TEST(BlockScatter, beforeAnythingIsMeasuredItIsWhatIsExpected) {
+TEST(BlockScatter, firstBlockKeepsTheExpectedVariance) {
   BlockScatter s;
   EXPECT_EQ(s.variance(), 0);
   s.expect(0.2);
@@ -69,7 +69,7 @@ TEST(BlockScatter, beforeAnythingIsMeasuredItIsWhatIsExpected) {
 // Noise alone is λ/n in each direction, 7.5e-5 px²; what is taken off for it leaves a mean over 60
 // blocks of five that scatters by √(2/300) = 8 % of that, 6e-6. The expectation, 0.2² / 5 = 8e-3,
 // weighs four blocks beside them.
-TEST(BlockScatter, noiseIsNoScatter) {
+TEST(BlockScatter, noiseAddsNoScatter) {
   BlockScatter s;
   s.expect(0.2);
   Blocks b(92);
@@ -98,7 +98,7 @@ TEST(BlockScatter, offsetsOfBlocksAreMeasured) {
   }
 }
 
-TEST(BlockScatter, aKnockIsNone) {
+TEST(BlockScatter, knockAddsNoScatter) {
   BlockScatter s;
   s.expect(0.1);
   Blocks b(95);
@@ -108,7 +108,7 @@ TEST(BlockScatter, aKnockIsNone) {
   EXPECT_EQ(s.variance(), before);
 }
 
-TEST(BlockScatter, whatSeesNothingSaysNothing) {
+TEST(BlockScatter, singularOrNonFiniteBlockIsIgnored) {
   BlockScatter s;
   s.expect(0.1);
   Blocks b(96);
@@ -126,7 +126,7 @@ TEST(BlockScatter, whatSeesNothingSaysNothing) {
   EXPECT_EQ(s.variance(), before);
 }
 
-TEST(BlockScatter, anOldDisagreementIsForgotten) {
+TEST(BlockScatter, oldScatterIsForgotten) {
   BlockScatter s;
   s.expect(0.1);
   Blocks b(97);

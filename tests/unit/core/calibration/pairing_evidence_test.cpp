@@ -74,7 +74,7 @@ Seen drive(const Case& c) {
   return seen;
 }
 
-TEST(PairingEvidence, tellsALateImageFromAKnockAndFromStanding) {
+TEST(PairingEvidence, lagIsDistinguishedFromKnockAndStanding) {
   for (const Case& c : std::vector<Case>{{.name = "nothing"},
                                          {.name = "standing", .step_m = 0},
                                          {.name = "camera late", .camera_late = 1, .wanted = 1},
@@ -92,7 +92,7 @@ TEST(PairingEvidence, tellsALateImageFromAKnockAndFromStanding) {
   }
 }
 
-TEST(PairingEvidence, ofARigThatStandsForLongNoiseMakesNoLag) {
+TEST(PairingEvidence, noiseOfAStandingRigIsNoLag) {
   Arena arena(PairingEvidence::memory_needed(kPoints));
   PairingEvidence evidence(kPoints, arena);
   Random random(3);
@@ -112,7 +112,7 @@ TEST(PairingEvidence, ofARigThatStandsForLongNoiseMakesNoLag) {
   }
 }
 
-TEST(PairingEvidence, measuresTheDistanceFromTheLines) {
+TEST(PairingEvidence, distanceFromEpipolarLinesIsMeasured) {
   Arena arena(PairingEvidence::memory_needed(kPoints));
   PairingEvidence evidence(kPoints, arena);
   const Transform T_right_left{Mat3::Identity(), {-0.5, 0, 0}};

@@ -26,7 +26,7 @@ RigCalibration known_rig() {
   return rig;
 }
 
-TEST(Posterior, anHourAddsTheWalkOfAnHourAndFourHoursTwiceItsSigma) {
+TEST(Posterior, driftAddsTheRandomWalkOfItsTime) {
   CalibrationOptions options;
   options.extrinsic_random_walk_mrad_per_sqrt_h = 0.4;
   const RigCalibration before = known_rig();
@@ -50,7 +50,7 @@ TEST(Posterior, anHourAddsTheWalkOfAnHourAndFourHoursTwiceItsSigma) {
   }
 }
 
-TEST(Posterior, noTimeAddsNothing) {
+TEST(Posterior, zeroOrNegativeTimeAddsNothing) {
   const RigCalibration before = known_rig();
   for (const double hours : {0.0, -1.0}) {
     RigCalibration rig = before;
@@ -61,7 +61,7 @@ TEST(Posterior, noTimeAddsNothing) {
   }
 }
 
-TEST(Posterior, whatIsNotKnownStaysNotKnown) {
+TEST(Posterior, unknownParametersStayUnknown) {
   RigCalibration rig = known_rig();
   let_drift(10, {}, &rig);
   for (int i = 0; i < kIntrinsicsSize; ++i) {
@@ -75,7 +75,7 @@ TEST(Posterior, whatIsNotKnownStaysNotKnown) {
   EXPECT_TRUE(nothing.covariance.empty());
 }
 
-TEST(Posterior, forgettingTheTransformsLeavesTheLenses) {
+TEST(Posterior, clearedTransformsKeepTheIntrinsics) {
   const RigCalibration before = known_rig();
   RigCalibration rig = before;
   clear_transforms(&rig);

@@ -30,7 +30,7 @@ constexpr double kMinLength = 0.4 / 3.5, kMaxLength = 1.6;
 
 // 250 normal errors lie within two sigmas for 95 %, give or take 1.4; ninety leaves room for the
 // drives being few.
-TEST(RigSolverSigmas, holdUpOverFiftyDrivesWithExactIntrinsics) {
+TEST(RigSolverSigmas, sigmasMatchErrorsOverFiftyDrives) {
   SolverInArena s(held());
   double nees = 0;    // mean of eᵀ C⁻¹ e over its dimension
   double within = 0;  // share of single errors within two sigmas

@@ -31,7 +31,7 @@ RigSolution solve(const FeatureDriveOptions& drive_options, const CalibrationOpt
   return s.solver.solve(rig);
 }
 
-TEST(RigSolver, exactTracksGiveTheTransformToTheirRounding) {
+TEST(RigSolver, exactTracksGiveTheExactTransform) {
   const FeatureDriveOptions drive = exact_drive();
   const RigSolution s = solve(drive, held(), rig_of(drive));
   ASSERT_EQ(s.status, RigSolveStatus::ok);
@@ -53,7 +53,7 @@ TEST(RigSolver, exactTracksGiveTheTransformToTheirRounding) {
   EXPECT_NEAR(s.travelled_m, 39 * 8.0 / 30.0, 0.1);
 }
 
-TEST(RigSolver, withNoiseTheErrorsAreWithinItsSigmas) {
+TEST(RigSolver, noisyTracksGiveErrorsWithinTheSigmas) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     FeatureDriveOptions drive;
     drive.seed = seed;
@@ -73,7 +73,7 @@ TEST(RigSolver, withNoiseTheErrorsAreWithinItsSigmas) {
   }
 }
 
-TEST(RigSolver, uncertainIntrinsicsMakeTheSigmasWider) {
+TEST(RigSolver, uncertainIntrinsicsWidenTheSigmas) {
   const FeatureDriveOptions drive;
   const RigSolution exact = solve(drive, held(), rig_of(drive));
   const RigSolution uncertain =
@@ -91,7 +91,7 @@ TEST(RigSolver, uncertainIntrinsicsMakeTheSigmasWider) {
   EXPECT_GT(uncertain.rig.sigma_total[1][0], 3e-4);
 }
 
-TEST(RigSolver, theFurtherCamerasFocalLengthIsFoundWhenItIsAskedFor) {
+TEST(RigSolver, freeFocalLengthIsEstimated) {
   FeatureDriveOptions drive = exact_drive();
   drive.right.fx *= 1.002;
   drive.right.fy *= 1.002;
@@ -119,7 +119,7 @@ CalibrationOptions held_by_tracks() {
 
 // White noise five times as large makes the length driven five times as uncertain; each sigma rests
 // on a residual variance and on the variance of some hundred clusters, 10 % of it.
-TEST(RigSolver, theScaleIsAsUncertainAsTheTracksMakeIt) {
+TEST(RigSolver, scaleSigmaGrowsWithTheNoise) {
   FeatureDriveOptions drive = exact_drive();
   drive.white_px = 0.1;
   const RigSolution quiet = solve(drive, held_by_tracks(), rig_of(drive));
@@ -131,7 +131,7 @@ TEST(RigSolver, theScaleIsAsUncertainAsTheTracksMakeIt) {
   EXPECT_NEAR(noisy.rig.scale_sigma / quiet.rig.scale_sigma, 5.0, 1.0);
 }
 
-TEST(RigSolver, theScaleIsAsUncertainWhereverTheWorldBegins) {
+TEST(RigSolver, scaleSigmaIsIndependentOfTheWorldOrigin) {
   const FeatureDriveOptions drive;
   double sigma[2];
   for (const std::size_t i : {0U, 1U}) {
@@ -154,7 +154,7 @@ TEST(RigSolver, theScaleIsAsUncertainWhereverTheWorldBegins) {
 
 // Half as long a way whose errors are independent is √2 times as uncertain, one that hangs on the
 // yaw no more than the whole.
-TEST(RigSolver, theScaleIsThatOfTheNewestFramesThatTracksTieTogether) {
+TEST(RigSolver, scaleSigmaIsOfTheNewestConnectedFrames) {
   const FeatureDriveOptions drive;
   double sigma[2];
   for (const std::size_t pieces : {1U, 2U}) {
@@ -171,7 +171,7 @@ TEST(RigSolver, theScaleIsThatOfTheNewestFramesThatTracksTieTogether) {
   EXPECT_LT(sigma[1], 2 * sigma[0]);
 }
 
-TEST(RigSolver, aSolveLeavesNoTraceInTheNext) {
+TEST(RigSolver, solveIsIndependentOfThePreviousOne) {
   const FeatureDriveOptions first, other = [] {
     FeatureDriveOptions o;
     o.seed = 7;
@@ -192,7 +192,7 @@ TEST(RigSolver, aSolveLeavesNoTraceInTheNext) {
   EXPECT_EQ(s.rig.sigma_total[1], t.rig.sigma_total[1]);
 }
 
-TEST(RigSolver, aRightCameraThatIsLateIsOutOfStep) {
+TEST(RigSolver, lagOfTheRightCameraIsFound) {
   FeatureDriveOptions drive;
   // Standing starts and stops: at one speed a lag is a transform like any other.
   drive.drive_s = 4;
@@ -214,7 +214,7 @@ TEST(RigSolver, aRightCameraThatIsLateIsOutOfStep) {
   EXPECT_EQ(cameras_in_sync.solver.solve(rig_of(drive)).lag_frames, 0);
 }
 
-TEST(RigSolver, aThirdCameraThatIsLateIsOutOfStep) {
+TEST(RigSolver, lagOfTheThirdCameraIsFound) {
   FeatureDriveOptions drive;
   drive.drive_s = 4;
   drive.stop_s = 0.2;
@@ -235,7 +235,7 @@ TEST(RigSolver, aThirdCameraThatIsLateIsOutOfStep) {
 
 // Where camera 2 has no pose yet it lies where the left one is: such a frame is none to begin with,
 // however well it fits.
-TEST(RigSolver, aFrameInWhichOneCameraHasNoPoseYetIsNoCandidate) {
+TEST(RigSolver, frameWithoutEveryPoseIsNoCandidate) {
   const FeatureDriveOptions drive = exact_drive();
   const FurtherCamera second{2, {exp_so3({-6e-3, 4e-3, 2e-3}), {-0.4, -0.05, 0.01}}};
   SolverInArena s(held(), 3);
@@ -250,7 +250,7 @@ TEST(RigSolver, aFrameInWhichOneCameraHasNoPoseYetIsNoCandidate) {
   EXPECT_EQ(s.solver.solve(rig_of(drive, second)).status, RigSolveStatus::no_candidate);
 }
 
-TEST(RigSolver, whatHoldsNoTransformSaysSo) {
+TEST(RigSolver, insufficientTracksGiveTheirStatus) {
   const FeatureDriveOptions drive = exact_drive();
   const RigCalibration rig = rig_of(drive);
   SolverInArena empty(held());
@@ -284,7 +284,7 @@ TEST(RigSolver, whatHoldsNoTransformSaysSo) {
   EXPECT_NE(g.status, RigSolveStatus::ok) << g.tracks << " tracks";
 }
 
-TEST(RigSolver, worksOffTheHeap) {
+TEST(RigSolver, solveUsesTheArenaAndNoHeap) {
   const FeatureDriveOptions drive;
   SolverInArena s(held());
   EXPECT_LE(s.arena.used(), s.arena.capacity());

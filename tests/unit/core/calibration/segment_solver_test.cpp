@@ -70,7 +70,7 @@ FeatureDriveOptions little_noise() {
   return o;
 }
 
-TEST(SegmentSolver, eachByItselfFindsTheTransform) {
+TEST(SegmentSolver, independentSegmentsFindTheTransform) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   Driven d(o, SegmentSolver::Kind::alone, given, rough(given));
@@ -93,7 +93,7 @@ TEST(SegmentSolver, eachByItselfFindsTheTransform) {
       << "disjoint tracks";
 }
 
-TEST(SegmentSolver, joinedTheyKnowMoreEachTime) {
+TEST(SegmentSolver, joinedSegmentsReduceTheSigmas) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   Driven joined(o, SegmentSolver::Kind::joined, given, rough(given)),
@@ -116,12 +116,12 @@ TEST(SegmentSolver, joinedTheyKnowMoreEachTime) {
               4 * std::sqrt(five_covariance(joined.solved[2].rig.covariance_total[1])(i, i)))
         << i;
   EXPECT_EQ(joined.solved[2].rig.frames, 3 * static_cast<int>(kStretch));
-  // The first knows nothing of others in either kind.
+  // The first segment has no predecessor of either kind.
   EXPECT_EQ(joined.solved[0].rig.T_camera_left[1].t, alone.solved[0].rig.T_camera_left[1].t);
   EXPECT_NE(joined.solved[1].rig.T_camera_left[1].t, alone.solved[1].rig.T_camera_left[1].t);
 }
 
-TEST(SegmentSolver, aCentreThatIsToldWrongIsFound) {
+TEST(SegmentSolver, wrongPrincipalPointIsEstimated) {
   const FeatureDriveOptions o = little_noise();
   Pinhole wrong = o.right;
   wrong.cx -= 5;
@@ -139,7 +139,7 @@ TEST(SegmentSolver, aCentreThatIsToldWrongIsFound) {
   EXPECT_LT(std::abs(lens.cx - o.right.cx), 2.5) << "and most of the five pixels are found";
 }
 
-TEST(SegmentSolver, framesAreTakenOnceThoughTheyAreShownAgain) {
+TEST(SegmentSolver, repeatedFramesAreTakenOnce) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   Driven d(o, SegmentSolver::Kind::alone, given, given);
@@ -152,7 +152,7 @@ TEST(SegmentSolver, framesAreTakenOnceThoughTheyAreShownAgain) {
   EXPECT_EQ(d.stretches.frames(), 30U);
 }
 
-TEST(SegmentSolver, whatIsLeftAtTheEndIsSolvedIfItIsEnough) {
+TEST(SegmentSolver, lastSegmentIsSolvedFromTheMinimumOn) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   for (const int frames : {24, 25}) {  // CalibrationOptions::min_frames is 25
@@ -171,7 +171,7 @@ TEST(SegmentSolver, whatIsLeftAtTheEndIsSolvedIfItIsEnough) {
 
 // An angle of the walk of an hour, 0.3 mrad, is many times what 30 frames leave open: after a day
 // what was known hardly counts.
-TEST(SegmentSolver, whatWasToldLongAgoCountsForLess) {
+TEST(SegmentSolver, oldPriorHasLessWeight) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   double sigma[2];
@@ -189,7 +189,7 @@ TEST(SegmentSolver, whatWasToldLongAgoCountsForLess) {
 }
 
 // The prior is widened once for the time that has passed, whether or not a solve failed meanwhile.
-TEST(SegmentSolver, oneThatFailsLeavesNoTraceInTheNext) {
+TEST(SegmentSolver, failedSegmentLeavesTheNextUnchanged) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   RigSolution third[2];
@@ -215,44 +215,6 @@ TEST(SegmentSolver, oneThatFailsLeavesNoTraceInTheNext) {
   }
   EXPECT_EQ(third[0].rig.T_camera_left[1].t, third[1].rig.T_camera_left[1].t);
   EXPECT_EQ(third[0].rig.sigma_noise[1], third[1].rig.sigma_noise[1]);
-}
-
-TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsObservations) {
-  Arena a(TrackLog::memory_needed(4, 8)), b(TrackLog::memory_needed(3, 5));
-  TrackLog from(4, 8, a), to(3, 5, b);
-  for (std::uint64_t number = 1; number <= 4; ++number) {
-    LoggedFrame f;
-    f.number = number;
-    f.stamp = Stamp(static_cast<std::int64_t>(number) * 1'000'000);
-    f.T_left_world.t = Vec3(0, 0, static_cast<double>(number));
-    f.stereo = 7;
-    from.begin(f);
-    for (std::uint32_t track = 0; track < 2 + 2 * number; ++track) {
-      LoggedObservation s;
-      s.track = 100 * static_cast<std::uint32_t>(number) + track;
-      s.cameras = 3;
-      s.raw[0].x() = static_cast<float>(track);
-      from.push(s);
-    }
-  }
-  for (std::size_t i = 0; i < 4; ++i) to.append(from.frame(i));
-  // Room for three: the oldest went. Room for five observations: of six, and twice of eight, the
-  // rest is left out and counted.
-  ASSERT_EQ(to.size(), 3U);
-  EXPECT_EQ(to.left_out(), 1U + 3U + 3U);
-  from.clear();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const LoggedFrame& f = to.frame(i);
-    EXPECT_EQ(f.number, i + 2);
-    EXPECT_EQ(f.stamp.ns(), static_cast<std::int64_t>(i + 2) * 1'000'000);
-    EXPECT_EQ(f.T_left_world.t.z(), static_cast<double>(i + 2));
-    EXPECT_EQ(f.stereo, 7);
-    ASSERT_EQ(f.observations.size(), 5U);
-    for (std::uint32_t track = 0; track < 5; ++track) {
-      EXPECT_EQ(f.observations[track].track, 100 * (i + 2) + track);
-      EXPECT_EQ(f.observations[track].raw[0].x(), static_cast<float>(track));
-    }
-  }
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ void expect_frame(const LoggedFrame& f, std::uint64_t number, std::size_t observ
     EXPECT_EQ(f.observations[i].track, 100 * number + i);
 }
 
-TEST(TrackLog, keepsFramesInOrderWithTheirObservations) {
+TEST(TrackLog, framesKeepOrderAndObservations) {
   Log l(4, 5);
   EXPECT_TRUE(l.log.empty());
   l.frame(3, 2);
@@ -53,7 +53,7 @@ TEST(TrackLog, keepsFramesInOrderWithTheirObservations) {
   EXPECT_LE(l.arena.used(), TrackLog::memory_needed(4, 5));
 }
 
-TEST(TrackLog, whenFullTheOldestFrameGoesAgainAndAgain) {
+TEST(TrackLog, fullLogDropsItsOldestFrame) {
   Log l(4, 5);
   for (std::uint64_t n = 1; n <= 23; ++n) {
     l.frame(n, static_cast<std::uint32_t>(n % 6));
@@ -67,7 +67,7 @@ TEST(TrackLog, whenFullTheOldestFrameGoesAgainAndAgain) {
   EXPECT_EQ(l.log.left_out(), 0U);
 }
 
-TEST(TrackLog, observationsBeyondAFramesCapacityAreLeftOutAndCounted) {
+TEST(TrackLog, observationsBeyondTheCapacityAreCounted) {
   Log l(2, 3);
   l.frame(1, 8);
   l.frame(2, 4);
@@ -77,7 +77,17 @@ TEST(TrackLog, observationsBeyondAFramesCapacityAreLeftOutAndCounted) {
   EXPECT_EQ(l.log.left_out(), 6U);
 }
 
-TEST(TrackLog, dropsFramesBeforeANumberAndGoesOn) {
+TEST(TrackLog, appendedFramesKeepTheirObservations) {
+  Log from(4, 8), to(3, 5);
+  for (std::uint64_t n = 1; n <= 4; ++n) from.frame(n, static_cast<std::uint32_t>(2 + 2 * n));
+  for (std::size_t i = 0; i < 4; ++i) to.log.append(from.log.frame(i));
+  ASSERT_EQ(to.log.size(), 3U);
+  EXPECT_EQ(to.log.left_out(), 1U + 3U + 3U) << "of six, and twice of eight";
+  from.log.clear();
+  for (std::size_t i = 0; i < 3; ++i) expect_frame(to.log.frame(i), i + 2, 5);
+}
+
+TEST(TrackLog, framesBeforeANumberAreDropped) {
   Log l(4, 2);
   for (std::uint64_t n = 1; n <= 6; ++n) l.frame(n, 1);  // 3 to 6, the ring has turned
   l.log.drop_before(3);
@@ -98,7 +108,7 @@ TEST(TrackLog, dropsFramesBeforeANumberAndGoesOn) {
   EXPECT_TRUE(l.log.empty());
 }
 
-TEST(TrackLog, aScaledWorldLooksTheSame) {
+TEST(TrackLog, scaledWorldKeepsItsDirections) {
   Log l(3, 1);
   Random random(4);
   const Vec3 centre(1, -2, 3), p(4, 5, 40);
@@ -132,7 +142,7 @@ TEST(TrackLog, aScaledWorldLooksTheSame) {
   }
 }
 
-TEST(TrackLog, aCopyHasTheNewestFramesOfItsOwn) {
+TEST(TrackLog, copyHasItsOwnNewestFrames) {
   Log from(5, 4);
   for (std::uint64_t n = 1; n <= 7; ++n) from.frame(n, 4);  // 3 to 7
   Log all(5, 4), fewer(5, 4), small(2, 3);

@@ -68,7 +68,7 @@ std::vector<Vec3> points(const Model& model) {
   return all;
 }
 
-TEST(Camera, projectsLikeOpenCv) {
+TEST(Camera, projectionMatchesOpenCv) {
   for (const Model& model : models()) {
     const Camera camera(model.k);
     const cv::Matx33d K(model.k.fx, 0, model.k.cx, 0, model.k.fy, model.k.cy, 0, 0, 1);
@@ -134,7 +134,7 @@ TEST(Camera, intrinsicsJacobianMatchesCentralDifferences) {
   }
 }
 
-TEST(Camera, unprojectFindsTheRayOfEveryPointTheLensSees) {
+TEST(Camera, unprojectInvertsProject) {
   for (const Model& model : models()) {
     const Camera camera(model.k);
     for (const Vec3& p : points(model)) {
@@ -154,7 +154,7 @@ TEST(Camera, unprojectFindsTheRayOfEveryPointTheLensSees) {
   }
 }
 
-TEST(Camera, everyPixelOfARectilinearLensHasARay) {
+TEST(Camera, everyPixelOfARadtanLensHasARay) {
   for (const Model& model : models()) {
     if (model.k.kind != CameraModelKind::pinhole_radtan) continue;
     const Camera camera(model.k);
@@ -169,7 +169,7 @@ TEST(Camera, everyPixelOfARectilinearLensHasARay) {
   }
 }
 
-TEST(Camera, unprojectRefusesWhatNoPointProjectsTo) {
+TEST(Camera, unprojectRefusesUnreachablePixels) {
   const Camera fisheye(models()[3].k);
   Vec3 ray(7, 7, 7);
   EXPECT_FALSE(fisheye.unproject({0, 0}, &ray)) << "the corner looks backwards";
@@ -180,7 +180,7 @@ TEST(Camera, unprojectRefusesWhatNoPointProjectsTo) {
   EXPECT_EQ(ray, Vec3(7, 7, 7)) << "untouched";
 }
 
-TEST(Camera, behindAndNotANumberLeaveTheOutputsAlone) {
+TEST(Camera, invalidPointLeavesTheOutputsUnchanged) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Model& model : models()) {
     const Camera camera(model.k);
@@ -200,7 +200,7 @@ TEST(Camera, behindAndNotANumberLeaveTheOutputsAlone) {
   }
 }
 
-TEST(Camera, foldedLightMakesNoImage) {
+TEST(Camera, pointBeyondTheFoldIsRefused) {
   // r (1 − 0.3 r²) grows up to r = 1/√0.9 ≈ 1.054 and comes back: r = 1.5 would land on the pixel
   // of r = 0.53.
   Intrinsics k = intrinsics(CameraModelKind::pinhole_radtan, 640, 480, {400, 400, 320, 240},
@@ -215,7 +215,7 @@ TEST(Camera, foldedLightMakesNoImage) {
   EXPECT_EQ(pixel, Vec2(-1, -2));
 }
 
-TEST(Camera, theEquidistantModelWithoutCoefficientsIsTheAngle) {
+TEST(Camera, equidistantWithoutCoefficientsIsTheAngle) {
   const Camera camera(
       intrinsics(CameraModelKind::pinhole_equidistant, 512, 512, {200, 200, 256, 256}, {}));
   Vec2 pixel;

@@ -14,7 +14,7 @@ void drive_east(AttitudeCheck* check, double from, double metres, double yaw) {
   for (double x = from; x <= from + metres; x += 1) check->add({x, 0}, 0.1, yaw);
 }
 
-TEST(AttitudeCheck, ContradictedAfterFiftyMetresAndUntilItAgreesAsLong) {
+TEST(AttitudeCheck, wrongYawIsContradictedAfterFiftyMetres) {
   AttitudeCheck check;
   drive_east(&check, 0, 45, kNorth);
   EXPECT_FALSE(check.contradicted());
@@ -27,7 +27,7 @@ TEST(AttitudeCheck, ContradictedAfterFiftyMetresAndUntilItAgreesAsLong) {
   EXPECT_FALSE(check.contradicted());
 }
 
-TEST(AttitudeCheck, AJumpAndTwentyDegreesAreNoContradiction) {
+TEST(AttitudeCheck, jumpOrTwentyDegreesIsNoContradiction) {
   AttitudeCheck check;
   check.add({0, 0}, 0.1, kNorth);
   check.add({1000, 0}, 0.1, kNorth);

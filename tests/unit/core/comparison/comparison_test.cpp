@@ -96,7 +96,7 @@ struct Bench {
   }
 };
 
-TEST(MountOf, turnsCameraAxesIntoTheVehicles) {
+TEST(MountOf, cameraAxesBecomeVehicleAxes) {
   const Transform T = mount_of({1, 2, 3}, Vec3::Zero());
   EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);  // seen ahead is ahead
   EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(),
@@ -108,7 +108,7 @@ TEST(MountOf, turnsCameraAxesIntoTheVehicles) {
       1e-15);
 }
 
-TEST(Comparison, idealInsAndTruePosesAgreeThroughTheWholeChain) {
+TEST(Comparison, idealInsAndTruePosesAgreeToAMillimetre) {
   Bench b;
   b.drive(0, 100);
   b.finish();
@@ -137,7 +137,7 @@ TEST(Comparison, idealInsAndTruePosesAgreeThroughTheWholeChain) {
   EXPECT_EQ(b.out.back().ins, InsMatch::none);
 }
 
-TEST(Comparison, aShortDriveIsPlacedAtItsEnd) {
+TEST(Comparison, shortDriveIsAlignedAtItsEnd) {
   Bench b;
   b.drive(0, 4);
   EXPECT_EQ(b.comparison.alignment().revision, 0U);
@@ -148,7 +148,7 @@ TEST(Comparison, aShortDriveIsPlacedAtItsEnd) {
       1e-3);
 }
 
-TEST(Comparison, theErrorIsTheDriftAfterThePlacement) {
+TEST(Comparison, errorIsTheDriftSinceTheAlignment) {
   Bench b;
   const Vec3 drift(0.5, -0.25, 0.125);  // m in the world's axes, from 50 s on
   b.drive(0, 60, {}, [&](double t, PoseSample* p) {
@@ -166,7 +166,7 @@ TEST(Comparison, theErrorIsTheDriftAfterThePlacement) {
   EXPECT_EQ(b.comparison.alignment().revision, 1U);  // frozen
 }
 
-TEST(Comparison, whereTheInsIsAwayPosesGoOnAndAreComparedAgainAfterIt) {
+TEST(Comparison, posesDuringInsOutageAreNotCompared) {
   struct Away {
     const char* what;
     double from, to;  // s: without a reading, or a fix
@@ -204,7 +204,7 @@ TEST(Comparison, whereTheInsIsAwayPosesGoOnAndAreComparedAgainAfterIt) {
   }
 }
 
-TEST(Comparison, aFixWithoutAHeightCountsForEastAndNorthOnly) {
+TEST(Comparison, fixWithoutHeightCountsForEastAndNorthOnly) {
   Bench b;
   b.drive(0, 50, [](double t, InsSample* s) {
     if (t > 20 && t < 30) s->fix = FixStatus::fix_2d, s->position.height_m = 0;
@@ -221,7 +221,7 @@ TEST(Comparison, aFixWithoutAHeightCountsForEastAndNorthOnly) {
   EXPECT_TRUE(b.out[b.out.size() - 2].compared);
 }
 
-TEST(Comparison, aPoseWaitsNoLongerThanItMay) {
+TEST(Comparison, poseIsReleasedAfterTheMaximumWait) {
   Bench b;
   for (int i = 0; i < 20; ++i) b.comparison.add(b.pose(0.05 * i));  // no INS at all
   b.take();
@@ -229,7 +229,7 @@ TEST(Comparison, aPoseWaitsNoLongerThanItMay) {
   EXPECT_EQ(b.out.front().ins, InsMatch::none);
 }
 
-TEST(Comparison, aFullQueueLetsTheOldestOut) {
+TEST(Comparison, fullQueueReleasesAndCountsTheOldest) {
   ComparisonOptions options = Bench::with_mount();
   options.max_wait = Duration::seconds(1e6);
   Bench b(options);
@@ -241,7 +241,7 @@ TEST(Comparison, aFullQueueLetsTheOldestOut) {
   EXPECT_EQ(b.comparison.counters().pushed_out, b.out.size());
 }
 
-TEST(Comparison, aJumpOf100MetresIsSaidAndNotInterpolatedAcross) {
+TEST(Comparison, jumpOf100MetresIsCountedNotInterpolated) {
   Bench b;
   const Vec3 jump(0, 100, 0);
   for (int i = 0; i <= 40 * 120; ++i) {
@@ -278,7 +278,7 @@ void expect_placed_behind_a_leap(int last_before, int without_fix) {
   for (const ComparedPose& c : b.out) EXPECT_FALSE(c.scale_disagrees);
 }
 
-TEST(Comparison, aJumpWhilePlacingBeginsThePlacementAnewWhetherOrNotAFrameFellIntoIt) {
+TEST(Comparison, jumpDuringAlignmentRestartsIt) {
   // Poses fall between readings 3n and 3n + 1: into the first jump, beside the second.
   for (const int last_before : {600, 601})
     for (const int without_fix : {0, 1, 3}) {
@@ -289,7 +289,7 @@ TEST(Comparison, aJumpWhilePlacingBeginsThePlacementAnewWhetherOrNotAFrameFellIn
 
 /// Poses a second behind the INS, so that several leaps are known before the first pose meets one.
 /// The alignment's 100 metres are driven after 10.15 s: between the first leap and the last.
-TEST(Comparison, ofSeveralJumpsBeforeAPoseNoneIsForgotten) {
+TEST(Comparison, severalJumpsBeforeAPoseAreAllCounted) {
   const Vec3 first(30, 100, 0), second(-60, -100, 0);
   for (const Vec3& between : {first, second}) {
     Bench b;
@@ -309,7 +309,7 @@ TEST(Comparison, ofSeveralJumpsBeforeAPoseNoneIsForgotten) {
   }
 }
 
-TEST(Comparison, aRestartedOdometryIsPlacedAnew) {
+TEST(Comparison, mapResetStartsANewAlignment) {
   Bench b;
   const Transform elsewhere{exp_so3({0, 0.3, 0}), {5, 0, 5}};
   b.drive(0, 60, {}, [&](double t, PoseSample* p) {
@@ -322,7 +322,7 @@ TEST(Comparison, aRestartedOdometryIsPlacedAnew) {
   EXPECT_LT(b.out[b.out.size() - 2].error_enu.norm(), 1e-3);
 }
 
-TEST(Comparison, aLostPoseIsNotComparedButKeepsItsIns) {
+TEST(Comparison, lostPoseKeepsItsInsAndIsNotCompared) {
   Bench b;
   b.drive(0, 30, {}, [](double t, PoseSample* p) {
     if (t > 20 && t < 21) {
@@ -350,7 +350,7 @@ bool only_course(double t, InsSample* s) {
   return true;
 }
 
-TEST(Comparison, positionsAndCourseAloneArePlacedAndCompared) {
+TEST(Comparison, positionAndCourseAloneAreCompared) {
   ComparisonOptions o = Bench::with_mount();
   o.T_ins_left = mount_of({1.2, 0.4, 0}, Vec3::Zero());
   Bench b(o);
@@ -366,7 +366,7 @@ TEST(Comparison, positionsAndCourseAloneArePlacedAndCompared) {
   EXPECT_GT(b.comparison.alignment().rotation_sigma.head<2>().minCoeff(), 0);
 }
 
-TEST(Comparison, withoutAttitudeTheLastHeadingHoldsAtAStandstill) {
+TEST(Comparison, standstillKeepsTheLastCourse) {
   Bench b;
   const auto standing = [](double t, InsSample* s) {
     only_course(t, s);
@@ -384,7 +384,7 @@ TEST(Comparison, withoutAttitudeTheLastHeadingHoldsAtAStandstill) {
   }
 }
 
-TEST(Comparison, aWrongScaleIsSeen) {
+TEST(Comparison, scaleErrorAboveTwoPercentIsReported) {
   for (const double scale : {1.0, 1.01, 1.03, 0.97}) {
     Bench b;
     b.drive(0, 60, {}, [&](double, PoseSample* p) { p->T_world_left.t *= scale; });
@@ -392,7 +392,7 @@ TEST(Comparison, aWrongScaleIsSeen) {
     EXPECT_NEAR(c.path_ratio, scale, 1e-4);
     EXPECT_EQ(c.scale_disagrees, std::abs(scale - 1) > 0.02);
   }
-  // A receiver that knows 2.5 m cannot tell 3 % of 200 m: 4 √2 2.5 / 200 = 7 %.
+  // A receiver with a sigma of 2.5 m does not resolve 3 % of 200 m: 4 √2 2.5 / 200 = 7 %.
   Bench b;
   b.drive(
       0, 60, [](double, InsSample* s) { return s->position_sigma = 2.5, true; },
@@ -400,7 +400,7 @@ TEST(Comparison, aWrongScaleIsSeen) {
   EXPECT_FALSE(b.out[b.out.size() - 2].scale_disagrees);
 }
 
-TEST(Comparison, samplesThatMeanNothingAreRefusedAndCounted) {
+TEST(Comparison, invalidSamplesAreRefusedAndCounted) {
   Bench b;
   b.comparison.add(b.sample(1.0));
   b.comparison.add(b.sample(1.0));  // the same stamp
@@ -423,7 +423,7 @@ TEST(Comparison, samplesThatMeanNothingAreRefusedAndCounted) {
   EXPECT_EQ(b.out[0].ins, InsMatch::no_fix);
 }
 
-TEST(Comparison, anInsWhoseClockWentBackForGoodIsTakenUpAgainAfterASecondWhateverItsRate) {
+TEST(Comparison, insClockSetBackIsAcceptedAfterASecond) {
   for (const int rate : {1, 4, 120, 400}) {
     SCOPED_TRACE(rate);
     ComparisonOptions options = Bench::with_mount();
@@ -441,9 +441,8 @@ TEST(Comparison, anInsWhoseClockWentBackForGoodIsTakenUpAgainAfterASecondWhateve
   }
 }
 
-TEST(Comparison, anHourAt120HzTakesNoMemory) {
+TEST(Comparison, hourAt120HzAllocatesNothing) {
   Bench b;
-  if (!AllocationGuard::available()) GTEST_SKIP() << "the allocation hooks are not in this build";
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::uint64_t out = 0;
   {

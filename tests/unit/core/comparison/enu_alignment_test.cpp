@@ -38,7 +38,7 @@ double rotation_error(const EnuAlignment& p) {
   return rotation_angle(p.T_enu_world.R * truth().R.transpose());
 }
 
-TEST(FitEnuAlignment, findsAnExactPlacement) {
+TEST(FitEnuAlignment, exactPairsGiveTheExactAlignment) {
   EnuAlignment alignment;
   const auto pairs = drive(100, 0.3, 200);
   ASSERT_EQ(fit_enu_alignment(pairs, kCorrelation, &alignment), EnuAlignmentStatus::ok);
@@ -50,7 +50,7 @@ TEST(FitEnuAlignment, findsAnExactPlacement) {
   EXPECT_EQ(alignment.pairs, 200);
 }
 
-TEST(FitEnuAlignment, headingWithASigmaSharesWithThePositions) {
+TEST(FitEnuAlignment, headingAndPositionsAreWeightedBySigma) {
   const double wrong = 0.01;
   const auto turned = [&](double heading_sigma, double by) {
     auto pairs = drive(100, 0.0, 200);
@@ -71,7 +71,7 @@ TEST(FitEnuAlignment, headingWithASigmaSharesWithThePositions) {
   EXPECT_LT(rotation_error(turned(1e-5, 1.0)), 1e-6) << "a mount that is no mount is not taken";
 }
 
-TEST(FitEnuAlignment, attitudeAndPositionsShareThePitchByTheirSigmas) {
+TEST(FitEnuAlignment, tiltAndPositionsAreWeightedBySigma) {
   // Positions say level; the attitude of the INS is pitched by 10 mrad across the way. The result
   // lies where the weights put it.
   const double wrong = 0.01;
@@ -84,15 +84,15 @@ TEST(FitEnuAlignment, attitudeAndPositionsShareThePitchByTheirSigmas) {
     EXPECT_EQ(fit_enu_alignment(pairs, kCorrelation, &alignment), EnuAlignmentStatus::ok);
     return rotation_error(alignment);
   };
-  EXPECT_LT(pitched(1.0), 0.02 * wrong);   // attitude that knows nothing
-  EXPECT_GT(pitched(1e-5), 0.98 * wrong);  // attitude that knows all
+  EXPECT_LT(pitched(1.0), 0.02 * wrong);   // The attitude has no weight.
+  EXPECT_GT(pitched(1e-5), 0.98 * wrong);  // The attitude has all the weight.
   // Two independent heights over 100 m (10 s, correlation 10 s) hold the pitch to σ_h √12 / (L √2).
   const double sigma_pitch = 5.0 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
   const double tilt = 0.1, expected = wrong / (1.0 + tilt * tilt / (sigma_pitch * sigma_pitch));
   EXPECT_NEAR(pitched(tilt), expected, 0.03 * expected);
 }
 
-TEST(FitEnuAlignment, sigmaOfTheHeadingIsWhatTheReceiverCanTell) {
+TEST(FitEnuAlignment, headingSigmaFollowsFromPositionSigma) {
   // A line of length L with n_eff independent positions: σ_yaw = σ √12 / (L √n_eff), for many
   // pairs.
   EnuAlignment alignment;
@@ -104,7 +104,7 @@ TEST(FitEnuAlignment, sigmaOfTheHeadingIsWhatTheReceiverCanTell) {
   EXPECT_NEAR(alignment.position_sigma.x(), 2.5 / std::sqrt(2.0), 0.01);
 }
 
-TEST(FitEnuAlignment, sigmasHoldOverManyNoisyDrives) {
+TEST(FitEnuAlignment, sigmasMatchErrorsOfNoisyDrives) {
   // White errors and a correlation short enough that each pair counts: the squared error over the
   // variance averages to one a parameter.
   Random random(11);
@@ -142,7 +142,7 @@ TEST(FitEnuAlignment, residualsBeyondTheSigmasWidenTheResult) {
   EXPECT_NEAR(noisy.residual, 0.1 * std::sqrt(3.0), 0.02);
 }
 
-TEST(FitEnuAlignment, saysWhatDoesNotHold) {
+TEST(FitEnuAlignment, insufficientPairsGiveTheirStatus) {
   EnuAlignment alignment;
   alignment.revision = 7;
   EXPECT_EQ(fit_enu_alignment(drive(100, 0.3, 2), kCorrelation, &alignment),

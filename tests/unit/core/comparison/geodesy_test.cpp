@@ -31,7 +31,7 @@ const std::array kKnown = {
                {-1452.415758, -1385.238005, -2.316367}},
 };
 
-TEST(LocalTangentPlane, knownPointsOfBothHemispheres) {
+TEST(LocalTangentPlane, knownPointsMatchToAMicrometre) {
   for (const KnownPoint& k : kKnown) {
     const LocalTangentPlane plane(k.origin);
     EXPECT_LT((plane.to_enu(k.point) - k.enu).cwiseAbs().maxCoeff(), 1e-6);
@@ -42,7 +42,7 @@ TEST(LocalTangentPlane, knownPointsOfBothHemispheres) {
   }
 }
 
-TEST(LocalTangentPlane, axesOfAnotherPlaceAreTheDerivativesOfItsCoordinates) {
+TEST(LocalTangentPlane, rotationFromIsTheCoordinateDerivative) {
   for (const KnownPoint& k : kKnown) {
     const LocalTangentPlane plane(k.origin);
     const Mat3 R = plane.rotation_from(k.point);
@@ -56,7 +56,7 @@ TEST(LocalTangentPlane, axesOfAnotherPlaceAreTheDerivativesOfItsCoordinates) {
   }
 }
 
-TEST(Geodetic, whatIsNoPlaceIsNotPlausible) {
+TEST(Geodetic, swappedOrNonFiniteIsNotPlausible) {
   EXPECT_TRUE((Geodetic{-27.4975, 153.0137, 60}).plausible());
   EXPECT_FALSE((Geodetic{153.0137, -27.4975, 60}).plausible());  // swapped
   EXPECT_FALSE((Geodetic{std::nan(""), 0, 0}).plausible());
@@ -64,7 +64,7 @@ TEST(Geodetic, whatIsNoPlaceIsNotPlausible) {
   EXPECT_FALSE((Geodetic{0, 0, std::nan("")}).plausible());
 }
 
-TEST(CompassHeading, isClockwiseFromNorth) {
+TEST(CompassHeading, headingIsClockwiseFromNorth) {
   constexpr double kPi = std::numbers::pi;
   EXPECT_NEAR(compass_heading_deg(0), 90, 1e-12);          // east
   EXPECT_NEAR(compass_heading_deg(kPi / 2), 0, 1e-12);     // north
@@ -86,7 +86,7 @@ std::vector<double> numbers(const std::string& line) {
   return out;
 }
 
-TEST(LocalTangentPlane, realDriveToTheMillimetre) {
+TEST(LocalTangentPlane, recordedDriveMatchesToTwoMicrometres) {
   const auto file = test::shared_data("data/oxts/enu.csv");
   if (!file) GTEST_SKIP() << test::shared_data_missing("data/oxts/enu.csv");
   std::ifstream in(*file);

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <vector>
 
 #include "core/comparison/comparison.hpp"
@@ -14,6 +13,7 @@
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "drivers/mock/ins_model.hpp"
+#include "tests/support/small_mock.hpp"
 
 namespace vergence {
 namespace {
@@ -21,16 +21,6 @@ namespace {
 constexpr Stamp kStart{1'000'000'000'000};
 const Vec3 kLever(0.9, 0.375, 0.5);
 const Vec3 kBoresight(0.02, -0.03, 0.05);  // rad
-
-std::shared_ptr<const mock::World> town() {
-  static const auto world = [] {
-    mock::WorldOptions o;
-    o.texture_detail = 0;
-    o.built_fraction = o.tree_fraction = o.car_fraction = 0;
-    return std::make_shared<const mock::World>(o);
-  }();
-  return world;
-}
 
 struct Drove {
   std::vector<StampedPose> estimate;
@@ -57,7 +47,7 @@ Drove drove(const How& how) {
   const Transform T_body_ins = T_body_left * mount_of(kLever, kBoresight).inverse();
   RigCalibration rig;
   rig.cameras = 2;
-  const mock::RigTruth truth(town(), options, rig, T_body_left, T_body_ins, {});
+  const mock::RigTruth truth(test::empty_town(), options, rig, T_body_left, T_body_ins, {});
   const double length = truth.drive().duration().to_seconds();
   Drove d;
   Random random(how.seed, 40);
@@ -101,7 +91,7 @@ Mat3 nominal() { return mount_of(Vec3::Zero(), Vec3::Zero()).R; }
 /// Ground truth in Mount's parameters.
 Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().transpose()); }
 
-TEST(Mount, anIdealReferenceGivesItsMount) {
+TEST(Mount, idealReferenceGivesTheExtrinsics) {
   for (const bool velocity : {true, false}) {
     How how;
     how.ideal = true;
@@ -121,7 +111,7 @@ TEST(Mount, anIdealReferenceGivesItsMount) {
   }
 }
 
-TEST(Mount, aSlowReferenceGivesItsMountAsAQuickOneDoes) {
+TEST(Mount, slowReferenceGivesTheExtrinsics) {
   struct Slow {
     double rate, jitter_s;
   };
@@ -150,7 +140,7 @@ TEST(Mount, aSlowReferenceGivesItsMountAsAQuickOneDoes) {
   }
 }
 
-/// Thirty drives with an INS of the MTi-G's class: what is said is true within what is said of it.
+/// Errors of thirty drives with an INS of the MTi-G's class, relative to the stated sigmas.
 void sigmas_hold(bool velocity) {
   constexpr int kDrives = 30;
   std::array<std::vector<double>, 7> ratios, sigmas;
@@ -201,10 +191,10 @@ void sigmas_hold(bool velocity) {
   }
 }
 
-TEST(Mount, sigmasHoldOverThirtyDrivesWithVelocity) { sigmas_hold(true); }
-TEST(Mount, sigmasHoldOverThirtyDrivesByPositionAlone) { sigmas_hold(false); }
+TEST(Mount, sigmasMatchErrorsWithVelocity) { sigmas_hold(true); }
+TEST(Mount, sigmasMatchErrorsByPositionAlone) { sigmas_hold(false); }
 
-TEST(Mount, aStraightDriveShowsNoLeverArm) {
+TEST(Mount, leverArmIsUnobservableOnAStraight) {
   How how;
   how.kind = mock::DriveKind::straight;
   how.velocity = false;
@@ -226,7 +216,7 @@ void reverse(std::vector<MountReference>* reference) {
   }
 }
 
-TEST(Mount, trajectoriesThatDoNotBelongTogetherHaveNoFit) {
+TEST(Mount, unrelatedTrajectoriesDoNotConverge) {
   for (const mock::DriveKind kind : {mock::DriveKind::loop, mock::DriveKind::figure_eight})
     for (const bool velocity : {true, false}) {
       How how;
@@ -257,7 +247,7 @@ TEST(Mount, trajectoriesThatDoNotBelongTogetherHaveNoFit) {
 
 /// The residuals of 15 degrees that a fit may have at most: half their square is the two degrees
 /// that count as seen.
-TEST(Mount, attitudesThatSwayTooFarHaveNoFit) {
+TEST(Mount, swayingAttitudeDoesNotConverge) {
   How how;
   how.ideal = true;
   how.velocity = false;
@@ -275,7 +265,7 @@ TEST(Mount, attitudesThatSwayTooFarHaveNoFit) {
   EXPECT_EQ(swaying(18), MountStatus::not_converged);
 }
 
-TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
+TEST(Mount, insufficientDataGivesStatusAndKeepsResult) {
   How still;
   still.kind = mock::DriveKind::still;
   Drove d = drove(still);

@@ -41,7 +41,7 @@ std::vector<StampedPose> moved(const Transform& T, double scale, std::vector<Sta
   return poses;
 }
 
-TEST(Associate, interpolatesPositionLinearlyAndRotationAlongTheShorterArc) {
+TEST(Associate, poseIsInterpolatedAlongTheShorterArc) {
   // From +170° to −170° about z the short way leads over 180°.
   const std::vector<StampedPose> reference{pose(0, {0, 0, 0}, {0, 0, 170 * kPi / 180}),
                                            pose(0.1, {4, 2, 0}, {0, 0, -170 * kPi / 180})};
@@ -55,7 +55,7 @@ TEST(Associate, interpolatesPositionLinearlyAndRotationAlongTheShorterArc) {
   EXPECT_EQ(m.reference[0].stamp, estimate[0].stamp);
 }
 
-TEST(Associate, countsWhatLiesBeforeAfterAndInAHole) {
+TEST(Associate, unmatchedPosesAreCountedByCause) {
   const std::vector<StampedPose> reference{pose(1.0, {1, 0, 0}), pose(1.2, {2, 0, 0}),
                                            pose(1.5, {3, 0, 0}), pose(1.6, {4, 0, 0})};
   const std::vector<StampedPose> estimate{pose(0.9), pose(1.0), pose(1.1), pose(1.3),
@@ -70,11 +70,11 @@ TEST(Associate, countsWhatLiesBeforeAfterAndInAHole) {
   EXPECT_DOUBLE_EQ(m.reference[0].T_world_body.t.x(), 1);
   EXPECT_DOUBLE_EQ(m.reference[1].T_world_body.t.x(), 1.5);
   EXPECT_DOUBLE_EQ(m.reference[2].T_world_body.t.x(),
-                   3);  // a reference at the very stamp counts, whatever the hole beside it
+                   3);  // A reference at the same stamp counts beside any gap.
   EXPECT_DOUBLE_EQ(m.reference[3].T_world_body.t.x(), 4);
 }
 
-TEST(Associate, nearestTakesTheNeighbourAsItIsUpToTheLimitInclusive) {
+TEST(Associate, nearestMatchesUpToTheLimitInclusive) {
   const std::vector<StampedPose> reference{pose(1.0, {1, 0, 0}), pose(1.1, {2, 0, 0})};
   const std::vector<StampedPose> estimate{pose(0.994), pose(0.995), pose(1.004), pose(1.05),
                                           pose(1.097), pose(1.105), pose(1.106)};
@@ -90,7 +90,7 @@ TEST(Associate, nearestTakesTheNeighbourAsItIsUpToTheLimitInclusive) {
   EXPECT_EQ(m.after, 1U);
 }
 
-TEST(Associate, keepsNanosecondsOfADateApart) {
+TEST(Associate, nanosecondsAtADateAreKept) {
   constexpr std::int64_t date = 1403636584763555584;
   std::vector<StampedPose> reference = line(2, 100.0), estimate = line(1, 0.0);
   reference[0].stamp = Stamp(date);
@@ -101,7 +101,7 @@ TEST(Associate, keepsNanosecondsOfADateApart) {
   EXPECT_DOUBLE_EQ(m.reference[0].T_world_body.t.x(), 25);
 }
 
-TEST(Align, findsTheRigidMotionAndTheScaleThatWereApplied) {
+TEST(Align, appliedMotionAndScaleAreFound) {
   const std::vector<StampedPose> reference = helix(80);
   const Transform T_estimate_reference{exp_so3({0.4, -1.1, 2.0}), {5, -7, 11}};
   const std::vector<StampedPose> estimate = moved(T_estimate_reference, 1.02, reference);
@@ -121,7 +121,7 @@ TEST(Align, findsTheRigidMotionAndTheScaleThatWereApplied) {
   EXPECT_FALSE(se3.roll_unobservable);
 }
 
-TEST(Align, neverReflects) {
+TEST(Align, alignmentIsNeverAReflection) {
   const std::vector<StampedPose> reference = helix(80);
   std::vector<StampedPose> mirrored = reference;
   for (StampedPose& p : mirrored) p.T_world_body.t.z() *= -1.0;
@@ -137,7 +137,7 @@ TEST(Align, neverReflects) {
             1e2 * kRounding);
 }
 
-TEST(Align, saysWhenAStraightPathLeavesTheRollOpen) {
+TEST(Align, straightPathLeavesTheRollUnobservable) {
   Random random(3);
   std::vector<StampedPose> reference = line(50, 1.2, Vec3::UnitZ()), estimate = reference;
   for (StampedPose& p : estimate)
@@ -146,7 +146,7 @@ TEST(Align, saysWhenAStraightPathLeavesTheRollOpen) {
   EXPECT_TRUE(align(reference, reference, AlignmentScale::one).roll_unobservable);
 }
 
-TEST(Evaluate, pathsAndScaleOfAnEstimateThatIsTooLarge) {
+TEST(Evaluate, scaledEstimateGivesPathRatioAndScale) {
   const std::vector<StampedPose> reference = helix(100);
   const TrajectoryEvaluation e =
       evaluate(moved({exp_so3({1, 2, 0}), {9, 9, 9}}, 1.02, reference), reference, {});
@@ -159,7 +159,7 @@ TEST(Evaluate, pathsAndScaleOfAnEstimateThatIsTooLarge) {
   EXPECT_NEAR(e.path_reference, 99 * std::hypot(20 * std::sin(0.05), 0.05), 1e-9);
 }
 
-TEST(Evaluate, headingOfACameraIsTakenAboutItsWorldsUp) {
+TEST(Evaluate, cameraHeadingIsAboutItsWorldUp) {
   // In a camera's world (y down) a turn to the left, counter-clockwise from above, is negative
   // about y.
   std::vector<StampedPose> reference;
@@ -180,7 +180,7 @@ TEST(Evaluate, headingOfACameraIsTakenAboutItsWorldsUp) {
   EXPECT_NEAR(e.heading_start_aligned.last, 0.05, kRounding);
 }
 
-TEST(Evaluate, headingErrorsWrapToTheShorterWay) {
+TEST(Evaluate, headingErrorWrapsToTheShorterArc) {
   std::vector<StampedPose> reference, estimate;
   for (int i = 0; i < 10; ++i) {
     const double yaw = i == 0 ? 0.0 : 3.1;
@@ -193,7 +193,7 @@ TEST(Evaluate, headingErrorsWrapToTheShorterWay) {
   EXPECT_NEAR(evaluate(estimate, reference, options).heading_start_aligned.last, 0.1, kRounding);
 }
 
-TEST(Evaluate, endErrorsOfADriftThatIsKnown) {
+TEST(Evaluate, knownDriftGivesTheEndErrors) {
   const std::vector<StampedPose> reference = line(101, 1.0);
   std::vector<StampedPose> estimate = reference;
   for (StampedPose& p : estimate) p.T_world_body.t *= 1.01;
@@ -207,7 +207,7 @@ TEST(Evaluate, endErrorsOfADriftThatIsKnown) {
   EXPECT_TRUE(e.se3.roll_unobservable);
 }
 
-TEST(SegmentErrors, endAtTheFirstPoseStrictlyFartherAndDivideByTheNominalLength) {
+TEST(SegmentErrors, segmentEndsAtFirstPoseBeyondItsLength) {
   const std::vector<StampedPose> reference = line(12, 1.0);
   const std::vector<StampedPose> estimate = line(12, 1.01);
   SegmentOptions options{{10, 11, 5}, 1, false};
@@ -230,7 +230,7 @@ TEST(SegmentErrors, endAtTheFirstPoseStrictlyFartherAndDivideByTheNominalLength)
             2U);  // from poses 0 and 4
 }
 
-TEST(SegmentErrors, rotationPerMetre) {
+TEST(SegmentErrors, rotationErrorIsPerMetre) {
   const std::vector<StampedPose> reference = line(30, 1.0);
   std::vector<StampedPose> estimate = reference;
   for (std::size_t i = 0; i < estimate.size(); ++i)
@@ -239,7 +239,7 @@ TEST(SegmentErrors, rotationPerMetre) {
   EXPECT_NEAR(s.rotation, 0.011 / 10, 1e-12);
 }
 
-TEST(Evaluate, pathShorterThanEveryLengthGivesNoneNotZero) {
+TEST(Evaluate, shortPathHasNoSegmentErrorInsteadOfZero) {
   const std::vector<StampedPose> reference = helix(50);
   const TrajectoryEvaluation e = evaluate(reference, reference, {});
   ASSERT_EQ(e.segments.size(), 1U);
@@ -248,7 +248,7 @@ TEST(Evaluate, pathShorterThanEveryLengthGivesNoneNotZero) {
   EXPECT_TRUE(std::isnan(e.segments[0].rotation));
 }
 
-TEST(Evaluate, scaledSegmentsTakeTheSim3ScaleOut) {
+TEST(Evaluate, scaledSegmentsRemoveTheSim3Scale) {
   const std::vector<StampedPose> reference = helix(300);
   EvaluationOptions options;
   options.segments = {{{10, 20}, 1, false}, {{10, 20}, 1, true}};
@@ -257,7 +257,7 @@ TEST(Evaluate, scaledSegmentsTakeTheSim3ScaleOut) {
   EXPECT_LT(e.segments[1].translation, 1e-10);
 }
 
-TEST(Evaluate, saysWhatIsMissing) {
+TEST(Evaluate, insufficientInputGivesItsStatus) {
   const std::vector<StampedPose> reference = helix(50);
   EXPECT_EQ(evaluate({}, reference, {}).status, EvaluationStatus::no_match);
   EXPECT_EQ(evaluate(reference, {}, {}).status, EvaluationStatus::no_match);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::array kStateNames = {"none", "unverified", "verified", "suspect"};
 constexpr std::array kTriggerNames = {"adopted",      "adopted_verified", "confirmed",
-                                      "contradicted", "doubted",          "kept"};
+                                      "contradicted", "suspected",        "kept"};
 constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "pair_found",
                                                "frames_enough",
@@ -28,7 +28,7 @@ constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "requested",
                                                "pose_lost",
                                                "pose_found",
-                                               "pose_found_doubtful",
+                                               "pose_found_suspect",
                                                "pose_found_uncalibrated"};
 constexpr std::array kDegradationNames = {"pairing",    "scene", "frame",       "out_of_sync",
                                           "late_image", "rig",   "calibration", "dynamic_scene",
@@ -52,7 +52,7 @@ std::ptrdiff_t arrows(const std::string& text) {
   return n;
 }
 
-TEST(CalibrationStates, onlyDoubtLeadsToSuspectAndOnlyADriveToVerified) {
+TEST(CalibrationStates, suspectAndVerifiedHaveTheirTriggersOnly) {
   using S = CalibrationState;
   using T = CalibrationTrigger;
   for (const CalibrationTransition& t : kCalibrationTransitions) {
@@ -65,7 +65,7 @@ TEST(CalibrationStates, onlyDoubtLeadsToSuspectAndOnlyADriveToVerified) {
   EXPECT_EQ(after(S::suspect, T::confirmed), S::suspect);
 }
 
-TEST(CalibrationStates, theDrawingsInTheReadmeAreTheTables) {
+TEST(CalibrationStates, readmeDiagramsMatchTheTables) {
   const std::string text = readme();
   for (const CalibrationTransition& t : kCalibrationTransitions) {
     const std::string line = edge(kStateNames[static_cast<std::size_t>(t.from)],

@@ -13,13 +13,13 @@ CovarianceBaseline driven(int motions) {
   return usual;  // 0.014 on the median
 }
 
-TEST(CovarianceBaseline, aMotionThreeTimesAsUncertainAsTheOthersIsUnusual) {
+TEST(CovarianceBaseline, threeTimesTheUsualSigmaIsUnusual) {
   EXPECT_TRUE(driven(kEnough).unusual(0.043));
   EXPECT_FALSE(driven(kEnough).unusual(0.041));
   EXPECT_FALSE(driven(kEnough - 1).unusual(0.043)) << "too few to tell";
 }
 
-TEST(CovarianceBaseline, oneCertainMotionEndsNothing) {
+TEST(CovarianceBaseline, oneCertainMotionDoesNotEndIt) {
   CovarianceBaseline usual = driven(100);
   for (int i = 0; i < 5; ++i) (void)usual.unusual(0.060);
   EXPECT_TRUE(usual.unusual(0.014));
@@ -27,7 +27,7 @@ TEST(CovarianceBaseline, oneCertainMotionEndsNothing) {
   EXPECT_FALSE(usual.unusual(0.014));
 }
 
-TEST(CovarianceBaseline, standingIsNotJudgedAndALargeSigmaIsNoStanding) {
+TEST(CovarianceBaseline, standingIsNotEvaluated) {
   EXPECT_FALSE(CovarianceBaseline{}.measurable(0.027, 0.014));
   EXPECT_TRUE(CovarianceBaseline{}.measurable(0.029, 0.014));
   const CovarianceBaseline usual = driven(kEnough);
@@ -35,7 +35,7 @@ TEST(CovarianceBaseline, standingIsNotJudgedAndALargeSigmaIsNoStanding) {
   EXPECT_TRUE(usual.measurable(0.029, 0.1)) << "seven times the usual";
 }
 
-TEST(CovarianceBaseline, whatStaysUnusualNeverBecomesUsual) {
+TEST(CovarianceBaseline, lastingUncertaintyStaysUnusual) {
   CovarianceBaseline usual = driven(200);
   for (int i = 0; i < 100; ++i) EXPECT_TRUE(usual.unusual(0.1)) << i;
   for (int i = 0; i < 4; ++i) (void)usual.unusual(0.014);

@@ -5,7 +5,7 @@
 namespace vergence {
 namespace {
 
-TEST(DegradationLedger, namesTheStrongestThatStands) {
+TEST(DegradationLedger, strongestIsReported) {
   DegradationLedger ledger;
   EXPECT_EQ(ledger.strongest(true), nullptr);
   ledger.enter(Degradation::window, Reason::time_gap, 7, 3);
@@ -18,7 +18,7 @@ TEST(DegradationLedger, namesTheStrongestThatStands) {
   EXPECT_FALSE(ledger.any_up_to(Degradation::rig));
 }
 
-TEST(DegradationLedger, anEntryEndsAfterAsMuchEvidenceAsItNeeds) {
+TEST(DegradationLedger, entryEndsAfterItsEvidence) {
   DegradationLedger ledger;
   EXPECT_FALSE(ledger.weaken(Degradation::scene));
   ledger.enter(Degradation::scene, Reason::map_reset, 5, 2);
@@ -30,7 +30,7 @@ TEST(DegradationLedger, anEntryEndsAfterAsMuchEvidenceAsItNeeds) {
   EXPECT_TRUE(ledger.stands(Degradation::rig));
 }
 
-TEST(DegradationLedger, anEntryKeepsTheFrameItBeganIn) {
+TEST(DegradationLedger, entryKeepsItsFirstFrame) {
   DegradationLedger ledger;
   for (std::uint64_t frame = 11; frame < 15; ++frame)
     ledger.hold(Degradation::frame, true, Reason::few_inliers, frame);
@@ -41,7 +41,7 @@ TEST(DegradationLedger, anEntryKeepsTheFrameItBeganIn) {
   EXPECT_EQ(ledger[Degradation::frame].since, 16U);
 }
 
-TEST(DegradationLedger, aLateImageSaysNothingOfAPoseThatStands) {
+TEST(DegradationLedger, lateImageIsIgnoredWhileStanding) {
   DegradationLedger ledger;
   ledger.enter(Degradation::late_image, Reason::image_repeated, 3, 12);
   EXPECT_EQ(ledger.strongest(false), nullptr);

@@ -87,7 +87,7 @@ void expect_at_start(const PoseSample& s) {
   EXPECT_LT(log_so3(s.T_world_left.R).norm(), 1e-3);
 }
 
-TEST(Estimator, answersEveryFrameWithItsNumberAndStamp) {
+TEST(Estimator, everyFrameGetsItsNumberAndStamp) {
   Standing s;
   for (int i = 0; i < 5; ++i) {
     const PoseSample sample = s.give(i);
@@ -107,7 +107,7 @@ double position_sigma(const PoseSample& s) {
 
 // Every frame is measured against the same map: the pose of the last is no worse than that of the
 // tenth. Summed up frame by frame it would be √20 times.
-TEST(Estimator, aPoseThatStandsGetsNoMoreUncertain) {
+TEST(Estimator, standingPoseKeepsItsUncertainty) {
   Standing s;
   double tenth = 0;
   for (int i = 0; i <= 200; ++i) {
@@ -120,7 +120,7 @@ TEST(Estimator, aPoseThatStandsGetsNoMoreUncertain) {
   }
 }
 
-TEST(Estimator, ofAContradictedPairingTheFirstImageAloneIsUsedAndThePoseSaysSo) {
+TEST(Estimator, contradictedPairingUsesTheLeftImageOnly) {
   Standing contradicted, single_camera;
   for (int i = 0; i < 3; ++i) {
     (void)contradicted.give(i);
@@ -139,7 +139,7 @@ TEST(Estimator, ofAContradictedPairingTheFirstImageAloneIsUsedAndThePoseSaysSo) 
   EXPECT_EQ(contradicted.give(4).status, PoseStatus::ok) << "that one frame only";
 }
 
-TEST(Estimator, aPairingThatNothingProvesIsUsedAsItIs) {
+TEST(Estimator, assumedPairingIsUsedLikeAVerifiedOne) {
   Standing verified, assumed;
   for (int i = 0; i < 3; ++i) {
     RigFrame frame = verified.frame(i);
@@ -151,7 +151,7 @@ TEST(Estimator, aPairingThatNothingProvesIsUsedAsItIs) {
   }
 }
 
-TEST(Estimator, aFrameThatIsNotNewerIsLostToATimeGapAndChangesNothing) {
+TEST(Estimator, olderFrameIsLostAndChangesNothing) {
   Standing s, undisturbed;
   for (int i = 0; i < 4; ++i) {
     (void)s.give(i);
@@ -170,7 +170,7 @@ TEST(Estimator, aFrameThatIsNotNewerIsLostToATimeGapAndChangesNothing) {
   EXPECT_EQ(a.T_world_left.R, b.T_world_left.R);
 }
 
-TEST(Estimator, aCameraThatGaveNoImageIsSaid) {
+TEST(Estimator, missingImageIsDegradedAndRecovers) {
   for (const std::size_t camera : {0U, 1U}) {
     Standing s;
     for (int i = 0; i < 4; ++i) (void)s.give(i);
@@ -188,7 +188,7 @@ TEST(Estimator, aCameraThatGaveNoImageIsSaid) {
   }
 }
 
-TEST(Estimator, withNoImageAtAllItIsLostAndComesBack) {
+TEST(Estimator, frameWithoutImagesIsLostAndRecovers) {
   Standing s;
   for (int i = 0; i < 4; ++i) (void)s.give(i);
   for (int i = 4; i < 10; ++i) {
@@ -205,7 +205,7 @@ TEST(Estimator, withNoImageAtAllItIsLostAndComesBack) {
   expect_at_start(after);
 }
 
-TEST(Estimator, anImageOfAnotherSizeIsNeverRead) {
+TEST(Estimator, imageOfAnotherSizeIsNotRead) {
   for (const std::size_t camera : {0U, 1U}) {
     Standing s;
     for (int i = 0; i < 4; ++i) (void)s.give(i);
@@ -222,7 +222,7 @@ TEST(Estimator, anImageOfAnotherSizeIsNeverRead) {
   }
 }
 
-TEST(Estimator, whatMakesNoRigIsRefusedWithASentence) {
+TEST(Estimator, invalidRigIsRefused) {
   const auto refused = [](const RigCalibration& r) {
     try {
       (void)Estimator::memory_needed({}, r);
@@ -243,7 +243,7 @@ TEST(Estimator, whatMakesNoRigIsRefusedWithASentence) {
     EXPECT_NE(refused(r), "");
 }
 
-TEST(Estimator, anArenaTooSmallIsRefusedNotOverrun) {
+TEST(Estimator, tooSmallArenaIsRefused) {
   const EstimatorOptions options;
   const RigCalibration calibration = rig();
   SequentialRunner runner;
@@ -253,7 +253,7 @@ TEST(Estimator, anArenaTooSmallIsRefusedNotOverrun) {
                std::length_error);
 }
 
-TEST(Estimator, staysWithinTheMemoryItAskedForAndOffTheHeap) {
+TEST(Estimator, processingUsesTheArenaAndNoHeap) {
   Standing s;
   EXPECT_LE(s.arena.used(), s.arena.capacity());
   const std::uint64_t before = AllocationGuard::runtime_allocations();

@@ -61,7 +61,7 @@ struct StopAndGo {
   }
 };
 
-TEST(LateCamera, thatRepeatedAnImageWhileStandingIsNotBelievedUntilTheRigHasDriven) {
+TEST(LateCamera, repeatWhileStandingIsNotOkOnceMoving) {
   StopAndGo d;
   std::string story;
   int ok_standing = 0, suspected = 0;
@@ -76,7 +76,7 @@ TEST(LateCamera, thatRepeatedAnImageWhileStandingIsNotBelievedUntilTheRigHasDriv
   EXPECT_GT(suspected, 0) << story;
 }
 
-TEST(LateCamera, thatOnlyRepeatedAnImageIsBelievedOnceADozenFramesHaveShownIt) {
+TEST(LateCamera, repeatedImageIsOkAfterTwelveFrames) {
   StopAndGo d;
   std::string story;
   int first_ok = -1, suspected = 0;

@@ -18,7 +18,7 @@ using odometry::test::Corridor;
 /// Camera `frozen` gives its image of frame 30 until frame 46: 0.8 s, 2.4 m.
 class RepeatedImage : public testing::TestWithParam<std::size_t> {};
 
-TEST_P(RepeatedImage, isTakenForNoStandstill) {
+TEST_P(RepeatedImage, repeatedImageIsNotTakenForStandstill) {
   constexpr int kFrozen = 30, kGoesOn = 47, kLast = 60;
   Corridor corridor;
   EstimatorOptions options;
@@ -52,7 +52,7 @@ TEST_P(RepeatedImage, isTakenForNoStandstill) {
       EXPECT_LT(off, 0.025 + 0.01 * truth.t.norm()) << i;
     }
   }
-  // The first new image after 2.4 m that nobody saw may have to be found again in the next one.
+  // The first new image after 2.4 m without images may have to be found again in the next one.
   EXPECT_GE(posed, kLast - 1);
 }
 

@@ -49,11 +49,11 @@ struct Review {
   }
 };
 
-TEST(SolutionReview, theCalibrationInUseIsKeptWhereTheSolveFoundTheSame) {
+TEST(SolutionReview, identicalSolutionIsNoBetter) {
   EXPECT_EQ(Review(Vec3::Zero()).gate(), Gate::no_better);
 }
 
-TEST(SolutionReview, aPitchIsJudgedByEpipolarLines) {
+TEST(SolutionReview, pitchIsAcceptedByEpipolarLines) {
   const Review r({1e-3, 0, 0});  // 0.7 px of every row
   EXPECT_TRUE(r.lines_tell());
   EXPECT_EQ(r.gate(), Gate::open);
@@ -61,7 +61,7 @@ TEST(SolutionReview, aPitchIsJudgedByEpipolarLines) {
 
 // 1 mrad is 2.7 % of the depth at 20 m, which the solve holds to 0.27 %; of epipolar lines it moves
 // those in the image's corners, by less than the matches scatter.
-TEST(SolutionReview, aYawThatNoEpipolarLineShowsIsJudgedByDepth) {
+TEST(SolutionReview, yawIsAcceptedByDepth) {
   for (const double yaw : {1e-3, -1e-3}) {
     const Review r({0, yaw, 0});
     ASSERT_FALSE(r.lines_tell()) << yaw;
@@ -70,7 +70,7 @@ TEST(SolutionReview, aYawThatNoEpipolarLineShowsIsJudgedByDepth) {
 }
 
 // A measurement whose depth does not differ by more than chance leaves the calibration unchanged.
-TEST(SolutionReview, aYawWithinWhatIsToleratedChangesNothing) {
+TEST(SolutionReview, toleratedYawIsNoBetter) {
   for (const double yaw : {1.5e-4, -1.5e-4})
     EXPECT_EQ(Review({0, yaw, 0}).gate(), Gate::no_better) << yaw;
 }

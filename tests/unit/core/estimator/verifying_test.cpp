@@ -80,7 +80,7 @@ struct SuppliedRig {
 
 // Inverse depth is off by Z ψ / b: at the depth where a match of 0.15 px is 1 % (6.6 m) the
 // tolerated 2 % are a yaw of 1.5 mrad. The claims below are none and 15 mrad (20 %) off.
-TEST(Verifying, aTrueCalibrationIsDegradedUntilTheDriveConfirmsIt) {
+TEST(Verifying, trueCalibrationIsDegradedUntilVerified) {
   SuppliedRig c;
   c.drive(60);
   const int confirmed = c.first(Kind::calibration_verified);
@@ -100,7 +100,7 @@ TEST(Verifying, aTrueCalibrationIsDegradedUntilTheDriveConfirmsIt) {
   EXPECT_TRUE(c.estimator->verified());
 }
 
-TEST(Verifying, afterAnOutageTheDriveHasToConfirmItAgainAndSaysSoOnce) {
+TEST(Verifying, outageNeedsOneNewVerification) {
   SuppliedRig c;
   c.dark_from = 50, c.dark_to = 56;
   c.drive(110);
@@ -121,7 +121,7 @@ TEST(Verifying, afterAnOutageTheDriveHasToConfirmItAgainAndSaysSoOnce) {
 
 // The tolerated 2 % of the depth at which the corridor is judged are a yaw of 1.5 mrad: this one is
 // 20 %, and no frame shows it to whom the frames before it are unknown.
-TEST(Verifying, aYawKnockedInAnOutageIsNeverOkWithTheOldCalibration) {
+TEST(Verifying, yawKnockDuringOutageIsNeverOk) {
   SuppliedRig c;
   c.dark_from = 50, c.dark_to = 56;
   c.drive(110, 53, Vec3(0, 0.015, 0));
@@ -164,13 +164,13 @@ void expect_mended_once(double yaw_rad) {
     }
 }
 
-TEST(Verifying, aYawKnockedAfterARigWasLearntIsMendedOnceAndNotDrawnBack) {
+TEST(Verifying, yawKnockIsRecalibratedOnce) {
   expect_mended_once(0.015);
   // A rotation just large enough to be detected at once.
   expect_mended_once(0.004);
 }
 
-TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
+TEST(Verifying, wrongYawIsContradictedAndReplaced) {
   SuppliedRig c;
   const Transform truth = c.given.T_camera_left[1];
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * truth.R;
@@ -179,15 +179,18 @@ TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
             accepted = c.first(Kind::calibration_accepted);
   ASSERT_GE(contradicted, 0) << c.story;
   ASSERT_GE(accepted, contradicted) << c.story;
-  bool any_ok = false;
+  const int verified = c.first(Kind::calibration_verified);
+  ASSERT_EQ(verified, accepted + 1) << c.story;
   for (const PoseSample& s : c.samples) {
     EXPECT_NE(s.status, PoseStatus::lost) << s.frame << '\n' << c.story;
-    EXPECT_FALSE(s.status == PoseStatus::ok && static_cast<int>(s.frame) < accepted)
-        << s.frame << '\n'
-        << c.story;
-    any_ok = any_ok || s.status == PoseStatus::ok;
+    // The poses of the frame of the adoption and of the next still are those of the contradicted
+    // rig. The first pose after them has what a fifth of all depths left in the window to correct.
+    if (static_cast<int>(s.frame) <= verified) {
+      EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
+    } else if (static_cast<int>(s.frame) > verified + 1) {
+      EXPECT_EQ(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
+    }
   }
-  EXPECT_TRUE(any_ok) << c.story;
   // Where it is judged (6.6 m) 15 mrad are 20 % of the inverse depth, known to a tenth: 2 % is what
   // the drive's own may be off.
   const auto first = std::find_if(c.decisions.begin(), c.decisions.end(),
@@ -206,29 +209,9 @@ TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
   EXPECT_NEAR(yaw + (lens.cx - true_lens.cx) / true_lens.fx, 0, 3e-3) << c.story;
 }
 
-// The pose of the frame in which it is adopted, and of the next, still are those of the rig that
-// was contradicted: 20 % off.
-TEST(Verifying, posesOfAContradictedCalibrationAreNotOk) {
-  SuppliedRig c;
-  c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * c.given.T_camera_left[1].R;
-  c.drive(60);
-  const int accepted = c.first(Kind::calibration_accepted),
-            confirmed = c.first(Kind::calibration_verified);
-  ASSERT_GE(accepted, 0) << c.story;
-  ASSERT_EQ(confirmed, accepted + 1) << c.story;
-  for (const PoseSample& s : c.samples) {
-    // The first pose after it has what a fifth of all depths has left in the window to take back.
-    if (static_cast<int>(s.frame) <= confirmed) {
-      EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
-    } else if (static_cast<int>(s.frame) > confirmed + 1) {
-      EXPECT_EQ(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
-    }
-  }
-}
-
 // While the calibration is a claim, epipolar lines cannot say whether a yaw is new; disparities
 // that move all at once can. 10 mrad are 2.8 px here.
-TEST(Verifying, aYawKnockedBeforeTheClaimIsConfirmedIsSeenAtOnce) {
+TEST(Verifying, yawKnockBeforeVerificationIsDetected) {
   constexpr int kKnock = 22;  // after the first snapshot, before it is decided
   SuppliedRig c;
   c.drive(45, kKnock, {0, 0.01, 0});
@@ -242,7 +225,7 @@ TEST(Verifying, aYawKnockedBeforeTheClaimIsConfirmedIsSeenAtOnce) {
 // For five frames after a calibration was adopted the monitor tells no knock; a pose is not `ok`
 // from the knock's first frame on all the same. 5 mrad of pitch are 1.4 px across the epipolar
 // lines.
-TEST(Verifying, aPitchKnockedRightAfterACalibrationWasAdoptedIsNeverOk) {
+TEST(Verifying, pitchKnockAfterAdoptionIsNeverOk) {
   constexpr int kVerified = 26, kKnock = kVerified + 3;
   const Transform truth = Corridor().rig().T_camera_left[1];
   SuppliedRig c;
@@ -255,21 +238,6 @@ TEST(Verifying, aPitchKnockedRightAfterACalibrationWasAdoptedIsNeverOk) {
               static_cast<int>(s.frame) > kVerified + 1 && static_cast<int>(s.frame) < kKnock)
         << s.frame << '\n'
         << c.story;
-}
-
-TEST(Verifying, offlineAClaimStandsAndIsNotCalledUnverified) {
-  for (const double yaw : {0.0, 0.015}) {
-    SuppliedRig c;
-    c.options.online = false;
-    c.given.T_camera_left[1].R = exp_so3({0, yaw, 0}) * c.given.T_camera_left[1].R;
-    c.drive(40);
-    for (const PoseSample& s : c.samples)
-      EXPECT_NE(s.reason, Reason::unverified_calibration) << s.frame;
-    EXPECT_EQ(c.first(Kind::calibration_verified), -1) << c.story;
-    EXPECT_EQ(c.first(Kind::calibration_contradicted), -1) << c.story;
-    EXPECT_TRUE(c.decisions.empty());
-    EXPECT_EQ(c.estimator->calibration().T_camera_left[1].R, c.given.T_camera_left[1].R);
-  }
 }
 
 }  // namespace

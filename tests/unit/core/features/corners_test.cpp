@@ -49,7 +49,7 @@ std::pair<int, int> cell_of(const Corner& c, int cell) {
   return {static_cast<int>(c.x) / cell, static_cast<int>(c.y) / cell};
 }
 
-TEST(Corners, scoresAreOpenCvsLeastEigenvaluesOnEveryTarget) {
+TEST(Corners, scoresMatchOpenCvOnEveryTarget) {
   // 49 products of up to 127² are summed in floats, seven by seven: relative error below 14 · 2⁻²⁴
   // of the trace, which is at most 2 · 127².
   constexpr float kRounding = 14.F * 6e-8F * 2.F * 127.F * 127.F;
@@ -70,7 +70,7 @@ TEST(Corners, scoresAreOpenCvsLeastEigenvaluesOnEveryTarget) {
   }
 }
 
-TEST(Corners, eachIsTheStrongestOfItsCellAndAPeak) {
+TEST(Corners, cornerIsTheStrongestPeakOfItsCell) {
   const Image image = textured();
   const cv::Mat scores = reference_scores(image);
   CornerOptions options;
@@ -101,7 +101,7 @@ TEST(Corners, eachIsTheStrongestOfItsCellAndAPeak) {
   }
 }
 
-TEST(Corners, oneACellStrongestFirstApartAndInsideTheBorder) {
+TEST(Corners, cornersAreSortedApartAndInsideTheBorder) {
   const Image image = white_noise(kWidth, kHeight, 2);
   CornerOptions options;
   options.cell = 24;
@@ -125,7 +125,7 @@ TEST(Corners, oneACellStrongestFirstApartAndInsideTheBorder) {
   }
 }
 
-TEST(Corners, cellsThatHoldATakenOneAreLeftAloneAndOthersKeepTheirDistance) {
+TEST(Corners, occupiedCellsGetNoCorner) {
   const Image image = textured();
   CornerOptions options;
   const Found all(image.view(), options);
@@ -146,14 +146,14 @@ TEST(Corners, cellsThatHoldATakenOneAreLeftAloneAndOthersKeepTheirDistance) {
   EXPECT_EQ(still_there, all.corners.size() / 2);
 }
 
-TEST(Corners, withLittleRoomTheWeakestAreDropped) {
+TEST(Corners, limitedCapacityDropsTheWeakest) {
   const Image image = textured();
   const Found all(image.view(), {}), few(image.view(), {}, {}, 7);
   ASSERT_EQ(few.corners.size(), 7U);
   for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(few.corners[i].score, all.corners[i].score);
 }
 
-TEST(Corners, thereAreNoneOnFlatGroundOrAnEdge) {
+TEST(Corners, flatImageOrEdgeHasNoCorner) {
   EXPECT_EQ(
       Found(draw(kWidth, kHeight, [](const Vec2&) { return 90.0; }).view(), {}).corners.size(), 0U);
   const Image edge = draw(kWidth, kHeight, [](const Vec2& p) {
@@ -163,7 +163,7 @@ TEST(Corners, thereAreNoneOnFlatGroundOrAnEdge) {
   EXPECT_EQ(Found(edge.view(), {}).corners.size(), 0U);
 }
 
-TEST(Corners, readNoByteOutsideTheImage) {
+TEST(Corners, noByteOutsideTheImageIsRead) {
   for (const auto guard : {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind})
     for (const int border : {0, 5, 16}) {
       const test::GuardedImage image(white_noise(131, 99, 3), guard);
@@ -174,7 +174,7 @@ TEST(Corners, readNoByteOutsideTheImage) {
     }
 }
 
-TEST(Corners, anImageTooSmallOrEmptyHasNone) {
+TEST(Corners, tooSmallOrEmptyImageHasNoCorner) {
   EXPECT_EQ(Found(white_noise(20, 20, 1).view(), {}).corners.size(), 0U);
   EXPECT_EQ(Found(ImageView{}, {}).corners.size(), 0U);
 }

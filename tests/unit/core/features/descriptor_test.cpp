@@ -36,7 +36,7 @@ TEST(Descriptor, distanceCountsBits) {
   EXPECT_EQ(distance(a, {}), 256);
 }
 
-TEST(Descriptor, thePlaceSeenAgainIsNearerThanAnyOther) {
+TEST(Descriptor, changedViewIsNearerThanAnyOtherPlace) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const Texture texture(seed);
     const Descriptor here = of(texture);

@@ -10,6 +10,7 @@
 namespace vergence::features {
 namespace {
 
+using test::Built;
 using test::draw;
 using test::Image;
 using test::Texture;
@@ -28,16 +29,6 @@ Intrinsics lens(bool distorted) {
   if (distorted) k.distortion = {-0.28, 0.07, 0.0004, -0.0003, 0};
   return k;
 }
-
-struct Built {
-  Arena arena;
-  Pyramid pyramid;
-  explicit Built(const ImageView& image)
-      : arena(Pyramid::memory_needed(image.width, image.height, 3)),
-        pyramid(image.width, image.height, 3, arena) {
-    pyramid.build(image);
-  }
-};
 
 /// Two cameras before a wall at depth `depth` (m, in left), painted with a function of the ideal
 /// left pixel.
@@ -94,7 +85,7 @@ EpipolarSearchOptions to_two_metres() {
   return o;
 }
 
-TEST(EpipolarSearch, findsTheDepthToAPixelOfItsLevel) {
+TEST(EpipolarSearch, depthIsFoundToAPixelOfItsLevel) {
   for (const bool distorted : {false, true})
     for (const Transform& T : {beside(), turned()})
       for (const double depth : {4.0, 11.0, 60.0}) {
@@ -118,7 +109,7 @@ TEST(EpipolarSearch, findsTheDepthToAPixelOfItsLevel) {
       }
 }
 
-TEST(EpipolarSearch, aLongCurveIsSearchedWithoutPassingMatchesBy) {
+TEST(EpipolarSearch, longCurveIsSearchedCompletely) {
   // From infinity to 1/6 m the curve is 1200 px long, 600 of level 1.
   const Wall wall(Texture(7, 8, 20), 20.0, false, beside());
   EpipolarSearchOptions usual, near;
@@ -138,7 +129,7 @@ TEST(EpipolarSearch, aLongCurveIsSearchedWithoutPassingMatchesBy) {
   EXPECT_GT(found, 9 * found_usual / 10);
 }
 
-TEST(EpipolarSearch, aPatternThatRepeatsIsAmbiguous) {
+TEST(EpipolarSearch, repeatedPatternIsAmbiguous) {
   const auto fence = [](const Vec2& p) {
     return 128 + 60 * std::cos(p.x() * 2 * std::numbers::pi / 24) *
                      std::cos(p.y() * 2 * std::numbers::pi / 40);
@@ -148,7 +139,7 @@ TEST(EpipolarSearch, aPatternThatRepeatsIsAmbiguous) {
     EXPECT_EQ(wall.search(pixel, to_two_metres()).status, SearchStatus::ambiguous);
 }
 
-TEST(EpipolarSearch, whatTheOtherCameraDoesNotSeeIsUncorrelated) {
+TEST(EpipolarSearch, patchUnseenByTheOtherCameraIsUncorrelated) {
   const Wall wall(Texture(3), 8.0, false, beside(), Texture(77));
   int refused = 0;
   for (int i = 0; i < 30; ++i) {
@@ -162,14 +153,14 @@ TEST(EpipolarSearch, whatTheOtherCameraDoesNotSeeIsUncorrelated) {
   EXPECT_EQ(refused, 30);
 }
 
-TEST(EpipolarSearch, aCurveOutsideTheImageIsOffImage) {
+TEST(EpipolarSearch, curveOutsideTheImageIsOffImage) {
   const Wall wall(Texture(3), 8.0, false, {exp_so3(Vec3(1.2, 0, 0)), Vec3(-0.5, 0, 0)});
   EXPECT_EQ(wall.search({240, 160}, to_two_metres()).status, SearchStatus::off_image);
   const Wall behind(Texture(3), 8.0, false, {exp_so3(Vec3(0, 3.1, 0)), Vec3(-0.5, 0, 0)});
   EXPECT_EQ(behind.search({240, 160}, to_two_metres()).status, SearchStatus::off_image);
 }
 
-TEST(EpipolarSearch, atTheBorderNoByteOutsideTheImageIsRead) {
+TEST(EpipolarSearch, noByteOutsideTheImageIsRead) {
   const Wall wall(Texture(3), 20.0, false, beside());
   for (const auto guard : {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind}) {
     const test::GuardedImage guarded(wall.right_image, guard);
@@ -193,7 +184,7 @@ TEST(EpipolarSearch, atTheBorderNoByteOutsideTheImageIsRead) {
   }
 }
 
-TEST(InverseDepth, isFittedToItsPixelAndTheDistanceLeftIsTheOneAcross) {
+TEST(InverseDepth, fitGivesInverseDepthAndDistanceAcross) {
   for (const bool distorted : {false, true})
     for (const Transform& T : {beside(), turned()}) {
       const Camera right(lens(distorted)), left(lens(distorted));
@@ -220,7 +211,7 @@ TEST(InverseDepth, isFittedToItsPixelAndTheDistanceLeftIsTheOneAcross) {
     }
 }
 
-TEST(InverseDepth, withoutABaselineOrInFrontOfTheLensThereIsNone) {
+TEST(InverseDepth, missingBaselineOrPointBehindHasNoDepth) {
   const Camera camera(lens(false));
   double rho = 0.1, sigma = 0;
   const EpipolarCurve no_baseline{&camera, Transform{}, Vec3(0, 0, 1)};

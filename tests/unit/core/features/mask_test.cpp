@@ -37,7 +37,7 @@ Image half_hidden(int from_x) {
   return image;
 }
 
-TEST(Mask, hidesWhatIsZeroAndItsMarginAndNothingElse) {
+TEST(Mask, zeroPixelsAndTheirMarginAreHidden) {
   const Image image = spotted();
   for (const int margin : {0, 1, 7}) {
     Arena arena(Mask::memory_needed(kWidth, kHeight));
@@ -56,7 +56,7 @@ TEST(Mask, hidesWhatIsZeroAndItsMarginAndNothingElse) {
   }
 }
 
-TEST(Mask, withoutAnImageAndOutsideOfItHidesNothing) {
+TEST(Mask, emptyMaskAndOutsideHideNothing) {
   Arena arena(Mask::memory_needed(kWidth, kHeight));
   EXPECT_FALSE(Mask().hides(3, 3));
   EXPECT_TRUE(Mask(ImageView{}, 7, arena).empty());
@@ -69,7 +69,7 @@ TEST(Mask, withoutAnImageAndOutsideOfItHidesNothing) {
   EXPECT_FALSE(mask.hides(Vec2(1e300, 3)));
 }
 
-TEST(Mask, keepsCornersAwayAndLeavesTheOthersAsTheyAre) {
+TEST(Mask, maskRemovesOnlyItsOwnCorners) {
   const Image image = draw(kWidth, kHeight, Texture(5));
   const Image shown = half_hidden(kWidth / 2);
   Arena arena(Mask::memory_needed(kWidth, kHeight));
@@ -103,7 +103,7 @@ TEST(Mask, keepsCornersAwayAndLeavesTheOthersAsTheyAre) {
   EXPECT_GT(compared, 10U);
 }
 
-TEST(Mask, keepsBlobsAwayAndDoesNotLetThemTakeRoom) {
+TEST(Mask, maskedBlobsTakeNoCapacity) {
   const Image image = draw(kWidth, kHeight, Texture(5));
   const Image shown = half_hidden(kWidth / 2);
   Arena arena(Mask::memory_needed(kWidth, kHeight) + Surf::memory_needed(kWidth, kHeight) +

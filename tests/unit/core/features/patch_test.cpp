@@ -12,6 +12,7 @@
 namespace vergence::features {
 namespace {
 
+using test::Built;
 using test::draw;
 using test::Image;
 using test::Texture;
@@ -21,16 +22,6 @@ constexpr int kWidth = 180, kHeight = 160;
 // (grey levels / px)², which makes 0.01 px of that; bilinear interpolation of waves down to 8 px
 // adds as much, and steps end below 0.01 px.
 constexpr double kSubPixel = 0.02;
-
-struct Built {
-  Arena arena;
-  Pyramid pyramid;
-  explicit Built(const ImageView& image, int levels = 3)
-      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
-        pyramid(image.width, image.height, levels, arena) {
-    pyramid.build(image);
-  }
-};
 
 /// A texture and its patch cut at a pixel.
 struct Scene {
@@ -54,7 +45,7 @@ AlignResult align_in(const Image& image, const Patch& patch, const Vec2& predict
   return align(patch, b.pyramid, predicted, A, options);
 }
 
-TEST(Patch, knownShiftsAreFoundToAFiftiethOfAPixelOnEveryTarget) {
+TEST(Patch, shiftIsFoundToAFiftiethOfAPixel) {
   constexpr int kCases = 60;
   Random random(11);
   std::array<double, 8> square{};
@@ -78,7 +69,7 @@ TEST(Patch, knownShiftsAreFoundToAFiftiethOfAPixelOnEveryTarget) {
   for (const double sum : square) EXPECT_LT(std::sqrt(sum / kCases), kSubPixel);
 }
 
-TEST(Patch, aPatchCutBetweenPixelsKeepsItsAnchorOnEveryLevel) {
+TEST(Patch, subpixelAnchorIsKeptOnEveryLevel) {
   for (const Vec2& at : {Vec2(90.3, 79.8), Vec2(89.5, 80.5), Vec2(91, 83), Vec2(92.75, 81.25)}) {
     const Scene s(3, at);
     for (int level = 0; level < s.patch.levels; ++level) {
@@ -91,7 +82,7 @@ TEST(Patch, aPatchCutBetweenPixelsKeepsItsAnchorOnEveryLevel) {
   }
 }
 
-TEST(Patch, turnedAndScaledPatchesAreFoundWithTheirShape) {
+TEST(Patch, rotatedAndScaledPatchIsFound) {
   Random random(5);
   double square = 0;
   int cases = 0;
@@ -121,9 +112,9 @@ TEST(Patch, turnedAndScaledPatchesAreFoundWithTheirShape) {
   EXPECT_LT(std::sqrt(square / cases), 1.5 * kSubPixel);
 }
 
-TEST(Patch, itsSigmaIsWhatNoiseDoes) {
+TEST(Patch, sigmaMatchesTheErrorDueToNoise) {
   // One grey level of noise in the image (with the rounding 1.04), a clean patch: along the worst
-  // direction the error's sigma is the one told, along the other it is less, so the whole lies
+  // direction the error's sigma is the stated one, along the other it is less, so the whole lies
   // between one and √2 of it. 200 cases know it to 5 %; kSettled and interpolation add 0.02 px.
   double square = 0, predicted = 0;
   constexpr int kCases = 200;
@@ -145,7 +136,7 @@ TEST(Patch, itsSigmaIsWhatNoiseDoes) {
   EXPECT_LT(ratio, 1.1 * std::numbers::sqrt2);
 }
 
-TEST(Patch, whereTheImageEndsItSaysOutside) {
+TEST(Patch, positionOutsideTheImageIsOutside) {
   const Scene s(1);
   for (const Vec2& at : {Vec2(3, 80), Vec2(kWidth - 3, 80), Vec2(90, 2), Vec2(90, kHeight - 2),
                          Vec2(-50, -50), Vec2(1e6, 5), Vec2(NAN, 5)})
@@ -153,7 +144,7 @@ TEST(Patch, whereTheImageEndsItSaysOutside) {
               AlignStatus::outside);
 }
 
-TEST(Patch, withoutStructureInBothDirectionsItIsFlat) {
+TEST(Patch, patchWithoutTwoDimensionalTextureIsFlat) {
   const Image plain = draw(kWidth, kHeight, [](const Vec2&) { return 100.0; });
   const Image stripes =
       draw(kWidth, kHeight, [](const Vec2& p) { return 128 + 60 * std::sin(p.x() / 3); });
@@ -165,7 +156,7 @@ TEST(Patch, withoutStructureInBothDirectionsItIsFlat) {
   }
 }
 
-TEST(Patch, furtherThanAllowedItDiverges) {
+TEST(Patch, shiftBeyondTheLimitDiverges) {
   const Scene s(2);
   const Image moved =
       draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(p - Vec2(5, 0)); });
@@ -178,7 +169,7 @@ TEST(Patch, furtherThanAllowedItDiverges) {
             AlignStatus::diverged);
 }
 
-TEST(Patch, somethingElseIsNeverTakenForIt) {
+TEST(Patch, otherTextureOrNegativeIsNotMatched) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     // Waves of 4 to 9 px fill a window with some thirty independent values: a correlation of 0.8 by
     // chance would be four sigmas and more.
@@ -198,7 +189,7 @@ TEST(Patch, somethingElseIsNeverTakenForIt) {
             AlignStatus::ok);
 }
 
-TEST(Patch, isCutOnTheLevelsThatHoldItAndOnNoneOutside) {
+TEST(Patch, patchIsCutOnLevelsThatContainIt) {
   const Scene s(1);
   Patch patch{};
   EXPECT_TRUE(cut_patch(s.built.pyramid, {90, 80}, &patch));
@@ -210,7 +201,7 @@ TEST(Patch, isCutOnTheLevelsThatHoldItAndOnNoneOutside) {
   EXPECT_EQ(patch.levels, 0);
 }
 
-TEST(Patch, atTheBorderNoByteOutsideTheImageIsRead) {
+TEST(Patch, noByteOutsideTheImageIsRead) {
   const Texture texture(6);
   constexpr int kSide = 101;
   const Image image = draw(kSide, kSide, texture);

@@ -9,19 +9,9 @@
 namespace vergence::features {
 namespace {
 
+using test::Built;
 using test::Image;
 using test::white_noise;
-
-/// Arena and pyramid of it, built from an image.
-struct Built {
-  Arena arena;
-  Pyramid pyramid;
-  Built(const ImageView& image, int levels)
-      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
-        pyramid(image.width, image.height, levels, arena) {
-    pyramid.build(image);
-  }
-};
 
 int different_pixels(const ImageView& a, const ImageView& b) {
   if (a.width != b.width || a.height != b.height) return -1;
@@ -38,7 +28,7 @@ struct Size {
 constexpr std::array kSizes{Size{752, 480}, Size{753, 481}, Size{64, 64},   Size{65, 63},
                             Size{127, 97},  Size{129, 66},  Size{191, 200}, Size{1226, 370}};
 
-TEST(Pyramid, isOpenCvsPyrDownOnEveryTarget) {
+TEST(Pyramid, levelsMatchOpenCvOnEveryTarget) {
   for (const Size s : kSizes) {
     const Image image = white_noise(s.width, s.height, 8);
     test::on_every_target([&](const char* target) {
@@ -58,7 +48,7 @@ TEST(Pyramid, isOpenCvsPyrDownOnEveryTarget) {
   }
 }
 
-TEST(Pyramid, readsNoByteOutsideTheImage) {
+TEST(Pyramid, noByteOutsideTheImageIsRead) {
   for (const Size s : {Size{101, 75}, Size{64, 64}, Size{97, 66}})
     for (const auto guard :
          {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind}) {
@@ -71,7 +61,7 @@ TEST(Pyramid, readsNoByteOutsideTheImage) {
     }
 }
 
-TEST(Pyramid, levelZeroIsTheCallersImageAndSmallImagesHaveFewerLevels) {
+TEST(Pyramid, smallImageHasFewerLevels) {
   const Image image = white_noise(70, 200, 1);
   const Built b(image.view(), 6);
   EXPECT_EQ(b.pyramid.level(0).data, image.bytes.data());
@@ -79,7 +69,7 @@ TEST(Pyramid, levelZeroIsTheCallersImageAndSmallImagesHaveFewerLevels) {
   EXPECT_EQ(b.pyramid.level(1).width, 35);
 }
 
-TEST(Pyramid, takesFromTheArenaWhatItSaidAndNothingFromTheHeap) {
+TEST(Pyramid, buildUsesTheArenaAndNoHeap) {
   const Image image = white_noise(640, 480, 1);
   Arena arena(Pyramid::memory_needed(640, 480, 4));
   Pyramid pyramid(640, 480, 4, arena);

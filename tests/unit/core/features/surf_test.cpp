@@ -72,7 +72,7 @@ double distance(const SurfDescriptor& a, const SurfDescriptor& b) {
 /// 12 … 24, 21 … 45, 39 … 87 px can be a maximum.
 double places_apart(double sigma) { return 5.2 * sigma < 21 ? 1 : 5.2 * sigma < 42 ? 2 : 4; }
 
-TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {
+TEST(SurfHessian, hessianIsTheSumOverItsBoxes) {
   const Image image = test::white_noise(70, 60, 3, 5, 255);
   Arena arena(detail::IntegralImage::memory_needed(70, 60));
   detail::IntegralImage sums(70, 60, arena);
@@ -116,7 +116,7 @@ TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {
 // 0.048 h³/w² (from its series, h δ (δ² − 1/4) h²/w², δ h the top's place between the samples);
 // boxes make a coarser top than the Gaussian's derivatives: twice that. Rounded grey values: 0.02
 // px.
-TEST(Surf, findsABlobAtItsSubPixelPlace) {
+TEST(Surf, blobIsFoundAtItsSubpixelPosition) {
   Random random(5);
   for (const double sigma : {2.5, 3.0, 3.6, 5.5, 6.5, 7.5, 10.0, 13.0}) {
     for (int i = 0; i < 8; ++i) {
@@ -176,7 +176,7 @@ Moved match_moved(const Vec2& shift, double degrees, double larger, bool upright
   return m;
 }
 
-TEST(SurfMatcher, findsThePartnersInAShiftedTurnedAndEnlargedPicture) {
+TEST(SurfMatcher, shiftedRotatedAndScaledImageIsMatched) {
   const Moved shifted = match_moved({7.3, -4.6}, 0, 1, true);
   EXPECT_GE(shifted.matches, 100);
   EXPECT_GE(shifted.right, 0.97 * shifted.matches);
@@ -209,7 +209,7 @@ class Matching : public ::testing::Test {
   BoundedVector<SurfMatch> out{arena.make<SurfMatch>(8, "matches")};
 };
 
-TEST_F(Matching, wantsTheBestOfBothOfOneSignAndClearlySo) {
+TEST_F(Matching, matchIsMutualUniqueAndOfOneSign) {
   Set left, right;
   left.add(0, 0, false, 0.00);   // nearest: right 0, which prefers left 1
   left.add(1, 0, false, 0.05);   // mutual with right 0
@@ -230,7 +230,7 @@ TEST_F(Matching, wantsTheBestOfBothOfOneSignAndClearlySo) {
   EXPECT_EQ(out[1].right, 2U);
 }
 
-TEST_F(Matching, looksInTheBandOnly) {
+TEST_F(Matching, matchLiesInTheEpipolarBand) {
   Set left, right;
   left.add(50, 20, false, 0);
   right.add(10, 40, false, 0);  // looks the same, 20 px beside the line
@@ -246,7 +246,7 @@ TEST_F(Matching, looksInTheBandOnly) {
   EXPECT_TRUE(out.empty());
 }
 
-TEST_F(Matching, badInputIsNamedAndMatchesNothing) {
+TEST_F(Matching, invalidInputGivesStatusAndNoMatch) {
   Set left, right;
   for (int i = 0; i < 9; ++i) left.add(0, 0, false, i);
   right.add(0, 0, false, 0);
@@ -269,7 +269,7 @@ TEST_F(Matching, badInputIsNamedAndMatchesNothing) {
   EXPECT_TRUE(out.empty());
 }
 
-TEST(Surf, smallFlatAndWrongImagesGiveNoPoints) {
+TEST(Surf, smallFlatOrInvalidImageHasNoPoint) {
   Arena arena(Surf::memory_needed(100, 80) + 50 * sizeof(SurfPoint) + kCacheLine);
   Surf surf(100, 80, arena);
   BoundedVector<SurfPoint> points(arena.make<SurfPoint>(50, "points"));
@@ -279,7 +279,7 @@ TEST(Surf, smallFlatAndWrongImagesGiveNoPoints) {
     const Image noise = test::white_noise(w, h, 1);
     EXPECT_EQ(surf.set_image(noise.view()), SurfStatus::ok);
     EXPECT_EQ(surf.detect({}, &points), 0) << w << " x " << h;
-    // A point that lies outside has nothing about it.
+    // A point outside the image has a descriptor of zeros.
     constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
     for (SurfPoint outside :
          {SurfPoint{1e6F, -1e6F, 3, 0, 1, false}, SurfPoint{kNaN, 1e30F, 3, 0, 1, false},
@@ -306,7 +306,7 @@ TEST(Surf, smallFlatAndWrongImagesGiveNoPoints) {
   EXPECT_EQ(surf.set_image({large.bytes.data(), 50, -50, 50}), SurfStatus::invalid_image);
 }
 
-TEST(Surf, nothingBesideThePictureIsReadAndPaddingIsNoPicture) {
+TEST(Surf, noByteOutsideTheImageIsRead) {
   for (const auto guard : {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind}) {
     const test::GuardedImage guarded(test::white_noise(131, 117, 9), guard);
     const Image padded = test::white_noise(131, 117, 9, 13, 200);
@@ -324,7 +324,7 @@ TEST(Surf, nothingBesideThePictureIsReadAndPaddingIsNoPicture) {
   }
 }
 
-TEST(Surf, takesTheMemoryItSaysAndNoneAfterwards) {
+TEST(Surf, detectionUsesTheArenaAndNoHeap) {
   const Image image = draw(240, 180, Texture(2));
   constexpr std::size_t kRoom = 200;
   Arena arena(Surf::memory_needed(240, 180) + SurfMatcher::memory_needed(kRoom) +

@@ -41,7 +41,7 @@ TEST(FeatureTargets, correlationsAreEqualOnEveryTarget) {
 
 /// Where a product and a sum are one instruction everywhere in a window, its bits do not depend on
 /// the target, nor on the machine: those of AVX2, AVX3 and NEON.
-TEST(FeatureTargets, windowsHaveTheSameBitsWhereProductsAreFused) {
+TEST(FeatureTargets, windowsAreBitIdenticalWithFusedProducts) {
   const test::Image patch = test::white_noise(kPatchSide, kPatchSide + 4, 11);
   const test::Image image = test::white_noise(64, 64, 13, 64);
   const float turned[4] = {0.96F, -0.2F, 0.21F, 1.03F};
@@ -63,7 +63,7 @@ TEST(FeatureTargets, windowsHaveTheSameBitsWhereProductsAreFused) {
       bits.add(x);
     EXPECT_EQ(bits.value(), 0xad232a4b8e8150c5U) << target << std::hex << ": 0x" << bits.value();
   });
-  if (fused == 0) GTEST_SKIP() << "this machine has none of them";
+  if (fused == 0) GTEST_SKIP() << "needs a processor with AVX2 or NEON";
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/features/pyramid.hpp"
 #include "core/math/random.hpp"
 #include "core/math/types.hpp"
 #include "core/types/image.hpp"
@@ -117,6 +118,17 @@ class GuardedImage {
   std::size_t length_ = 0;
   std::uint8_t* memory_ = nullptr;
   std::uint8_t* data_ = nullptr;
+};
+
+/// A pyramid of an image, with the arena it lies in.
+struct Built {
+  Arena arena;
+  Pyramid pyramid;
+  explicit Built(const ImageView& image, int levels = 3)
+      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
+        pyramid(image.width, image.height, levels, arena) {
+    pyramid.build(image);
+  }
 };
 
 using vergence::test::on_every_target;

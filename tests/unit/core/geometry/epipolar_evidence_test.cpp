@@ -24,21 +24,21 @@ std::vector<float> distances(int fitting, int chance, double width_px) {
 
 EpipolarEvidence weigh(std::vector<float> d) { return weigh_epipolar_distances(d, kBand, kNoise); }
 
-TEST(EpipolarEvidence, ThirtyTrueMatchesFit) {
+TEST(EpipolarEvidence, thirtyTrueMatchesFit) {
   const EpipolarEvidence e = weigh(distances(30, 0, kNoise));
   EXPECT_TRUE(e.fits()) << e.log_likelihood_ratio;
   // The median of thirty is known to a sixth of a sigma.
   EXPECT_NEAR(e.width_px, kNoise, 0.5 * kNoise);
 }
 
-TEST(EpipolarEvidence, ChanceNeverFitsHoweverMuchOfItThereIs) {
+TEST(EpipolarEvidence, chanceMatchesNeverFit) {
   for (const int n : {0, 1, 10, 100, 1000}) EXPECT_FALSE(weigh(distances(0, n, 1)).fits()) << n;
   // More of it speaks more against.
   EXPECT_LT(weigh(distances(0, 1000, 1)).log_likelihood_ratio,
             weigh(distances(0, 100, 1)).log_likelihood_ratio);
 }
 
-TEST(EpipolarEvidence, WhatIsWiderThanNoiseNeedsMoreMatches) {
+TEST(EpipolarEvidence, widerResidualsNeedMoreMatches) {
   EXPECT_FALSE(weigh(distances(20, 0, 3 * kNoise)).fits());
   EXPECT_TRUE(weigh(distances(200, 0, 3 * kNoise)).fits());
 }

@@ -65,7 +65,7 @@ TEST(Epipolar, derivativesMatchCentralDifferences) {
   }
 }
 
-TEST(Epipolar, movingKeepsTheLengthAndTheBasisIsOrthonormal) {
+TEST(Epipolar, movedTransformKeepsLengthAndOrthonormalBasis) {
   Random random(43);
   for (int k = 0; k < 100; ++k) {
     const Transform T = random_stereo(random);
@@ -80,7 +80,7 @@ TEST(Epipolar, movingKeepsTheLengthAndTheBasisIsOrthonormal) {
   }
 }
 
-TEST(Epipolar, saysWhereNothingIsMeasured) {
+TEST(Epipolar, degenerateInputReturnsFalse) {
   double value = 7;
   EXPECT_FALSE(EpipolarGeometry(Transform{}).sampson({0, 0}, {0, 0}, &value, nullptr));
   const EpipolarGeometry forward(Transform{Mat3::Identity(), {0, 0, -1}});

@@ -40,7 +40,7 @@ double nearest(const FivePointSolutions& s, const Mat3& E) {
   return best;
 }
 
-TEST(FivePoint, findsTheTrueMatrixOfRandomMatches) {
+TEST(FivePoint, randomMatchesGiveTheTrueMatrix) {
   Random random(51);
   constexpr int kProblems = 3000;
   std::vector<double> errors;
@@ -59,7 +59,7 @@ TEST(FivePoint, findsTheTrueMatrixOfRandomMatches) {
                          // lies between: one in thousands
 }
 
-TEST(FivePoint, everySolutionIsEssentialAndFitsTheFiveMatches) {
+TEST(FivePoint, everySolutionIsEssentialAndFitsTheMatches) {
   Random random(52);
   for (int k = 0; k < 500; ++k) {
     const Matches m = random_matches(random);
@@ -75,7 +75,7 @@ TEST(FivePoint, everySolutionIsEssentialAndFitsTheFiveMatches) {
   }
 }
 
-TEST(FivePoint, decompositionFindsTheTransform) {
+TEST(FivePoint, decompositionGivesTheTransform) {
   Random random(54);
   for (int k = 0; k < 1000; ++k) {
     const Matches m = random_matches(random);
@@ -88,7 +88,7 @@ TEST(FivePoint, decompositionFindsTheTransform) {
   }
 }
 
-TEST(FivePoint, hasNoMatrixForDegenerateInput) {
+TEST(FivePoint, degenerateInputHasNoSolution) {
   Random random(55);
   Matches m = random_matches(random);
   m.left[4] = m.left[0];
@@ -108,7 +108,7 @@ TEST(FivePoint, hasNoMatrixForDegenerateInput) {
   EXPECT_EQ(T.R, Mat3::Identity());
 }
 
-TEST(FivePoint, nothingIsNotANumberAndNothingAllocates) {
+TEST(FivePoint, extremeInputIsFiniteWithoutAllocations) {
   Random random(56);
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   for (int k = 0; k < 2000; ++k) {

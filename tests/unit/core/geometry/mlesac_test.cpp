@@ -31,9 +31,9 @@ double share_flagged_right(const RigScene& scene, const RigObservations& o,
   return static_cast<double>(right) / static_cast<double>(o.size());
 }
 
-TEST_F(RigMlesacTest, findsThePoseAmongHalfOutliersAndFlagsThem) {
+TEST_F(RigMlesacTest, poseAmongHalfOutliersIsFoundAndFlagged) {
   // T² = 9.21 alone calls 1 % of good pixels wrong, 2 % of points seen twice; three-point poses
-  // carry noise of their own, so sigma is told three times as large as it is.
+  // carry noise of their own, so the stated sigma is three times the true one.
   int poses = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Random random(seed);
@@ -53,7 +53,7 @@ TEST_F(RigMlesacTest, findsThePoseAmongHalfOutliersAndFlagsThem) {
   EXPECT_GE(poses, 48);
 }
 
-TEST_F(RigMlesacTest, drawsFromACameraThatAloneSeesThePoints) {
+TEST_F(RigMlesacTest, pointsSeenByOneCameraGiveThePose) {
   Random random(8);
   const RigScene scene = make_scene(random, 2, 60, 0.0, 0.0, 0.0, 0.3, &table_);
   RigObservations o = table_.view();
@@ -65,7 +65,7 @@ TEST_F(RigMlesacTest, drawsFromACameraThatAloneSeesThePoints) {
   EXPECT_EQ(found.inliers, 60);
 }
 
-TEST_F(RigMlesacTest, aGoodPriorEndsTheSearchEarlyAndABadOneDoesNoHarm) {
+TEST_F(RigMlesacTest, goodPriorEndsEarlyAndBadOneDoesNoHarm) {
   Random random(10);
   const RigScene scene = make_scene(random, 2, 300, 0.1, 0.3, 0.3, 0.6, &table_);
   MlesacOptions options;
@@ -78,7 +78,7 @@ TEST_F(RigMlesacTest, aGoodPriorEndsTheSearchEarlyAndABadOneDoesNoHarm) {
   EXPECT_LT(rotation_angle(bad.T_left_world.R * scene.T_left_world.R.transpose()), 0.02);
 }
 
-TEST_F(RigMlesacTest, theScoreIsTheTruncatedCostOfThePose) {
+TEST_F(RigMlesacTest, scoreIsTheTruncatedCost) {
   Random random(12);
   (void)make_scene(random, 2, 150, 0.3, 0.3, 0.3, 0.6, &table_);
   const MlesacOptions options;
@@ -99,7 +99,7 @@ TEST_F(RigMlesacTest, theScoreIsTheTruncatedCostOfThePose) {
   EXPECT_NEAR(found.score, cost, 1e-3 * cost);  // float: 1e-3 px of 0.6 px, hundreds of terms
 }
 
-TEST_F(RigMlesacTest, findsNothingInWhatCannotBe) {
+TEST_F(RigMlesacTest, invalidInputHasNoPose) {
   Random random(13);
   (void)make_scene(random, 2, 2, 0.0, 0.0, 0.0, 0.3, &table_);
   EXPECT_FALSE(mlesac_.solve(table_.view(), {}, nullptr, random).found);
@@ -134,7 +134,7 @@ TEST_F(RigMlesacTest, findsNothingInWhatCannotBe) {
   EXPECT_FALSE(mlesac_.solve(table_.view(), {}, nullptr, random).found);
 }
 
-TEST_F(RigMlesacTest, numbersThatAreNoneAreLeftOut) {
+TEST_F(RigMlesacTest, nonFiniteObservationsAreIgnored) {
   Random random(14);
   const RigScene scene = make_scene(random, 2, 100, 0.0, 0.0, 0.0, 0.3, &table_);
   ASSERT_TRUE(table_.push(Vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0), 0.3));
@@ -149,7 +149,7 @@ TEST_F(RigMlesacTest, numbersThatAreNoneAreLeftOut) {
   EXPECT_EQ(found.observations, 200);
 }
 
-TEST(SamplesNeeded, followsTheFormula) {
+TEST(SamplesNeeded, countFollowsTheRansacFormula) {
   EXPECT_EQ(samples_needed(1.0, 3, 0.99, 1000), 1);
   EXPECT_EQ(samples_needed(0.0, 3, 0.99, 1000), 1000);
   EXPECT_EQ(samples_needed(0.5, 3, 0.99, 1000), 35);   // ln 0.01 / ln 0.875 = 34.5

@@ -73,7 +73,7 @@ TEST_F(PoseRefinerTest, gradientIsTheDerivativeOfTheCost) {
   }
 }
 
-TEST_F(PoseRefinerTest, informationIsTheCurvatureOfTheCostWhereResidualsVanish) {
+TEST_F(PoseRefinerTest, informationIsTheCurvatureAtZeroResiduals) {
   Random random(22);
   const RigScene scene = make_scene(random, 2, 67, 0.0, 0.3, 0.0, 0.5, &table_);
   problem_.gather(table_.view());
@@ -88,7 +88,7 @@ TEST_F(PoseRefinerTest, informationIsTheCurvatureOfTheCostWhereResidualsVanish) 
   EXPECT_LT((numeric - H).norm(), 1e-6 * H.norm()) << numeric << "\n\n" << H;
 }
 
-TEST_F(PoseRefinerTest, grossPointsNearByDoNotMoveThePose) {
+TEST_F(PoseRefinerTest, nearOutliersDoNotMoveThePose) {
   // Three points at 7 m, wrong by 8 px the same way in both cameras, beside 150 right ones at 10 to
   // 60 m. The second round is the solve without them: the same to a hundredth of its sigma.
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -141,7 +141,7 @@ TEST_F(PoseRefinerTest, informationPredictsTheSpreadOfThePose) {
   EXPECT_NEAR(rms, 0.4, 0.02);  // the 1 % beyond the χ² threshold are not in it
 }
 
-TEST_F(PoseRefinerTest, saysThatFarPointsDoNotHoldThePosition) {
+TEST_F(PoseRefinerTest, farPointsLeaveThePositionUncertain) {
   Random random(23);
   const RigScene near = make_scene(random, 2, 100, 0.0, 0.3, 0.2, 0.3, &table_);
   const RefinedPose held = refiner_.refine(table_.view(), near.T_left_world, {}, {});
@@ -158,7 +158,7 @@ TEST_F(PoseRefinerTest, saysThatFarPointsDoNotHoldThePosition) {
   EXPECT_LT(loose.rotation_sigma, 0.01);
 }
 
-TEST_F(PoseRefinerTest, usesOnlyWhatItIsTold) {
+TEST_F(PoseRefinerTest, onlySelectedObservationsAreUsed) {
   Random random(25);
   const RigScene scene = make_scene(random, 2, 100, 0.4, 0.0, 0.0, 0.3, &table_);
   std::vector<std::uint8_t> use(100, 0);
@@ -169,7 +169,7 @@ TEST_F(PoseRefinerTest, usesOnlyWhatItIsTold) {
   for (std::size_t i = 0; i < 100; ++i) EXPECT_EQ(refiner_.flags()[i] == 3, scene.good[i]) << i;
 }
 
-TEST_F(PoseRefinerTest, hasNoPoseForWhatCannotBe) {
+TEST_F(PoseRefinerTest, invalidInputHasNoPose) {
   Random random(26);
   const RigScene scene = make_scene(random, 1, 2, 0.0, 0.0, 0.0, 0.3, &table_);
   EXPECT_FALSE(refiner_.refine(table_.view(), scene.T_left_world, {}, {}).usable);

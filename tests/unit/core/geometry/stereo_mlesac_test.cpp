@@ -58,7 +58,7 @@ class StereoMlesacTest : public testing::Test {
   StereoMlesac mlesac_{kCapacity, arena_};
 };
 
-TEST_F(StereoMlesacTest, isExactOnExactMatches) {
+TEST_F(StereoMlesacTest, exactMatchesGiveTheExactTransform) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
     const MatchSet m = make_matches(random, 100, 0.0, 0.0);
@@ -69,7 +69,7 @@ TEST_F(StereoMlesacTest, isExactOnExactMatches) {
   }
 }
 
-TEST_F(StereoMlesacTest, findsTheTransformAmongFortyPercentOutliers) {
+TEST_F(StereoMlesacTest, transformIsFoundAmongFortyPercentOutliers) {
   // By chance an outlier lies within the epipolar band of ±2.6·√2 sigmas of 0.3 px in under 1 % of
   // the cases (540 px high images), half of them in front; χ² leaves 1 % of the good ones out.
   int close = 0, flagged = 0;
@@ -114,7 +114,7 @@ TEST_F(StereoMlesacTest, informationPredictsTheErrorOfMostRuns) {
       kRuns * 9 / 10);  // the truncated cost has side valleys: a sampled search may end in one
 }
 
-TEST_F(StereoMlesacTest, aFarSceneHoldsTheTurnButNotTheDirection) {
+TEST_F(StereoMlesacTest, farSceneLeavesTheDirectionUncertain) {
   Random random(10);
   MatchSet m;
   m.T_right_left = {exp_so3({0.02, 0.01, -0.03}), {-kBaseline, 0, 0}};
@@ -132,7 +132,7 @@ TEST_F(StereoMlesacTest, aFarSceneHoldsTheTurnButNotTheDirection) {
   EXPECT_GT(found.direction_sigma, 0.05);
 }
 
-TEST_F(StereoMlesacTest, findsNothingInWhatCannotBeAndLeavesOutWhatIsNoNumber) {
+TEST_F(StereoMlesacTest, invalidInputFailsAndNonFiniteIsIgnored) {
   Random random(11);
   MatchSet m = make_matches(random, 4, 0, 0);
   EXPECT_FALSE(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).found);

@@ -52,7 +52,7 @@ void expect_bits(std::uint64_t expected, const std::function<void(Fingerprint&)>
   });
 }
 
-TEST(GeometryTargets, projectionCostHasTheSameBits) {
+TEST(GeometryTargets, projectionCostIsBitIdentical) {
   const Scene<float> s;
   const ScoreColumns columns{s.x.data(), s.y.data(),      s.z.data(),  s.u.data(),
                              s.v.data(), s.weight.data(), s.cap.data()};
@@ -64,7 +64,7 @@ TEST(GeometryTargets, projectionCostHasTheSameBits) {
   });
 }
 
-TEST(GeometryTargets, sampsonCostHasTheSameBits) {
+TEST(GeometryTargets, sampsonCostIsBitIdentical) {
   Scene<float> s;
   std::vector<float> x1(kPoints), y1(kPoints), x2(kPoints), y2(kPoints);
   for (std::size_t i = 0; i < kPoints; ++i) {  // normalised coordinates of a step straight ahead
@@ -83,7 +83,7 @@ TEST(GeometryTargets, sampsonCostHasTheSameBits) {
   });
 }
 
-TEST(GeometryTargets, normalSumsHaveTheSameBits) {
+TEST(GeometryTargets, normalSumsAreBitIdentical) {
   const Scene<double> s;
   const RefineColumns columns{s.x.data(), s.y.data(), s.z.data(),
                               s.u.data(), s.v.data(), s.weight.data()};
@@ -97,7 +97,7 @@ TEST(GeometryTargets, normalSumsHaveTheSameBits) {
   });
 }
 
-TEST(GeometryTargets, squaredErrorsHaveTheSameBits) {
+TEST(GeometryTargets, squaredErrorsAreBitIdentical) {
   const Scene<double> s;
   const RefineColumns columns{s.x.data(), s.y.data(), s.z.data(),
                               s.u.data(), s.v.data(), s.weight.data()};

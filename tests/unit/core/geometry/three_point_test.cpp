@@ -37,7 +37,7 @@ double nearest(const ThreePointSolutions& s, const Transform& truth) {
   return best;
 }
 
-TEST(ThreePoint, findsTheTruePoseOfRandomProblems) {
+TEST(ThreePoint, randomProblemsGiveTheTruePose) {
   // Near a double root (the danger cylinder) the error of a pose is the square root of rounding:
   // 1e-16 → 1e-8, and the median stays at rounding. Of 20 000 random problems one in ten thousand
   // may be that near.
@@ -58,7 +58,7 @@ TEST(ThreePoint, findsTheTruePoseOfRandomProblems) {
   EXPECT_LT(errors[kProblems * 99 / 100], 1e-9);
 }
 
-TEST(ThreePoint, everySolutionPutsThePointsOnTheRaysInFront) {
+TEST(ThreePoint, everySolutionPutsPointsOnTheRaysInFront) {
   Random random(12);
   for (int k = 0; k < 5000; ++k) {
     const Problem p = random_problem(random);
@@ -76,7 +76,7 @@ TEST(ThreePoint, everySolutionPutsThePointsOnTheRaysInFront) {
   }
 }
 
-TEST(ThreePoint, solvesSymmetricAndFarScenes) {
+TEST(ThreePoint, symmetricAndFarScenesAreSolved) {
   // An equilateral triangle seen head on: the cubic has multiple roots.
   for (const double depth : {1.0, 5.0, 1e3}) {
     for (const double size : {1.0, 0.1}) {
@@ -99,7 +99,7 @@ TEST(ThreePoint, solvesSymmetricAndFarScenes) {
   EXPECT_LT(nearest(solve_three_point(p.rays, p.points), Transform{}), 1e-9);
 }
 
-TEST(ThreePoint, hasNoPoseForDegenerateInput) {
+TEST(ThreePoint, degenerateInputHasNoPose) {
   Random random(14);
   const Problem good = random_problem(random);
   Problem p = good;
@@ -132,7 +132,7 @@ TEST(ThreePoint, hasNoPoseForDegenerateInput) {
     EXPECT_TRUE(s.T_camera_world[static_cast<std::size_t>(i)].finite());
 }
 
-TEST(ThreePoint, nothingIsNotANumberWhateverTheInput) {
+TEST(ThreePoint, extremeInputIsFinite) {
   Random random(15);
   for (int k = 0; k < 20000; ++k) {
     Problem p = random_problem(random);

@@ -35,7 +35,7 @@ std::vector<RayView> views_of(const Vec3& p_first, std::size_t n, double noise, 
   return views;
 }
 
-TEST(Triangulate, recoversExactPoints) {
+TEST(Triangulate, exactViewsGiveTheExactPoint) {
   Random random(31);
   for (int k = 0; k < 5000; ++k) {
     const Vec3 p = test::visible_point(random, 3, 30);
@@ -50,7 +50,7 @@ TEST(Triangulate, recoversExactPoints) {
   }
 }
 
-TEST(Triangulate, covarianceAndChiSquareHoldUp) {
+TEST(Triangulate, covarianceAndChiSquareMatchTheErrors) {
   Random random(32);
   double nees = 0, chi2 = 0;
   constexpr int kRuns = 3000;
@@ -72,7 +72,7 @@ TEST(Triangulate, covarianceAndChiSquareHoldUp) {
   EXPECT_NEAR(chi2, 5.0, 0.25);  // 2·4 − 3; √(2·5/3000) = 0.058
 }
 
-TEST(Triangulate, farPointsKeepTheirDirection) {
+TEST(Triangulate, pointAtInfinityKeepsItsDirection) {
   const std::array<RayView, 2> views = {
       RayView{Transform{}, Vec2(0.1, -0.05), kSigma},
       RayView{{Mat3::Identity(), {-0.5, 0, 0}}, Vec2(0.1, -0.05), kSigma}};
@@ -85,7 +85,7 @@ TEST(Triangulate, farPointsKeepTheirDirection) {
   EXPECT_GT(found.p_world.z(), 100.0);
 }
 
-TEST(Triangulate, namesWhatIsWrong) {
+TEST(Triangulate, degenerateViewsGiveTheirStatus) {
   const Transform right{Mat3::Identity(), {-0.5, 0, 0}};
   std::array<RayView, 2> views = {RayView{Transform{}, Vec2(0.0, 0.0), kSigma},
                                   RayView{right, Vec2(0.1, 0.0), kSigma}};
@@ -105,7 +105,7 @@ TEST(Triangulate, namesWhatIsWrong) {
   EXPECT_EQ(triangulate({}, {}).status, TriangulateStatus::invalid_input);
 }
 
-TEST(Triangulate, nothingIsNotANumberAndNothingAllocates) {
+TEST(Triangulate, extremeViewsAreFiniteWithoutAllocations) {
   Random random(33);
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   for (int k = 0; k < 5000; ++k) {

@@ -16,7 +16,7 @@ Square<N> definite() {
 
 constexpr double kRounding = 1e-12;  // some hundred ulps of entries below 10, condition below 1e3
 
-TEST(LinearSolve, CholeskySolvesInvertsAndWhitens) {
+TEST(LinearSolve, choleskySolvesInvertsAndWhitens) {
   const Mat6 A = definite<6>();
   const Cholesky<6> factor(A);
   ASSERT_TRUE(factor.ok());
@@ -28,7 +28,7 @@ TEST(LinearSolve, CholeskySolvesInvertsAndWhitens) {
   EXPECT_FALSE(Cholesky<6>(-A).ok());
 }
 
-TEST(LinearSolve, OtherFactorisationsAgree) {
+TEST(LinearSolve, ldltAndLuSolve) {
   const Mat6 A = definite<6>();
   const Vec6 b = Vec6::LinSpaced(-1, 2);
   Vec6 x;
@@ -43,7 +43,7 @@ TEST(LinearSolve, OtherFactorisationsAgree) {
   EXPECT_FALSE(positive_definite(-A));
 }
 
-TEST(LinearSolve, SingularValuesComeGreatestFirst) {
+TEST(LinearSolve, singularValuesAreInDescendingOrder) {
   const Mat3 M = definite<3>();
   const Svd3 s = svd(M);
   EXPECT_LT((s.U * s.singular.asDiagonal() * s.V.transpose() - M).norm(), kRounding);

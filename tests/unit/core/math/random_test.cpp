@@ -8,7 +8,7 @@
 namespace vergence {
 namespace {
 
-TEST(Random, isPcg32) {
+TEST(Random, sequenceIsThatOfPcg32) {
   // The reference implementation's own demonstration: seed 42, stream 54.
   Random random(42, 54);
   for (const std::uint32_t expected :
@@ -16,7 +16,7 @@ TEST(Random, isPcg32) {
     EXPECT_EQ(random.next(), expected);
 }
 
-TEST(Random, uniformFillsItsIntervalAndNeverReachesTheEnd) {
+TEST(Random, uniformIsEvenAndBelowOne) {
   Random random(3);
   constexpr int kDraws = 100000;
   double sum = 0, least = 1, most = 0;
@@ -33,7 +33,7 @@ TEST(Random, uniformFillsItsIntervalAndNeverReachesTheEnd) {
   EXPECT_GT(most, 1 - 1e-3);
 }
 
-TEST(Random, belowGivesEveryNumberEvenlyAndNoOther) {
+TEST(Random, belowIsEvenAndInRange) {
   Random random(4);
   std::array<int, 7> seen{};
   constexpr int kDraws = 70000;

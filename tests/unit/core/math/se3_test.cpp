@@ -16,14 +16,14 @@ double apart(const Transform& a, const Transform& b) {
   return (a.R - b.R).norm() + (a.t - b.t).norm();
 }
 
-TEST(Transform, mapsPointsAsItsNameSays) {
+TEST(Transform, parallelCamerasShiftThePoint) {
   const Transform T_right_left{
       Mat3::Identity(), {-0.75, 0, 0}};  // parallel cameras, the right one 0.75 m to the right
   EXPECT_TRUE((T_right_left * Vec3(0.75, 0, 4)).isApprox(Vec3(0, 0, 4)));
   EXPECT_TRUE(T_right_left.centre().isApprox(Vec3(0.75, 0, 0)));
 }
 
-TEST(Transform, isAGroup) {
+TEST(Transform, compositionAndInverseAreAGroup) {
   const Transform a = some(0.1), b = some(1.3), c = some(-2.2);
   EXPECT_LT(apart((a * b) * c, a * (b * c)), kRounding);
   EXPECT_LT(apart(a * a.inverse(), Transform{}), kRounding);
@@ -33,7 +33,7 @@ TEST(Transform, isAGroup) {
   EXPECT_LT(((a * b) * p - a * (b * p)).norm(), kRounding);
 }
 
-TEST(Transform, finiteRefusesNanAndInfinity) {
+TEST(Transform, nanOrInfinityIsNotFinite) {
   EXPECT_TRUE(some(1).finite());
   Transform T;
   T.t.y() = std::numeric_limits<double>::quiet_NaN();
@@ -43,7 +43,7 @@ TEST(Transform, finiteRefusesNanAndInfinity) {
   EXPECT_FALSE(T.finite());
 }
 
-TEST(Transform, isPerturbedOnTheLeftOfTheRotationAndPlainlyInTranslation) {
+TEST(Transform, perturbationIsLeftForRotationOnly) {
   const Transform T = some(0.6);
   const Vec3 phi(1e-3, -2e-3, 5e-4), tau(0.1, 0.2, -0.3);
   const Transform moved = perturbed(T, phi, tau);
@@ -51,7 +51,7 @@ TEST(Transform, isPerturbedOnTheLeftOfTheRotationAndPlainlyInTranslation) {
   EXPECT_LT((moved.t - (T.t + tau)).norm(), kRounding);
 }
 
-TEST(Quaternion, hasOneSignAndGivesTheRotationBack) {
+TEST(Quaternion, quaternionHasPositiveWAndRoundTrips) {
   for (const double angle : {0.0, 1e-9, 1.0, 3.0, std::numbers::pi - 1e-9, 4.0, 6.0}) {
     const Mat3 R = exp_so3(angle * Vec3(0.6, 0, -0.8));
     const Eigen::Quaterniond q = quaternion(R);
@@ -61,7 +61,7 @@ TEST(Quaternion, hasOneSignAndGivesTheRotationBack) {
   }
 }
 
-TEST(Interpolate, keepsTheEndsAndTurnsEvenlyAlongTheShorterArc) {
+TEST(Interpolate, interpolationFollowsTheShorterArc) {
   const Transform a{exp_so3({0, 0, 3.0}), {0, 0, 0}},
       b{exp_so3({0, 0, -3.0}), {2, 4, 6}};  // 0.28 rad across π, not 6 back
   EXPECT_LT(apart(interpolate(a, b, 0), a), kRounding);

@@ -43,7 +43,7 @@ Coefficients by_series(double theta) {
   return {static_cast<double>(a), static_cast<double>(b), static_cast<double>(c)};
 }
 
-TEST(So3, expIsARotationAndAgreesWithTheSeriesAtEveryAngle) {
+TEST(So3, expMatchesTheSeriesAtEveryAngle) {
   for (const Vec3& axis : axes())
     for (const double angle : kAngles) {
       const Mat3 R = exp_so3(angle * axis);
@@ -55,18 +55,18 @@ TEST(So3, expIsARotationAndAgreesWithTheSeriesAtEveryAngle) {
     }
 }
 
-TEST(So3, logUndoesExpUpToPi) {
+TEST(So3, logInvertsExpUpToPi) {
   for (const Vec3& axis : axes())
     for (const double angle : kAngles)
       EXPECT_LT((log_so3(exp_so3(angle * axis)) - angle * axis).norm(), kRounding) << angle;
 }
 
-TEST(So3, logKeepsTheDigitsOfTinyAngles) {
+TEST(So3, logKeepsDigitsOfTinyAngles) {
   for (const Vec3& axis : axes())
     EXPECT_LT((log_so3(exp_so3(1e-9 * axis)) - 1e-9 * axis).norm(), 1e-9 * kRounding);
 }
 
-TEST(So3, atPiEitherSignOfTheAxisIsRight) {
+TEST(So3, logAtPiGivesEitherSignOfTheAxis) {
   for (const Vec3& axis : axes()) {
     const Mat3 R = exp_so3(kPi * axis);
     const Vec3 phi = log_so3(R);
@@ -76,7 +76,7 @@ TEST(So3, atPiEitherSignOfTheAxisIsRight) {
   EXPECT_NEAR(rotation_angle(Vec3(1, -1, -1).asDiagonal()), kPi, kRounding);
 }
 
-TEST(So3, leftJacobianAgreesWithTheSeriesAtEveryAngle) {
+TEST(So3, leftJacobianMatchesTheSeriesAtEveryAngle) {
   for (const Vec3& axis : axes())
     for (const double angle : kAngles) {
       const auto [a, b, c] = by_series(angle);
@@ -87,7 +87,7 @@ TEST(So3, leftJacobianAgreesWithTheSeriesAtEveryAngle) {
     }
 }
 
-TEST(So3, normalisedRestoresAProductOfAThousandRotations) {
+TEST(So3, normalisedRestoresThousandRotations) {
   Mat3 R = Mat3::Identity();
   const Mat3 step = exp_so3({0.01, -0.02, 0.03});
   for (int i = 0; i < 1000; ++i) R = R * step;

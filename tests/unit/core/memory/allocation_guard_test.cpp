@@ -30,11 +30,11 @@ class AllocationGuardTest : public testing::Test {
  protected:
   void SetUp() override {
     if (!AllocationGuard::available())
-      GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
+      GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   }
 };
 
-TEST_F(AllocationGuardTest, countsEveryWayToTheHeap) {
+TEST_F(AllocationGuardTest, everyHeapFunctionIsCounted) {
   EXPECT_EQ(counted([] { sink = malloc(8); }), 1U);
   free(sink);
   EXPECT_EQ(counted([] { sink = calloc(2, 8); }), 1U);
@@ -60,7 +60,7 @@ TEST_F(AllocationGuardTest, countsEveryWayToTheHeap) {
   free(sink);
 }
 
-TEST_F(AllocationGuardTest, anUnsealedThreadMayAllocateWhileAnotherIsSealed) {
+TEST_F(AllocationGuardTest, unsealedThreadIsNotCounted) {
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::uint64_t inside = 1;
   std::thread other([&inside] {
@@ -77,7 +77,7 @@ TEST_F(AllocationGuardTest, anUnsealedThreadMayAllocateWhileAnotherIsSealed) {
   EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
-TEST_F(AllocationGuardTest, everySealedThreadCounts) {
+TEST_F(AllocationGuardTest, everySealedThreadIsCounted) {
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::vector<std::thread> threads;
   for (int i = 0; i < 3; ++i)
@@ -90,7 +90,7 @@ TEST_F(AllocationGuardTest, everySealedThreadCounts) {
   EXPECT_EQ(AllocationGuard::runtime_allocations() - before, 3U);
 }
 
-TEST_F(AllocationGuardTest, scopesNest) {
+TEST_F(AllocationGuardTest, nestedScopesStaySealed) {
   EXPECT_FALSE(AllocationGuard::thread_sealed());
   {
     const SealedScope outer;
@@ -100,7 +100,7 @@ TEST_F(AllocationGuardTest, scopesNest) {
   EXPECT_FALSE(AllocationGuard::thread_sealed());
 }
 
-TEST_F(AllocationGuardTest, abortsWhenToldTo) {
+TEST_F(AllocationGuardTest, allocationAbortsIfRequested) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
   EXPECT_DEATH(
       {

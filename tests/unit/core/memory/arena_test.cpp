@@ -27,7 +27,7 @@ TEST(Arena, piecesAreZeroedAlignedAndApart) {
   EXPECT_EQ(arena.used(), 64U + 128U + 64U);
 }
 
-TEST(Arena, whenFullSaysWhoAskedForHowMuchAndStaysUsable) {
+TEST(Arena, fullArenaNamesTheRequestAndStaysUsable) {
   Arena arena(128);
   (void)arena.make<std::uint8_t>(64, "first");
   try {
@@ -42,7 +42,7 @@ TEST(Arena, whenFullSaysWhoAskedForHowMuchAndStaysUsable) {
   EXPECT_EQ(arena.used(), arena.capacity());
 }
 
-TEST(Arena, sizesThatOverflowAreRefused) {
+TEST(Arena, overflowingSizeIsRefused) {
   Arena arena(256);
   EXPECT_THROW((void)arena.make<double>(std::numeric_limits<std::size_t>::max(), "too many"),
                std::length_error);
@@ -52,7 +52,7 @@ TEST(Arena, sizesThatOverflowAreRefused) {
   EXPECT_EQ(arena.used(), 0U);
 }
 
-TEST(Arena, objectsOfZerosAreZerosWhetherTheyAreConstructedOrNot) {
+TEST(Arena, objectsHaveTheirDefaultValues) {
   struct Zeros {
     std::uint64_t number = 0;
     const char* text = nullptr;
@@ -74,7 +74,7 @@ TEST(Arena, objectsOfZerosAreZerosWhetherTheyAreConstructedOrNot) {
   }
 }
 
-TEST(Arena, tellsWhoHoldsWhat) {
+TEST(Arena, rowsListBytesByName) {
   Arena arena(4096);
   (void)arena.make<std::uint8_t>(65, "tracks");
   (void)arena.make<double>(8, "poses");

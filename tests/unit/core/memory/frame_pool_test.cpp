@@ -32,7 +32,7 @@ TEST(FramePool, slotsAreAlignedPaddedAndApart) {
   }
 }
 
-TEST(FramePool, refusesWhenAllSlotsAreOutAndGoesOnAfterARelease) {
+TEST(FramePool, exhaustedPoolRefusesUntilARelease) {
   Arena arena(FramePool::memory_needed(8, 8, 2));
   FramePool pool(8, 8, 2, arena);
   const auto a = pool.acquire(), b = pool.acquire();
@@ -44,7 +44,7 @@ TEST(FramePool, refusesWhenAllSlotsAreOutAndGoesOnAfterARelease) {
   EXPECT_EQ(pool.acquire(), b);
 }
 
-TEST(FramePool, aSlotIsReleasedOnce) {
+TEST(FramePool, secondReleaseOfASlotIsRefused) {
   Arena arena(FramePool::memory_needed(8, 8, 2));
   FramePool pool(8, 8, 2, arena);
   const auto a = pool.acquire();

@@ -13,7 +13,7 @@
 namespace vergence {
 namespace {
 
-TEST(Ring, behavesLikeALimitedQueue) {
+TEST(Ring, operationsMatchALimitedQueue) {
   Ring<int, 8> ring;
   std::deque<int> model;
   Random random(11);
@@ -42,7 +42,7 @@ TEST(Ring, behavesLikeALimitedQueue) {
   EXPECT_GT(empties, 10);
 }
 
-TEST(Ring, betweenTwoThreadsNothingIsLostDoubledTornOrReordered) {
+TEST(Ring, twoThreadsLoseAndReorderNothing) {
   struct Message {
     std::uint64_t number;
     std::uint64_t complement;  // a torn message would not match

@@ -41,12 +41,12 @@ class ThreadAllocationsTest : public testing::Test {
  protected:
   void SetUp() override {
     if (!AllocationGuard::available())
-      GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
+      GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   }
   void TearDown() override { ThreadAllocations::end(); }
 };
 
-TEST_F(ThreadAllocationsTest, eachNameHasItsOwnCount) {
+TEST_F(ThreadAllocationsTest, eachThreadNameHasItsOwnCount) {
   ThreadAllocations::begin();
   run_named("vergence-one", 3);
   run_named("vergence-two", 5);
@@ -57,7 +57,7 @@ TEST_F(ThreadAllocationsTest, eachNameHasItsOwnCount) {
   EXPECT_EQ(count_of("gmain"), 2U);
 }
 
-TEST_F(ThreadAllocationsTest, aThreadThatOutlivesACountIsFoundAgainInTheNext) {
+TEST_F(ThreadAllocationsTest, threadIsCountedAgainInTheNextCount) {
   int step = 0;
   std::thread worker;
   pthread_barrier_t barrier;
@@ -82,7 +82,7 @@ TEST_F(ThreadAllocationsTest, aThreadThatOutlivesACountIsFoundAgainInTheNext) {
   (void)pthread_barrier_destroy(&barrier);
 }
 
-TEST_F(ThreadAllocationsTest, aFullTableCountsTheRestTogether) {
+TEST_F(ThreadAllocationsTest, fullTableCountsTheRestTogether) {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < ThreadAllocations::kMaxNames + 3; ++i)
     names.push_back("vergence-t" + std::to_string(i));

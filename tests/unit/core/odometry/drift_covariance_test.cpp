@@ -24,13 +24,13 @@ Mat6 noise(double metres, double radians) {
   return Q;
 }
 
-TEST(DriftCovariance, ofTheFirstPoseIsZero) {
+TEST(DriftCovariance, firstPoseHasZeroCovariance) {
   DriftCovariance drift;
   drift.step(looking(0.3, {1, 2, 3}), noise(1, 1), 0.1, true);
   EXPECT_TRUE(drift.pose().isZero());
 }
 
-TEST(DriftCovariance, ofStandingIsThatOfOneStepForEachMap) {
+TEST(DriftCovariance, standingAddsOneStepPerMap) {
   DriftCovariance drift;
   const Mat6 step = noise(0.02, 0.001);
   for (int i = 0; i <= 100; ++i) drift.step(looking(0.3, {1, 2, 3}), step, 0.1, false);
@@ -41,7 +41,7 @@ TEST(DriftCovariance, ofStandingIsThatOfOneStepForEachMap) {
   EXPECT_TRUE(drift.pose().isApprox(2 * step, 1e-9));
 }
 
-TEST(DriftCovariance, ofCreepingIsOneStepForEachWayThatIsCertain) {
+TEST(DriftCovariance, creepingAddsOneStepPerCertainPath) {
   DriftCovariance drift;
   constexpr double kSigma = 0.02;
   // 0.45 sigmas each: the seventh step is more than three sigmas from where it began.
@@ -51,7 +51,7 @@ TEST(DriftCovariance, ofCreepingIsOneStepForEachWayThatIsCertain) {
   EXPECT_NEAR(std::sqrt(drift.pose()(0, 0)), std::sqrt(10) * kSigma, 1e-6);
 }
 
-TEST(DriftCovariance, ofAPoseThatWasNotSeenEndsWhenOneIs) {
+TEST(DriftCovariance, extrapolationEndsWithTheNextSeenPose) {
   DriftCovariance drift;
   const Mat6 seen = noise(0.02, 0.001), unseen = noise(5, 0.1);
   for (int i = 0; i <= 9; ++i) drift.step(looking(0, {0, 0, 1.0 * i}), seen, 0, true);
@@ -62,14 +62,14 @@ TEST(DriftCovariance, ofAPoseThatWasNotSeenEndsWhenOneIs) {
   EXPECT_TRUE(drift.pose().isApprox(before + seen, 1e-9));
 }
 
-TEST(DriftCovariance, lengthsAreOffTogether) {
+TEST(DriftCovariance, lengthErrorsAreCorrelated) {
   DriftCovariance drift;
   for (int i = 0; i <= 10; ++i) drift.step(looking(0, {0.5 * i, 0, 0}), Mat6::Zero(), 0.02, false);
   // Five metres along x, by 2 %.
   EXPECT_NEAR(std::sqrt(drift.pose()(0, 0)), 0.1, 1e-9);
 }
 
-TEST(DriftCovariance, aTurnThatIsSharedMovesThePoseAside) {
+TEST(DriftCovariance, sharedRotationErrorMovesThePoseSideways) {
   DriftCovariance drift;
   constexpr int kSteps = 100;
   for (int i = 0; i <= kSteps; ++i) drift.step(looking(0, {0, 0, 1.0 * i}), Mat6::Zero(), 0, false);
@@ -82,7 +82,7 @@ TEST(DriftCovariance, aTurnThatIsSharedMovesThePoseAside) {
 }
 
 /// Against the errors of many drives round a bend, each step with its own noise.
-TEST(DriftCovariance, isThatOfManyDrives) {
+TEST(DriftCovariance, covarianceMatchesManyRandomDrives) {
   constexpr int kDrives = 4000, kSteps = 20;
   constexpr double kMetres = 0.01, kRadians = 0.002;
   DriftCovariance drift;
@@ -123,7 +123,7 @@ TEST(DriftCovariance, isThatOfManyDrives) {
           << i << ' ' << j;
 }
 
-TEST(MotionCovariance, ofAnExtrapolatedMotionIsHalfOfItAndWhatAVehicleMayDoUnseen) {
+TEST(MotionCovariance, extrapolatedMotionIsHalfUncertain) {
   const Transform moved{Mat3::Identity(), {0, 0, -3}};
   const Mat6 C = motion_covariance(Mat6::Zero(), moved, 0.5);
   const double gathered = 0.5 * 0.5 * 0.5;  // m: half of 1 m/s² in half a second
@@ -135,7 +135,7 @@ TEST(MotionCovariance, ofAnExtrapolatedMotionIsHalfOfItAndWhatAVehicleMayDoUnsee
   EXPECT_NEAR(std::sqrt(parked(3, 3)), std::numbers::pi, 1e-12) << "any way round";
 }
 
-TEST(MotionCovariance, containsWhatIsNotCarriedOn) {
+TEST(MotionCovariance, motionBeyondTheExtrapolationIsIncluded) {
   // 25 m/s and 0.2 rad/s kept through eight seconds of darkness: two are carried on, 150 m and 1.2
   // rad are missing.
   const Transform carried{exp_so3({0, 0.2 * kLongestExtrapolation, 0}),
@@ -148,7 +148,7 @@ TEST(MotionCovariance, containsWhatIsNotCarriedOn) {
   EXPECT_NEAR(std::sqrt(whole(2, 2)), std::hypot(25, 2), 1e-12);
 }
 
-TEST(CorrectionCovariance, isTheCorrectionAsOneSigma) {
+TEST(CorrectionCovariance, correctionIsOneSigma) {
   const Transform correction{exp_so3({0, 0.003, 0}), {0.1, 0, -0.2}};
   const Mat6 C = correction_covariance(correction);
   EXPECT_NEAR(std::sqrt(C(0, 0)), 0.1, 1e-12);
@@ -157,7 +157,7 @@ TEST(CorrectionCovariance, isTheCorrectionAsOneSigma) {
   EXPECT_TRUE(correction_covariance({}).isZero());
 }
 
-TEST(MotionCovariance, hasTranslationFirst) {
+TEST(MotionCovariance, translationComesFirst) {
   Mat6 fit = Mat6::Zero();
   fit(0, 0) = 4;  // rotation about x
   fit(5, 5) = 1;  // translation along z

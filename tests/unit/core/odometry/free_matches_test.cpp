@@ -33,7 +33,7 @@ class FreeMatches : public ::testing::TestWithParam<int> {
   }
 };
 
-TEST_P(FreeMatches, ofAMovedPictureLieWhereItMovedWithoutHeap) {
+TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
   const OdometryOptions o = options();
   const RigCalibration rig = blank_rig();
   Arena arena(FrontEnd::memory_needed(o, rig));
@@ -66,7 +66,7 @@ TEST_P(FreeMatches, ofAMovedPictureLieWhereItMovedWithoutHeap) {
   EXPECT_GE(static_cast<double>(right_ones), 0.9 * static_cast<double>(matches.size()));
 }
 
-TEST_P(FreeMatches, ofImagesThatAreMissingOrFlatAreNone) {
+TEST_P(FreeMatches, missingOrFlatImageHasNoMatch) {
   const OdometryOptions o = options();
   const RigCalibration rig = blank_rig();
   Arena arena(FrontEnd::memory_needed(o, rig));

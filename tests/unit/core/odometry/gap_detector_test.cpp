@@ -26,7 +26,7 @@ class Frames {
   Stamp last_{1'000'000'000};
 };
 
-TEST(GapDetector, oneGapLeavesARenewalDueUntilItIsDone) {
+TEST(GapDetector, gapRequestsARenewalUntilReset) {
   Frames f;
   EXPECT_EQ(f.next(kUsual), 0);
   EXPECT_FALSE(f.gaps.renewal_due());
@@ -38,7 +38,7 @@ TEST(GapDetector, oneGapLeavesARenewalDueUntilItIsDone) {
   EXPECT_FALSE(f.gaps.renewal_due());
 }
 
-TEST(GapDetector, anEvenDriveHasNoneHoweverSlowItIs) {
+TEST(GapDetector, evenIntervalsAreNoGap) {
   Frames f(1.0);
   EXPECT_FALSE(f.gaps.renewal_due());
   for (int i = 0; i < 5; ++i) EXPECT_EQ(f.next(1.0), 0);
@@ -46,7 +46,7 @@ TEST(GapDetector, anEvenDriveHasNoneHoweverSlowItIs) {
   EXPECT_EQ(f.next(10.0), 10.0);
 }
 
-TEST(GapDetector, ofTwoGapsInARowTheSceneIsMadeAnewOnce) {
+TEST(GapDetector, secondGapInARowRequestsNoRenewal) {
   Frames f;
   (void)f.next(kGap);
   f.gaps.clear_renewal();  // it was made anew
@@ -54,13 +54,13 @@ TEST(GapDetector, ofTwoGapsInARowTheSceneIsMadeAnewOnce) {
   EXPECT_FALSE(f.gaps.renewal_due());
 }
 
-TEST(GapDetector, withoutALinkNothingIsDue) {
+TEST(GapDetector, unlinkedCamerasNeedNoRenewal) {
   Frames f;
   EXPECT_EQ(f.next(kGap, false), kGap);
   EXPECT_FALSE(f.gaps.renewal_due());
 }
 
-TEST(GapDetector, framesAreCountedFromTheOneBeforeWhateverItShowed) {
+TEST(GapDetector, intervalIsCountedFromTheFrameBefore) {
   GapDetector gaps;
   EXPECT_EQ(gaps.since_frame(Stamp(1'000'000'000)), 0);
   EXPECT_DOUBLE_EQ(gaps.since_frame(Stamp(1'050'000'000)), kUsual);

@@ -29,7 +29,7 @@ Intrinsics wide_lens(CameraModelKind kind) {
 constexpr CameraModelKind kModels[] = {CameraModelKind::pinhole_radtan,
                                        CameraModelKind::pinhole_equidistant};
 
-TEST(UndistortedCamera, anIdealPixelIsWhereAPinholeWouldSeeTheSameRay) {
+TEST(UndistortedCamera, idealPixelIsThePinholePixelOfTheRay) {
   for (const CameraModelKind kind : kModels) {
     const UndistortedCamera lens(wide_lens(kind));
     Random random(3);
@@ -46,7 +46,7 @@ TEST(UndistortedCamera, anIdealPixelIsWhereAPinholeWouldSeeTheSameRay) {
   }
 }
 
-TEST(UndistortedCamera, derivativesAreThoseOfFiniteDifferences) {
+TEST(UndistortedCamera, derivativesMatchFiniteDifferences) {
   for (const CameraModelKind kind : kModels) {
     const UndistortedCamera lens(wide_lens(kind));
     Random random(4);
@@ -80,7 +80,7 @@ TEST(UndistortedCamera, derivativesAreThoseOfFiniteDifferences) {
   }
 }
 
-TEST(UndistortedCamera, withoutDistortionNothingMoves) {
+TEST(UndistortedCamera, undistortedLensMovesNothing) {
   Intrinsics k = wide_lens(CameraModelKind::pinhole_radtan);
   k.distortion = {};
   const UndistortedCamera lens(k);
@@ -91,7 +91,7 @@ TEST(UndistortedCamera, withoutDistortionNothingMoves) {
   EXPECT_EQ(magnification, 1.0);
 }
 
-TEST(UndistortedCamera, outsideTheModelThereIsNoPixel) {
+TEST(UndistortedCamera, pixelBeyondTheFoldIsRefused) {
   Intrinsics k = wide_lens(CameraModelKind::pinhole_radtan);
   k.distortion = {-0.5, 0, 0, 0,
                   0};  // folds at r² = 2/3: no ray is seen further out than 0.54 · 458 px

@@ -26,7 +26,7 @@ struct Filled {
 
 std::vector<int> order(const Map& map) { return {map.order().begin(), map.order().end()}; }
 
-TEST(Map, whenItsPointsAreUsedUpItRefuses) {
+TEST(Map, fullMapRefusesUntilAPointIsFreed) {
   Filled f(5);
   for (std::size_t i = 0; i < kMaxPoints; ++i)
     ASSERT_NE(f.point(PointStage::candidate), nullptr) << i;
@@ -45,7 +45,7 @@ TEST(Map, whenItsPointsAreUsedUpItRefuses) {
   for (const PointObservation& s : again->seen) EXPECT_EQ(s.cameras, 0);
 }
 
-TEST(Map, pointsOnTrialLeaveNoTraceInTheOrderOfSlots) {
+TEST(Map, rewoundPointsKeepTheOrderOfSlots) {
   Filled f(3);
   (void)f.point(PointStage::active);
   const std::size_t cursor = f.map.cursor();
@@ -57,7 +57,7 @@ TEST(Map, pointsOnTrialLeaveNoTraceInTheOrderOfSlots) {
   EXPECT_EQ(f.map.make_point(), tried);
 }
 
-TEST(Map, aFullWindowDropsItsOldestKeyframe) {
+TEST(Map, fullWindowDropsItsOldestKeyframe) {
   Filled f(3);
   const std::size_t a = f.keyframe(1), b = f.keyframe(2), c = f.keyframe(3);
   EXPECT_EQ(order(f.map),
@@ -72,7 +72,7 @@ TEST(Map, aFullWindowDropsItsOldestKeyframe) {
   EXPECT_EQ(f.map.order().size(), 3U);
 }
 
-TEST(Map, aNewKeyframeHasNoObservationsOfTheOneWhoseSlotItTakes) {
+TEST(Map, reusedKeyframeSlotHasNoObservations) {
   Filled f(2);
   MapPoint* p = f.point(PointStage::active);
   const std::size_t a = f.keyframe();
@@ -85,7 +85,7 @@ TEST(Map, aNewKeyframeHasNoObservationsOfTheOneWhoseSlotItTakes) {
   EXPECT_EQ(p->seen[b].cameras, 1);
 }
 
-TEST(Map, aDormantPointLivesAsLongAsTheWindowSeesIt) {
+TEST(Map, dormantPointLivesWhileTheWindowSeesIt) {
   Filled f(2);
   MapPoint* early = f.point(PointStage::dormant);
   MapPoint* both = f.point(PointStage::dormant);
@@ -105,7 +105,7 @@ TEST(Map, aDormantPointLivesAsLongAsTheWindowSeesIt) {
   EXPECT_EQ(both->stage, PointStage::free);
 }
 
-TEST(Map, clearedItIsEmptyAndHasItsWholeRoomAgain) {
+TEST(Map, clearedMapHasItsWholeCapacity) {
   Filled f(4);
   for (int i = 0; i < 10; ++i) {
     (void)f.point(PointStage::active);
@@ -121,7 +121,7 @@ TEST(Map, clearedItIsEmptyAndHasItsWholeRoomAgain) {
   EXPECT_EQ(n, kMaxPoints);
 }
 
-TEST(PointObservation, holdsACameraABit) {
+TEST(PointObservation, camerasAreSetAndDroppedByBit) {
   PointObservation s;
   s.set(0, {1.5, 2.5}, 0.2F);
   s.set(3, {7, 8}, 0.3F);

@@ -5,7 +5,7 @@
 namespace vergence::odometry {
 namespace {
 
-TEST(NewPointMonitor, fewerThanThreeInTenKeptAreLost) {
+TEST(NewPointMonitor, fewerThanThreeInTenKeptIsLost) {
   NewPointMonitor watch;
   EXPECT_FALSE(watch.lost());
   watch.add(100, 31);
@@ -19,7 +19,7 @@ TEST(NewPointMonitor, fewerThanThreeInTenKeptAreLost) {
   EXPECT_FALSE(watch.lost());
 }
 
-TEST(NewPointMonitor, fewPointsAtATimeAreJudgedTogether) {
+TEST(NewPointMonitor, fewPointsAreEvaluatedTogether) {
   NewPointMonitor watch;
   watch.add(40, 0);  // one blurred frame
   ASSERT_TRUE(watch.lost());

@@ -26,7 +26,7 @@ std::vector<FrameOutcome> drive(Duration budget, const std::vector<FrameOutcome>
   return all;
 }
 
-TEST(OdometryBudget, aFrameWithoutTimeHasItsPoseAllTheSame) {
+TEST(OdometryBudget, exhaustedBudgetStillGivesAPose) {
   const auto outcomes = drive(Duration::nanoseconds(1));
   int shortened = 0;
   for (int i = 0; i < kFrames; ++i) {
@@ -42,7 +42,7 @@ TEST(OdometryBudget, aFrameWithoutTimeHasItsPoseAllTheSame) {
   EXPECT_GT(shortened, 3);
 }
 
-TEST(OdometryBudget, withTimeEnoughNothingIsLeftOut) {
+TEST(OdometryBudget, sufficientBudgetDropsNoWork) {
   const auto with = drive(Duration::seconds(1000)), without = drive({});
   for (std::size_t i = 0; i < with.size(); ++i) {
     EXPECT_TRUE(with[i].effort.whole()) << i;
@@ -50,7 +50,7 @@ TEST(OdometryBudget, withTimeEnoughNothingIsLeftOut) {
   }
 }
 
-TEST(OdometryBudget, aRecordedDriveIsDrivenAgainWithTheSameWork) {
+TEST(OdometryBudget, recordedWorkGivesTheSamePoses) {
   const auto live = drive(Duration::nanoseconds(1)), again = drive({}, live);
   for (std::size_t i = 0; i < live.size(); ++i) {
     EXPECT_EQ(live[i].effort, again[i].effort) << i;

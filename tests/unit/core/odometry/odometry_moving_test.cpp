@@ -29,11 +29,9 @@ void expect_the_panel_is_told(Duration budget) {
   EXPECT_GT(followed, 5) << "the panel is not large enough to be followed: nothing was tested";
 }
 
-TEST(OdometryMoving, aPanelThatDrivesAlongIsNotTakenForTheScene) {
-  expect_the_panel_is_told(Duration{});
-}
+TEST(OdometryMoving, panelMovingAlongIsReported) { expect_the_panel_is_told(Duration{}); }
 
-TEST(OdometryMoving, aPanelIsToldHoweverLittleTimeThereIs) {
+TEST(OdometryMoving, panelIsReportedWithASmallBudget) {
   expect_the_panel_is_told(Duration::milliseconds(1));
 }
 

@@ -19,7 +19,7 @@ features::test::Image noise(const ImageView& like) {
   return image;
 }
 
-TEST(OdometryReasons, aGapAfterAFrameWithoutAPoseIsAGap) {
+TEST(OdometryReasons, gapAfterAnUnposedFrameIsReported) {
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
   for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);
@@ -40,7 +40,7 @@ TEST(OdometryReasons, aGapAfterAFrameWithoutAPoseIsAGap) {
 
 // The right camera's image confirms little of the left one's at a keyframe, and the rig stands from
 // then on: there is no further keyframe to take that back.
-TEST(OdometryReasons, camerasThatDoNotConfirmEachOtherAreToldAtOnceAndNoLonger) {
+TEST(OdometryReasons, missingStereoMatchesAreReportedAndEnd) {
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
   for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);
@@ -63,7 +63,7 @@ TEST(OdometryReasons, camerasThatDoNotConfirmEachOtherAreToldAtOnceAndNoLonger) 
   EXPECT_EQ(out.status, PoseStatus::ok) << to_string(out.reason);
 }
 
-TEST(OdometryReasons, aSceneThatCannotBeMadeAnewIsNotOk) {
+TEST(OdometryReasons, failedRebuildIsDegraded) {
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
   for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);

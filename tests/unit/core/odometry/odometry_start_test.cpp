@@ -37,7 +37,7 @@ class LentImage {
 };
 
 // A successor that fails is no reason to have nothing: the calibration before it is kept.
-TEST(OdometryStart, aSceneTheNewCalibrationCannotBeginIsBegunByTheOneBefore) {
+TEST(OdometryStart, failedCalibrationResumesThePreviousOne) {
   constexpr int kLink = 5, kDark = 8, kBack = 12;
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
@@ -62,7 +62,7 @@ TEST(OdometryStart, aSceneTheNewCalibrationCannotBeginIsBegunByTheOneBefore) {
       f.odometry.rig().T_camera_left[1].R.isApprox(corridor.rig().T_camera_left[1].R, 2e-3));
 }
 
-TEST(OdometryStart, aLeftCameraThatIsGoneIsNotLookedAtInTheMemoryItHad) {
+TEST(OdometryStart, disconnectedCameraMemoryIsNotRead) {
   constexpr int kGone = 6, kBack = 60;
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
@@ -90,7 +90,7 @@ TEST(OdometryStart, aLeftCameraThatIsGoneIsNotLookedAtInTheMemoryItHad) {
   EXPECT_GT(posed, 15);
 }
 
-TEST(OdometryStart, bySomeOfTheCamerasIsNotOk) {
+TEST(OdometryStart, startWithoutAllCamerasIsDegraded) {
   test::Corridor corridor(3);
   test::LinkedOdometry f(corridor.rig());
   RigFrame frame = corridor.frame(0);
@@ -102,7 +102,7 @@ TEST(OdometryStart, bySomeOfTheCamerasIsNotOk) {
 }
 
 // 20 mm of baseline: everything matches, nearly all of it with a disparity that measures no depth.
-TEST(OdometryStart, whereAllIsFarTheRigIsNotSaidToBeUnfit) {
+TEST(OdometryStart, farSceneIsReportedAsWeakGeometry) {
   test::Corridor corridor;
   RigCalibration rig = corridor.rig();
   rig.T_camera_left[1].t *= 0.02 / rig.baseline;

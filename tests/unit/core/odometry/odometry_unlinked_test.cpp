@@ -53,7 +53,7 @@ void expect_rig(const Odometry& odometry, int k, const Transform& truth, int i) 
   EXPECT_LT((found.t - truth.t).norm(), kShift) << "frame " << i << " camera " << k;
 }
 
-TEST(OdometryUnlinked, theFirstPairsGiveTheTransformAndTheKnownLengthTheScale) {
+TEST(OdometryUnlinked, firstPairsGiveTransformAndScale) {
   Drive d(false);
   int initialised = -1;
   for (int i = 0; i < 20; ++i) {
@@ -71,7 +71,7 @@ TEST(OdometryUnlinked, theFirstPairsGiveTheTransformAndTheKnownLengthTheScale) {
   EXPECT_EQ(initialised, 0) << "there is enough to see from the start";
 }
 
-TEST(OdometryUnlinked, aKnockIsAMotionOfOneCamera) {
+TEST(OdometryUnlinked, knockIsAMotionOfOneCamera) {
   Drive d(true);
   std::array<Transform, kMaxCameras> knocked = d.corridor.rig().T_camera_left;
   knocked[1] = perturbed(knocked[1], {0.006, -0.004, 0.005}, Vec3::Zero());
@@ -89,7 +89,7 @@ TEST(OdometryUnlinked, aKnockIsAMotionOfOneCamera) {
   }
 }
 
-TEST(OdometryUnlinked, linkedAgainTheWayGoesOnWithoutAJump) {
+TEST(OdometryUnlinked, relinkingKeepsThePathContinuous) {
   Drive d(false);
   Transform before;
   for (int i = 0; i < 10; ++i) {
@@ -123,7 +123,7 @@ TEST(OdometryUnlinked, linkedAgainTheWayGoesOnWithoutAJump) {
   }
 }
 
-TEST(OdometryUnlinked, aThirdCameraIsFoundThroughTheSceneOfTheFirstTwo) {
+TEST(OdometryUnlinked, thirdCameraIsFoundFromTheMap) {
   Drive d(false, 3);
   for (int i = 0; i < 16; ++i) {
     const FrameOutcome out = d.odometry.process(d.corridor.frame(i));
@@ -133,7 +133,7 @@ TEST(OdometryUnlinked, aThirdCameraIsFoundThroughTheSceneOfTheFirstTwo) {
     expect_rig(d.odometry, k, d.corridor.rig().T_camera_left[static_cast<std::size_t>(k)], 15);
 }
 
-TEST(OdometryUnlinked, allocatesNothing) {
+TEST(OdometryUnlinked, processingUsesTheArenaAndNoHeap) {
   Drive d(false);
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   for (int i = 0; i < 8; ++i) {

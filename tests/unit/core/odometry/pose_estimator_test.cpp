@@ -78,7 +78,7 @@ void expect_exact(const Transform& found, const Transform& truth) {
   EXPECT_LT((found.t - truth.t).norm(), kExactShift);
 }
 
-TEST(PoseEstimator, aRigsPoseIsFoundFromExactObservations) {
+TEST(PoseEstimator, exactObservationsGiveTheExactPose) {
   for (const bool sample : {false, true}) {
     Scene s;
     PoseEstimator e(s.options, s.rig, s.arena);
@@ -95,7 +95,7 @@ TEST(PoseEstimator, aRigsPoseIsFoundFromExactObservations) {
   }
 }
 
-TEST(PoseEstimator, pointsThatHoldNoPosesAreNotAsked) {
+TEST(PoseEstimator, candidateAndFreePointsAreNotUsed) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   for (int i = 0; i < 100; ++i) {
@@ -110,7 +110,7 @@ TEST(PoseEstimator, pointsThatHoldNoPosesAreNotAsked) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(e.agrees()[static_cast<std::size_t>(3 * i)], 0);
 }
 
-TEST(PoseEstimator, aThirdOfWrongObservationsDoNotMoveIt) {
+TEST(PoseEstimator, outliersInAThirdDoNotMoveThePose) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   for (int i = 0; i < 100; ++i)
@@ -123,7 +123,7 @@ TEST(PoseEstimator, aThirdOfWrongObservationsDoNotMoveIt) {
   EXPECT_EQ(fit.inliers, kPoints - 100);
 }
 
-TEST(PoseEstimator, grossObservationsAreLeftOutUnlessTheRigIsAClaim) {
+TEST(PoseEstimator, grossObservationsAreDroppedIfRequested) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   for (int i = 0; i < 5; ++i)
@@ -137,7 +137,7 @@ TEST(PoseEstimator, grossObservationsAreLeftOutUnlessTheRigIsAClaim) {
   EXPECT_GT((pulled.T_left_world.t - s.T_left_world.t).norm(), 10 * kExactShift);
 }
 
-TEST(PoseEstimator, theLeftCamerasPoseIsItsOwn) {
+TEST(PoseEstimator, leftPoseIgnoresAKnockedRightCamera) {
   Scene s;
   // The right camera was knocked: what it sees is all wrong for the rig.
   s.T_camera_left[1].R = exp_so3({0.03, 0, 0}) * s.T_camera_left[1].R;
@@ -152,7 +152,7 @@ TEST(PoseEstimator, theLeftCamerasPoseIsItsOwn) {
   EXPECT_EQ(fit.stereo_found, kPoints);
 }
 
-TEST(PoseEstimator, ofCamerasThatContradictEachOtherTheLeftOneIsPreferredWhereItHoldsAPose) {
+TEST(PoseEstimator, contradictingCamerasPreferTheLeft) {
   for (const int seen_left : {kPoints, OdometryOptions{}.ok_inliers - 1}) {
     Scene s;
     s.T_camera_left[1].R = exp_so3({0.03, 0, 0}) * s.T_camera_left[1].R;
@@ -178,7 +178,7 @@ TEST(PoseEstimator, ofCamerasThatContradictEachOtherTheLeftOneIsPreferredWhereIt
   }
 }
 
-TEST(PoseEstimator, camerasPosedEachForItselfGiveTheRig) {
+TEST(PoseEstimator, independentCameraPosesGiveTheRig) {
   for (const int cameras : {2, 3}) {
     Scene s(cameras);
     std::array<Transform, kMaxCameras> T = s.rig.T_camera_left;
@@ -199,7 +199,7 @@ TEST(PoseEstimator, camerasPosedEachForItselfGiveTheRig) {
   }
 }
 
-TEST(PoseEstimator, aCameraThatSeesTooLittleKeepsItsPredictionAndSupportsNothing) {
+TEST(PoseEstimator, cameraWithFewPointsKeepsItsPrediction) {
   Scene s;
   std::array<Transform, kMaxCameras> T = s.rig.T_camera_left;
   T[1] = perturbed(T[1], {0.001, 0, 0}, Vec3::Zero());
@@ -215,7 +215,7 @@ TEST(PoseEstimator, aCameraThatSeesTooLittleKeepsItsPredictionAndSupportsNothing
   EXPECT_EQ(s.agreeing(e, 1), 0);
 }
 
-TEST(PoseEstimator, withoutTheLeftCameraThereIsNoPose) {
+TEST(PoseEstimator, missingLeftImageGivesNoPose) {
   Scene s;
   std::array<Transform, kMaxCameras> T = s.rig.T_camera_left;
   for (MapPoint& p : s.points()) p.now.drop(0);
@@ -224,7 +224,7 @@ TEST(PoseEstimator, withoutTheLeftCameraThereIsNoPose) {
   EXPECT_FALSE(e.fit_left(s.map, s.T_left_world).found);
 }
 
-TEST(PoseEstimator, fewPointsAreNotBelieved) {
+TEST(PoseEstimator, tooFewPointsGiveNoPose) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   const auto keep = [&](int n) {
@@ -245,7 +245,7 @@ TEST(PoseEstimator, fewPointsAreNotBelieved) {
   EXPECT_EQ(nothing.inliers, 0);
 }
 
-TEST(PoseEstimator, oneCamerasPoseAsksForAShareOfItsPoints) {
+TEST(PoseEstimator, singleCameraPoseNeedsAShareOfItsPoints) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   Transform T;

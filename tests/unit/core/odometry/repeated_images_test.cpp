@@ -41,7 +41,7 @@ struct Pair {
   }
 };
 
-TEST(RepeatedImages, areThoseWithEveryPixelWhereItWas) {
+TEST(RepeatedImages, identicalImageIsRepeated) {
   Pair pair;
   const Image right = white_noise(kWidth, kHeight, 2);
   EXPECT_FALSE(pair.give(white_noise(kWidth, kHeight, 1), right).repeated);
@@ -53,7 +53,7 @@ TEST(RepeatedImages, areThoseWithEveryPixelWhereItWas) {
   EXPECT_EQ(again.structured, 0b01) << "it shows nothing of this frame";
 }
 
-TEST(RepeatedImages, areNotThoseWithTheSameGreyValuesElsewhere) {
+TEST(RepeatedImages, permutedPixelsAreNotRepeated) {
   Pair pair;
   Image right = white_noise(kWidth, kHeight, 2);
   ASSERT_FALSE(pair.give(white_noise(kWidth, kHeight, 1), right).repeated);

@@ -105,7 +105,7 @@ struct Bend {
   }
 };
 
-TEST(WindowAdjuster, exactObservationsBringThePosesBack) {
+TEST(WindowAdjuster, exactObservationsRestoreThePoses) {
   Bend b;
   const Transform first = b.map.keyframe(b.map.order()[0]).T_left_world;
   b.disturb();
@@ -121,7 +121,7 @@ TEST(WindowAdjuster, exactObservationsBringThePosesBack) {
       << "the oldest keyframe holds the window";
 }
 
-TEST(WindowAdjuster, grossOutliersAreDroppedAndNothingElse) {
+TEST(WindowAdjuster, onlyGrossOutliersAreDropped) {
   Bend b;
   b.disturb();
   std::vector<MapPoint*> wrong;
@@ -148,7 +148,7 @@ TEST(WindowAdjuster, grossOutliersAreDroppedAndNothingElse) {
   EXPECT_LT(b.worst_pose_error(), 1e-6) << "once they are gone they leave nothing behind";
 }
 
-TEST(WindowAdjuster, candidatesDoNotMoveAnything) {
+TEST(WindowAdjuster, candidatesMoveNothing) {
   Bend b;
   MapPoint* lie = b.map.make_point();
   lie->stage = PointStage::candidate;
@@ -159,7 +159,7 @@ TEST(WindowAdjuster, candidatesDoNotMoveAnything) {
   EXPECT_EQ(lie->p_world, Vec3(0, 0, 10));
 }
 
-TEST(WindowAdjuster, oneKeyframeOrNoPointsChangeNothing) {
+TEST(WindowAdjuster, singleKeyframeOrNoPointsChangesNothing) {
   Bend b;
   b.map.clear();
   EXPECT_EQ(b.adjuster.adjust(b.map).observations, 0);
@@ -168,7 +168,7 @@ TEST(WindowAdjuster, oneKeyframeOrNoPointsChangeNothing) {
   EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, b.poses[1].t);
 }
 
-TEST(WindowAdjuster, unlinkedAnImageThatSawNothingKeepsItsPlaceBesideTheLeftOne) {
+TEST(WindowAdjuster, unlinkedImageWithoutPointsKeepsItsTransform) {
   Bend b;
   for (MapPoint& p : b.map.points())
     for (const std::uint8_t slot : b.map.order()) p.seen[slot].drop(1);
@@ -192,7 +192,7 @@ double turn_left(const Bend& b) {
 
 constexpr double kTurned = 2e-3;  // rad: a disparity of 1 px
 
-TEST(WindowAdjuster, aTurnOfACameraIsOneErrorOfAllPointsAndIsFound) {
+TEST(WindowAdjuster, extrinsicRotationErrorIsEstimated) {
   Bend b;
   b.options.extrinsic_rotation_sigma_rad = 0.05;
   const Vec3 axis = Vec3::UnitZ().cross(b.calibration.T_camera_left[1].t).normalized();
@@ -207,7 +207,7 @@ TEST(WindowAdjuster, aTurnOfACameraIsOneErrorOfAllPointsAndIsFound) {
   EXPECT_LT(b.worst_pose_error(), 0.01 * 2.0) << "of the 2 m driven";
 }
 
-TEST(WindowAdjuster, aCalibrationThatIsCertainIsHeld) {
+TEST(WindowAdjuster, certainCalibrationIsKeptFixed) {
   Bend b;
   const Vec3 axis = Vec3::UnitZ().cross(b.calibration.T_camera_left[1].t).normalized();
   b.calibration.T_camera_left[1].R = exp_so3(kTurned * axis) * b.calibration.T_camera_left[1].R;
@@ -224,7 +224,7 @@ TEST(WindowAdjuster, aCalibrationThatIsCertainIsHeld) {
   EXPECT_NEAR(turn_left(b), kTurned, 1e-12);
 }
 
-TEST(WindowAdjuster, allocatesNothing) {
+TEST(WindowAdjuster, adjustmentAllocatesNothing) {
   Bend b;
   b.disturb();
   const std::uint64_t before = AllocationGuard::runtime_allocations();

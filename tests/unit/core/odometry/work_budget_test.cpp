@@ -18,37 +18,37 @@ FrameWorkload effort_in(double usable_s) {
   return budget.plan(kKeyframes, kSteps);
 }
 
-TEST(WorkBudget, withoutABudgetAllIsDone) {
+TEST(WorkBudget, zeroBudgetMeansNoLimit) {
   WorkBudget budget;
   budget.add_points_time(1e9, {});
   budget.begin({});
   EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
 }
 
-TEST(WorkBudget, withTimeEnoughAllIsDone) { EXPECT_TRUE(effort_in(3010).whole()); }
+TEST(WorkBudget, sufficientTimeDropsNothing) { EXPECT_TRUE(effort_in(3010).whole()); }
 
-TEST(WorkBudget, pointsGoFirst) {
+TEST(WorkBudget, pointsAreReducedFirst) {
   const FrameWorkload e = effort_in(2601);
   EXPECT_EQ(e.points_percent, 60);
   EXPECT_EQ(e.window_keyframes, FrameWorkload::kAll);
   EXPECT_EQ(e.window_steps, FrameWorkload::kAll);
 }
 
-TEST(WorkBudget, thenTheWindowIsSmaller) {
+TEST(WorkBudget, windowIsReducedSecond) {
   const FrameWorkload e = effort_in(250 + 1401);  // a quarter of the points, seven keyframes
   EXPECT_EQ(e.points_percent, 25);
   EXPECT_EQ(e.window_keyframes, 7);
   EXPECT_EQ(e.window_steps, FrameWorkload::kAll);
 }
 
-TEST(WorkBudget, thenItsSolverHasFewerSteps) {
+TEST(WorkBudget, solverStepsAreReducedThird) {
   const FrameWorkload e = effort_in(250 + 321);  // two steps of four keyframes
   EXPECT_EQ(e.points_percent, 25);
   EXPECT_EQ(e.window_keyframes, 4);
   EXPECT_EQ(e.window_steps, 2);
 }
 
-TEST(WorkBudget, atLastThereIsNoWindowAndAQuarterOfThePointsStill) {
+TEST(WorkBudget, aQuarterOfThePointsAlwaysRemains) {
   for (const double usable_s : {300.0, 1.0}) {
     const FrameWorkload e = effort_in(usable_s);
     EXPECT_EQ(e.points_percent, 25);
@@ -57,7 +57,7 @@ TEST(WorkBudget, atLastThereIsNoWindowAndAQuarterOfThePointsStill) {
   }
 }
 
-TEST(WorkBudget, oneDearFrameIsForgotten) {
+TEST(WorkBudget, singleCostlyFrameIsForgotten) {
   WorkBudget budget;
   budget.add_points_time(1e9, {});
   for (int i = 0; i < 40; ++i) budget.add_points_time(1e3, {});  // 0.8 to the 40th is 1.3e-4
@@ -65,7 +65,7 @@ TEST(WorkBudget, oneDearFrameIsForgotten) {
   EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
 }
 
-TEST(WorkBudget, aWindowThatWasLeftOutForOneDearOneIsTriedAgain) {
+TEST(WorkBudget, omittedWindowIsTriedAgain) {
   WorkBudget budget;
   budget.add_window_time(1e6, kKeyframes, kSteps);
   int frames = 0;

@@ -26,7 +26,7 @@ int by_definition(const std::vector<std::uint8_t>& raw, int stride, int width, i
   return sum / 16;
 }
 
-TEST(Bayer, isItsDefinitionAtEverySizeAndWritesNothingElse) {
+TEST(Bayer, greyMatchesTheDefinitionAtEverySize) {
   Random random(3);
   for (const auto& [width, height] : {std::pair{2, 2},
                                       {3, 2},
@@ -52,7 +52,7 @@ TEST(Bayer, isItsDefinitionAtEverySizeAndWritesNothingElse) {
   }
 }
 
-TEST(Bayer, anEvenColourIsEvenGreyWhateverThePattern) {
+TEST(Bayer, uniformColourIsUniformGreyForEveryPattern) {
   constexpr int kWidth = 18, kHeight = 12, kRed = 240, kGreen = 96, kBlue = 12;
   constexpr std::array<std::array<int, 4>, 4> kPatterns{{{kRed, kGreen, kGreen, kBlue},
                                                          {kBlue, kGreen, kGreen, kRed},

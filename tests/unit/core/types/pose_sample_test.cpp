@@ -8,7 +8,7 @@
 namespace vergence {
 namespace {
 
-TEST(Intrinsics, equidistantIsDistortedEvenWithoutCoefficients) {
+TEST(Intrinsics, equidistantIsDistortedWithoutCoefficients) {
   Intrinsics k;
   EXPECT_FALSE(k.has_distortion());
   k.distortion[4] = 1e-3;

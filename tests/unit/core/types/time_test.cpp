@@ -18,7 +18,7 @@ static_assert(!Subtractable<Stamp, HostStamp>, "two clocks have no difference");
 static_assert(!std::convertible_to<std::int64_t, Stamp>);
 static_assert(!std::convertible_to<std::int64_t, Duration>);
 
-TEST(Duration, secondsRoundToTheNearestNanosecondOnBothSidesOfZero) {
+TEST(Duration, secondsRoundToTheNearestNanosecond) {
   EXPECT_EQ(Duration::seconds(0.049999872).ns(), 49'999'872);
   EXPECT_EQ(Duration::seconds(-0.049999872).ns(), -49'999'872);
   EXPECT_EQ(Duration::seconds(1.6e-9).ns(), 2);

@@ -7,7 +7,7 @@
 namespace vergence::iidc {
 namespace {
 
-TEST(Bandwidth, UnitsAreThoseTheBusManagerCounts) {
+TEST(Bandwidth, unitsAreThoseTheBusManagerCounts) {
   EXPECT_EQ(bandwidth_units(1280, BusSpeed::s400), 1292U);
   EXPECT_EQ(bandwidth_units(1476, BusSpeed::s400), 1488U);
   EXPECT_EQ(bandwidth_units(4608, BusSpeed::s800), 2310U);
@@ -16,7 +16,7 @@ TEST(Bandwidth, UnitsAreThoseTheBusManagerCounts) {
   EXPECT_EQ(bandwidth_units(1024, BusSpeed::s200), 2072U);
 }
 
-TEST(Bandwidth, TheLargestPacketForAShareFitsAndTheNextDoesNot) {
+TEST(Bandwidth, packetForUnitsIsTheLargestThatFits) {
   for (const BusSpeed speed : {BusSpeed::s100, BusSpeed::s200, BusSpeed::s400, BusSpeed::s800})
     for (unsigned units = 0; units <= kBandwidthUnits; units += 7) {
       const std::size_t packet = packet_for_units(units, speed);

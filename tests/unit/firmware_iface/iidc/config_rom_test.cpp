@@ -10,7 +10,7 @@
 namespace vergence::iidc {
 namespace {
 
-TEST(ConfigRom, SaysWhoTheCameraIsAndWhereItsRegistersAre) {
+TEST(ConfigRom, exampleRomGivesGuidModelAndRegisterBase) {
   const auto q = example_rom();
   ConfigRom rom;
   ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
@@ -19,7 +19,7 @@ TEST(ConfigRom, SaysWhoTheCameraIsAndWhereItsRegistersAre) {
   EXPECT_EQ(std::string_view(rom.model.data()), "Flea3");
 }
 
-TEST(ConfigRom, EveryTruncationGivesAStatusOrLosesTexts) {
+TEST(ConfigRom, truncatedRomIsRefusedOrLosesItsTexts) {
   const auto q = example_rom();
   for (std::size_t n = 0; n < q.size(); ++n) {
     ConfigRom rom;
@@ -34,7 +34,7 @@ TEST(ConfigRom, EveryTruncationGivesAStatusOrLosesTexts) {
   }
 }
 
-TEST(ConfigRom, WhatIsNoCameraIsNamed) {
+TEST(ConfigRom, otherDevicesAreRefusedByReason) {
   ConfigRom rom;
   auto q = example_rom();
   q[1] = 0;
@@ -56,7 +56,7 @@ TEST(ConfigRom, WhatIsNoCameraIsNamed) {
   EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_command_base);
 }
 
-TEST(ConfigRom, TextLeavesThatLieAreLeftOut) {
+TEST(ConfigRom, textLeafOfWrongLengthIsLeftOut) {
   ConfigRom rom;
   for (const std::uint32_t header : {0U, 0x0001'0000U, 0x0002'0000U, 0xFFFF'0000U, 0x0006'0000U}) {
     auto q = example_rom();
@@ -70,7 +70,7 @@ TEST(ConfigRom, TextLeavesThatLieAreLeftOut) {
   EXPECT_EQ(std::string_view(rom.model.data()), "?F??3");
 }
 
-TEST(ConfigRom, ALongTextEndsInItsRoom) {
+TEST(ConfigRom, longTextIsCutAndTerminated) {
   auto q = example_rom();
   q.resize(26 + 1 + 2 + 40, 0x4142'4344);
   q[26] = 42U << 16U;

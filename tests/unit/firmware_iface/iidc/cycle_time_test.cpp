@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-TEST(CycleTime, FieldsAndNanoseconds) {
+TEST(CycleTime, fieldsConvertToNanoseconds) {
   const CycleTime t = CycleTime::of(127U << 25U | 7999U << 12U | 3071U);
   EXPECT_EQ(t.seconds, 127U);
   EXPECT_EQ(t.cycle, 7999U);
@@ -19,7 +19,7 @@ TEST(CycleTime, FieldsAndNanoseconds) {
   EXPECT_FALSE(CycleTime::of(3072U).valid());
 }
 
-TEST(CycleTime, ThereAndBackWithinATick) {
+TEST(CycleTime, roundTripStaysWithinOneTick) {
   for (std::int64_t ns = 0; ns < kCycleTimeWrapNs; ns += 777'777'777) {
     const CycleTime t = CycleTime::at(ns);
     ASSERT_TRUE(t.valid());
@@ -28,7 +28,7 @@ TEST(CycleTime, ThereAndBackWithinATick) {
   }
 }
 
-TEST(CycleUnwrapper, CountsThroughTheWrap) {
+TEST(CycleUnwrapper, timeContinuesAcrossTheWrap) {
   CycleUnwrapper u;
   const std::int64_t host = 5'000 * kSecond;
   std::int64_t first = 0;
@@ -41,7 +41,7 @@ TEST(CycleUnwrapper, CountsThroughTheWrap) {
   }
 }
 
-TEST(CycleUnwrapper, APauseOfHoursIsMeasuredByTheHost) {
+TEST(CycleUnwrapper, hostTimeResolvesWrapsOfLongPauses) {
   CycleUnwrapper u;
   const std::int64_t t0 = u.unwrap(100 * kSecond, 0);
   const std::int64_t pause = 10'000 * kSecond;
@@ -50,7 +50,7 @@ TEST(CycleUnwrapper, APauseOfHoursIsMeasuredByTheHost) {
   EXPECT_EQ(u.unwrap((100 * kSecond + bus) % kCycleTimeWrapNs, pause) - t0, bus);
 }
 
-TEST(CycleUnwrapper, CamerasThatShareItAgreeWhicheverCameFirst) {
+TEST(CycleUnwrapper, sharedUnwrapperKeepsCamerasConsistent) {
   // The clocks are 64 s apart: alone, each camera's wrap would be a matter of luck.
   CycleUnwrapper u;
   const std::int64_t host = 1'000 * kSecond, bus = 127 * kSecond + 990'000'000;
@@ -61,7 +61,7 @@ TEST(CycleUnwrapper, CamerasThatShareItAgreeWhicheverCameFirst) {
   EXPECT_EQ(u.unwrap(bus, host + 60'000'000), a);  // an older stamp that arrives late
 }
 
-TEST(CycleUnwrapper, ARestartForgets) {
+TEST(CycleUnwrapper, restartForgetsCountedWraps) {
   CycleUnwrapper u;
   (void)u.unwrap(127 * kSecond, 0);
   EXPECT_EQ(u.unwrap(kSecond, 2 * kSecond), 129 * kSecond);

@@ -5,7 +5,7 @@
 namespace vergence::iidc {
 namespace {
 
-TEST(Features, RegistersStandWhereTheStandardPutsThem) {
+TEST(Features, registerOffsetsAreThoseOfIidc131) {
   EXPECT_EQ(reg::feature_value(Feature::shutter), 0x81CU);
   EXPECT_EQ(reg::feature_value(Feature::gain), 0x820U);
   EXPECT_EQ(reg::feature_value(Feature::frame_rate), 0x83CU);
@@ -15,14 +15,14 @@ TEST(Features, RegistersStandWhereTheStandardPutsThem) {
   EXPECT_EQ(reg::mode_inquiry(7), 0x19CU);
 }
 
-TEST(Features, AnInquiryIsTakenApart) {
+TEST(Features, inquiryBitsAreDecoded) {
   const FeatureInquiry q = FeatureInquiry::of(0xC600'0000);
   EXPECT_TRUE(q.present && q.absolute && q.on_off && q.automatic);
   EXPECT_FALSE(FeatureInquiry::of(0x4000'0000).on_off);
   EXPECT_FALSE(FeatureInquiry::of(0).present);
 }
 
-TEST(Features, AValueGoesThereAndBack) {
+TEST(Features, valueQuadletRoundTrips) {
   FeatureValue v;
   v.present = v.absolute = v.on = true;
   v.value = 0x123;
@@ -31,7 +31,7 @@ TEST(Features, AValueGoesThereAndBack) {
     EXPECT_EQ(FeatureValue::of(q).quadlet(), q);
 }
 
-TEST(Features, TriggerModesZeroAndFourteenAndTheirSources) {
+TEST(Features, triggerInquiryAndModeUseTheirBits) {
   // Present, readable, switchable, polarity, level, sources 0 and 1, software, modes 0, 14, 15.
   const TriggerInquiry t = TriggerInquiry::of(bit(31) | bit(27) | bit(26) | bit(25) | bit(24) |
                                               bit(23) | bit(22) | bit(16) | bit(15) | 3);
@@ -52,7 +52,7 @@ TEST(Features, TriggerModesZeroAndFourteenAndTheirSources) {
   EXPECT_EQ(m.quadlet(), 0x82E0'0000U);
 }
 
-TEST(Features, StrobeTimesKeepToTheirBits) {
+TEST(Features, strobeTimesAreCutToTwelveBits) {
   StrobeControl s;
   s.on = true;
   s.delay = 0x1ABC;
@@ -60,7 +60,7 @@ TEST(Features, StrobeTimesKeepToTheirBits) {
   EXPECT_EQ(s.quadlet(), 0x83AB'CDEFU);
 }
 
-TEST(Features, IsoChannelsInBothLayouts) {
+TEST(Features, isoChannelRoundTripsInBothLayouts) {
   EXPECT_EQ((IsoChannel{5, 2, false}.quadlet()), 0x5200'0000U);
   EXPECT_EQ((IsoChannel{33, 3, true}.quadlet()), 0x0000'A103U);
   const IsoChannel b = IsoChannel::of(0x0000'A103);

@@ -11,7 +11,7 @@ FixedMode find(unsigned format, unsigned mode) {
   return {};
 }
 
-TEST(Formats, SizesAndPacketsAreThoseOfTheStandard) {
+TEST(Formats, sizesAndPacketsAreThoseOfTheStandard) {
   struct Row {
     unsigned format, mode, width, height, rate_code;
     std::size_t packet;
@@ -30,7 +30,7 @@ TEST(Formats, SizesAndPacketsAreThoseOfTheStandard) {
   }
 }
 
-TEST(Formats, APacketOfAFixedModeIsWholeQuadletsAndFillsTheFrame) {
+TEST(Formats, fixedModePacketsDivideTheFrameInQuadlets) {
   for (const FixedMode& m : fixed_modes())
     for (unsigned code = 0; code < kRates; ++code) {
       const std::size_t packet = fixed_packet_bytes(m, code);
@@ -43,7 +43,7 @@ TEST(Formats, APacketOfAFixedModeIsWholeQuadletsAndFillsTheFrame) {
     }
 }
 
-TEST(Formats, Format7PacketsForARateAreTheSmallestThatReachIt) {
+TEST(Formats, format7PacketIsTheSmallestReachingTheRate) {
   // 307200 bytes: 1024 a packet is 300 packets and one idle cycle.
   EXPECT_NEAR(packet_rate(307200, 1024), 8000.0 / 301, 1e-12);
   for (const double rate : {1.0, 7.5, 10.0, 26.0, 30.0, 60.0, 100.0})
@@ -61,7 +61,7 @@ TEST(Formats, Format7PacketsForARateAreTheSmallestThatReachIt) {
   EXPECT_EQ(packet_for_rate(1280 * 960, 30, 4, 8192), 4640U);  // 265
 }
 
-TEST(Formats, NonsenseIsZeroNotUndefined) {
+TEST(Formats, invalidArgumentsGiveZero) {
   EXPECT_EQ(packet_for_rate(0, 30, 4, 4096), 0U);
   EXPECT_EQ(packet_for_rate(1000, 0, 4, 4096), 0U);
   EXPECT_EQ(packet_for_rate(1000, 30, 0, 4096), 0U);

@@ -7,7 +7,7 @@
 namespace vergence::iidc {
 namespace {
 
-TEST(FrameInfo, AllItemsStandInTheirOrderWithoutHoles) {
+TEST(FrameInfo, allItemsFollowInOrderWithoutGaps) {
   const FrameInfoLayout all = FrameInfoLayout::of(0x8000'03FF);
   EXPECT_EQ(all.size(), 40U);
   std::vector<std::uint8_t> image(64);
@@ -17,7 +17,7 @@ TEST(FrameInfo, AllItemsStandInTheirOrderWithoutHoles) {
   EXPECT_EQ(all.read(FrameInfoItem::region, image), 0x2425'2627U);
 }
 
-TEST(FrameInfo, OnlyStampAndCounterAreEightBytes) {
+TEST(FrameInfo, timeAndCounterTakeEightBytes) {
   const FrameInfoLayout two = FrameInfoLayout::of(0x8000'0041);
   EXPECT_EQ(two.size(), 8U);
   EXPECT_TRUE(two.has(FrameInfoItem::time));
@@ -27,14 +27,14 @@ TEST(FrameInfo, OnlyStampAndCounterAreEightBytes) {
   EXPECT_EQ(two.read(FrameInfoItem::counter, image), 0x1234'5678U);
 }
 
-TEST(FrameInfo, ACameraWithoutItHasNothing) {
+TEST(FrameInfo, absentFeatureOrItemsGiveNoLayout) {
   EXPECT_EQ(FrameInfoLayout::of(0).size(), 0U);
   EXPECT_EQ(FrameInfoLayout::of(0x41).size(), 0U);
   EXPECT_EQ(FrameInfoLayout::of(0x8000'0000).size(), 0U);
   EXPECT_EQ(FrameInfoLayout::of(0x8000'0040).size(), 4U);  // the counter alone
 }
 
-TEST(CounterUnwrapper, WidensThroughTheWrapFromZero) {
+TEST(CounterUnwrapper, countsFromZeroAcrossTheWrap) {
   CounterUnwrapper c;
   EXPECT_EQ(c.take(0xFFFF'FFFEU), 0U);
   EXPECT_EQ(c.step(0xFFFF'FFFFU), 1);
@@ -46,7 +46,7 @@ TEST(CounterUnwrapper, WidensThroughTheWrapFromZero) {
   EXPECT_EQ(c.take(1), 6U);
 }
 
-TEST(FrameInfo, EveryFrameInfoRegisterGivesALayoutThatFits) {
+TEST(FrameInfo, everyRegisterValueGivesAFittingLayout) {
   const std::vector<std::uint8_t> image(40, 0xFF);
   for (std::uint32_t q = 0; q < 4096; ++q)
     for (const std::uint32_t present : {0U, kFrameInfoPresent}) {

@@ -21,7 +21,7 @@ Sentence parsed(const std::string& body) {
   return s;
 }
 
-TEST(Nmea, ggaHasTimePlaceHeightsAndQuality) {
+TEST(Nmea, ggaGivesTimePositionHeightsAndQuality) {
   const Sentence s =
       parsed("GNGGA,012345.250,2729.85000,S,15300.82200,E,4,17,0.62,20.125,M,39.5,M,1.0,0000");
   EXPECT_EQ(s.type, Type::gga);
@@ -36,7 +36,7 @@ TEST(Nmea, ggaHasTimePlaceHeightsAndQuality) {
   EXPECT_EQ(s.hdop, 0.62);
 }
 
-TEST(Nmea, rmcHasDateSpeedAndCourse) {
+TEST(Nmea, rmcGivesDateSpeedAndCourse) {
   const Sentence s = parsed("GPRMC,235959,A,2729.85,S,15300.822,W,36.0,270.5,290224,,,A");
   EXPECT_EQ(s.type, Type::rmc);
   EXPECT_TRUE(s.valid);
@@ -48,7 +48,7 @@ TEST(Nmea, rmcHasDateSpeedAndCourse) {
   EXPECT_EQ(parsed("GPRMC,,V,,,,,,,311299,,,N").days, 10956);  // of the century before
 }
 
-TEST(Nmea, headingCourseAndSigmas) {
+TEST(Nmea, hdtVtgAndGstGiveTheirFields) {
   EXPECT_EQ(parsed("HEHDT,123.4,T").heading_deg, 123.4);
   EXPECT_EQ(parsed("GNVTG,10.5,T,,M,1.0,N,36.0,K,A").course_deg, 10.5);
   EXPECT_NEAR(parsed("GNVTG,10.5,T,,M,1.0,N,36.0,K,A").speed.value(), 10.0, 1e-12);
@@ -56,7 +56,7 @@ TEST(Nmea, headingCourseAndSigmas) {
 }
 
 // Absent means absent: no field is made up of nonsense.
-TEST(Nmea, nonsenseInAFieldIsAnAbsentField) {
+TEST(Nmea, malformedFieldsAreAbsent) {
   for (const char* field :
        {"", "x", "1e5", "nan", "inf", "--1", "1.2.3", "-", ".", "+5", "99999999999999999999999"})
     EXPECT_FALSE(parsed(std::string("HEHDT,") + field + ",T").heading_deg) << field;
@@ -73,7 +73,7 @@ TEST(Nmea, nonsenseInAFieldIsAnAbsentField) {
     EXPECT_FALSE(parsed("GPRMC,,V,,,,,,," + std::string(day)).days) << day;
 }
 
-TEST(Nmea, checksumsAreRequired) {
+TEST(Nmea, missingOrWrongChecksumIsRefused) {
   Sentence s;
   EXPECT_EQ(parse("HEHDT,1,T", &s), Status::no_checksum);
   EXPECT_EQ(parse("HEHDT,1,T*00", &s), Status::checksum_wrong);

@@ -47,7 +47,7 @@ TEST(TriggerCrc, isThatOfIeee8023) {
   EXPECT_EQ(trigger_crc32(nullptr, 0), 0U);
 }
 
-TEST(TriggerFrames, everyPayloadLengthComesBackAndHoldsNoZeroInside) {
+TEST(TriggerFrames, everyPayloadLengthRoundTripsWithoutZeros) {
   for (std::size_t n = 0; n <= trigger_max_payload; ++n)
     for (const Bytes& payload : {Bytes(n, 0), Bytes(n, 0xFF), noise(n, 7)}) {
       const Bytes frame = framed(0x90, static_cast<std::uint8_t>(n), payload);
@@ -62,14 +62,14 @@ TEST(TriggerFrames, everyPayloadLengthComesBackAndHoldsNoZeroInside) {
     }
 }
 
-TEST(TriggerFrames, aPayloadThatIsTooLongIsRefused) {
+TEST(TriggerFrames, tooLongPayloadIsRefused) {
   const Bytes payload(trigger_max_payload + 1);
   Bytes out(200, 0x55);
   EXPECT_EQ(trigger_write_frame(1, 0, payload.data(), payload.size(), out.data()), 0U);
   EXPECT_EQ(out, Bytes(200, 0x55));
 }
 
-TEST(TriggerFrames, noSingleDamagedByteGetsThrough) {
+TEST(TriggerFrames, anySingleDamagedByteIsRefused) {
   const Bytes good = framed(trigger_pong, 9, noise(24, 3));
   for (std::size_t i = 0; i < good.size(); ++i)
     for (const unsigned flip : {0x01U, 0x80U, 0xFFU}) {
@@ -80,7 +80,7 @@ TEST(TriggerFrames, noSingleDamagedByteGetsThrough) {
     }
 }
 
-TEST(TriggerFrames, afterGarbageAndACutFrameTheNextIsFoundAndEachLossIsNamed) {
+TEST(TriggerFrames, frameAfterGarbageIsFoundAndLossesCounted) {
   Bytes bytes = noise(300, 5);  // longer than a frame, zeros inside
   bytes.push_back(0);
   const Bytes cut = framed(trigger_event, 1, noise(50, 6));
@@ -105,14 +105,14 @@ Bytes laid(void (*put)(const Message*, std::uint8_t*), const Message& message) {
   return bytes;
 }
 
-TEST(TriggerFrames, idleZerosAreNothing) {
+TEST(TriggerFrames, idleZerosAreIgnored) {
   const Decoded all = decode_all(Bytes(100, 0));
   EXPECT_TRUE(all.frames.empty());
   EXPECT_EQ(all.decoder.bad_coding + all.decoder.bad_length + all.decoder.bad_crc, 0U);
 }
 
 /// The bytes of firmware_iface/trigger/README.md, worked out by hand from its tables.
-TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
+TEST(TriggerPayloads, layoutsAreThoseOfTheReadme) {
   EXPECT_EQ((laid<trigger_info_payload_size, TriggerInfo>(
                 trigger_put_info, {1,
                                    2,
@@ -170,7 +170,7 @@ void expect_bijective(Get get, Put put) {
   EXPECT_FALSE(get(bytes.data(), kSize + 1, &m));
 }
 
-TEST(TriggerPayloads, everyLayoutReadsAndWritesEachOfItsBytesOnce) {
+TEST(TriggerPayloads, everyByteIsReadAndWrittenOnce) {
   expect_bijective<TriggerInfo, trigger_info_payload_size>(trigger_get_info, trigger_put_info);
   expect_bijective<TriggerConfig, trigger_config_payload_size>(trigger_get_config,
                                                                trigger_put_config);

@@ -11,7 +11,7 @@ namespace {
 
 using test::PvtBytes;
 
-TEST(Ubx, navPvtIsReadInSiUnits) {
+TEST(Ubx, navPvtIsDecodedInSiUnits) {
   Pvt p;
   ASSERT_TRUE(decode_pvt(PvtBytes().bytes, &p));
   EXPECT_EQ(p.utc_ns, 1709169825'000'000'000);  // date -u -d '2024-02-29 01:23:45' +%s
@@ -29,7 +29,7 @@ TEST(Ubx, navPvtIsReadInSiUnits) {
   EXPECT_FALSE(p.heading_deg);
 }
 
-TEST(Ubx, nanosecondsMayBeNegative) {
+TEST(Ubx, negativeNanosecondsLowerTheTime) {
   PvtBytes b;
   b.put(16, 4, -250'000'000);
   Pvt p;
@@ -37,7 +37,7 @@ TEST(Ubx, nanosecondsMayBeNegative) {
   EXPECT_EQ(p.utc_ns, 1709169824'750'000'000);
 }
 
-TEST(Ubx, whatIsNotValidIsAbsentOrRefused) {
+TEST(Ubx, invalidFieldsAreAbsentOrRefused) {
   Pvt p;
   PvtBytes b;
   b.put(11, 1, 3);  // not fully resolved
@@ -64,7 +64,7 @@ TEST(Ubx, whatIsNotValidIsAbsentOrRefused) {
   EXPECT_FALSE(decode_pvt(b.bytes, &p));
 }
 
-TEST(Ubx, aFrameWithinARefusedOneIsFound) {
+TEST(Ubx, frameInsideARefusedFrameIsFound) {
   const std::string good = PvtBytes().frame();
   std::string bad = good;
   bad[20] = static_cast<char>(bad[20] ^ 1);

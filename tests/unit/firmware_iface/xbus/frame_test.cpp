@@ -60,7 +60,7 @@ Bytes noise(std::size_t n, std::uint32_t seed) {
   return bytes;
 }
 
-TEST(WriteFrame, readsBackAtEveryLengthAndExtendsOnlyFrom255) {
+TEST(WriteFrame, roundTripsAndExtendsLengthFrom255) {
   for (const std::size_t length : {0U, 1U, 253U, 254U, 255U, 256U, 1000U, 2047U, 2048U}) {
     Bytes payload(length);
     std::iota(payload.begin(), payload.end(), std::uint8_t{0xF0});
@@ -74,7 +74,7 @@ TEST(WriteFrame, readsBackAtEveryLengthAndExtendsOnlyFrom255) {
   }
 }
 
-TEST(WriteFrame, refusesWhatDoesNotFitAndLeavesTheOutputAlone) {
+TEST(WriteFrame, refusesWhatDoesNotFitUntouched) {
   const Bytes payload(2049);
   Bytes out(3000, 0x55);
   EXPECT_EQ(write_frame({kBusMaster, 0x36, payload}, out).status, WriteStatus::payload_too_long);
@@ -84,7 +84,7 @@ TEST(WriteFrame, refusesWhatDoesNotFitAndLeavesTheOutputAlone) {
   EXPECT_EQ(out, Bytes(3000, 0x55));
 }
 
-TEST(ParseFrame, namesWhatIsWrong) {
+TEST(ParseFrame, namesTheFault) {
   const Bytes good = from_hex("FA FF 01 04 00 50 01 23 88");
   for (std::size_t n = 0; n < good.size(); ++n)
     EXPECT_EQ(parse_frame(std::span(good).first(n)).status, FrameStatus::incomplete) << n;
@@ -102,7 +102,7 @@ TEST(ParseFrame, namesWhatIsWrong) {
   EXPECT_EQ(parse_frame(from_hex("FA 01 30 00 CF")).message.bus, kBusFirst);
 }
 
-TEST(FrameStream, findsTheSameMessagesHoweverTheBytesArrive) {
+TEST(FrameStream, messagesDoNotDependOnChunkSizes) {
   const Bytes bytes = joined({from_hex("12 FA 00 36"), frame(0x31, {}), frame(0x36, noise(2048, 3)),
                               from_hex("FA FA FF"), frame(0x42, {0x21}), frame(0x36, noise(300, 4)),
                               from_hex("00")});
@@ -117,7 +117,7 @@ TEST(FrameStream, findsTheSameMessagesHoweverTheBytesArrive) {
   }
 }
 
-TEST(FrameStream, resynchronisesOneByteOnSoThatNoMessageHidesInAFalseFrame) {
+TEST(FrameStream, messagesInsideAFalseFrameAreFound) {
   // A false preamble whose claimed length covers the two real messages behind it.
   const Bytes bytes =
       joined({from_hex("FA FF 36 09"), frame(0x31, {}), frame(0x31, {}), noise(1, 1)});
@@ -127,7 +127,7 @@ TEST(FrameStream, resynchronisesOneByteOnSoThatNoMessageHidesInAFalseFrame) {
   EXPECT_EQ(stream.counters().checksum_wrong, 1U);
 }
 
-TEST(FrameStream, aPreambleInsideAPayloadIsPayload) {
+TEST(FrameStream, preambleInsideAPayloadIsPayload) {
   const Bytes bytes = from_hex("FA FF 36 07 10 60 04 FA FF 36 00 21");  // SampleTimeFine = FAFF3600
   FrameStream stream;
   const std::vector<Found> found = find_all(stream, bytes, 1);
@@ -138,7 +138,7 @@ TEST(FrameStream, aPreambleInsideAPayloadIsPayload) {
   EXPECT_TRUE(find_all(cut, std::span(bytes).subspan(1), 1).empty());
 }
 
-TEST(FrameStream, everyByteIsInAMessageOrCountedOrWaits) {
+TEST(FrameStream, everyByteIsCountedOnce) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     Bytes bytes = noise(5000, seed);
     for (std::size_t i = 0; i + 1 < bytes.size(); i += 97) {  // many half-credible beginnings
@@ -153,7 +153,7 @@ TEST(FrameStream, everyByteIsInAMessageOrCountedOrWaits) {
   }
 }
 
-TEST(FrameStream, abandonGivesUpALongClaimAndLooksAtWhatStandsBehind) {
+TEST(FrameStream, abandonFindsTheMessageBehindALongClaim) {
   FrameStream stream;
   const Bytes bytes = joined({from_hex("FA FF 36 FF 08 00"), frame(0x31, {})});
   EXPECT_TRUE(find_all(stream, bytes, 4).empty()) << "2048 bytes may still come";
@@ -168,7 +168,7 @@ TEST(FrameStream, abandonGivesUpALongClaimAndLooksAtWhatStandsBehind) {
   EXPECT_EQ(stream.counters().abandoned, 1U) << "nothing was waited for";
 }
 
-TEST(FrameStream, resetForgetsWhatWaits) {
+TEST(FrameStream, resetCountsWaitingBytesAsGarbage) {
   FrameStream stream;
   EXPECT_TRUE(find_all(stream, from_hex("FA FF 36 20 01 02"), 2).empty());
   stream.reset();
@@ -177,7 +177,7 @@ TEST(FrameStream, resetForgetsWhatWaits) {
   EXPECT_EQ(stream.counters().garbage_bytes, 6U);
 }
 
-TEST(FrameStream, whenFullTakesWhatFitsAndLosesNothing) {
+TEST(FrameStream, fullStreamTakesWhatFitsAndLosesNothing) {
   Bytes bytes;
   for (int i = 0; i < 40; ++i) {
     const Bytes one = frame(0x36, noise(2000, static_cast<std::uint32_t>(i) + 1));

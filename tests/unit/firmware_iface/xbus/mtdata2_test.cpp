@@ -23,7 +23,7 @@ Mtdata2 decoded(const std::vector<std::uint8_t>& bytes) {
   return out;
 }
 
-TEST(Numbers, fixedPointAsOnTheWire) {
+TEST(Numbers, fixedPointAndFloatAreReadFromTheWire) {
   EXPECT_EQ(read_fp16_32(from_hex("80 00 00 00 FF FF")), -0.5);
   EXPECT_EQ(read_fp16_32(from_hex("00 00 00 00 00 01")), 1.0);
   EXPECT_EQ(read_fp16_32(from_hex("00 00 00 00 80 00")), -32768.0);
@@ -35,7 +35,7 @@ TEST(Numbers, fixedPointAsOnTheWire) {
   EXPECT_EQ(read_i32(from_hex("FF FF FF F4")), -12);
 }
 
-TEST(Mtdata2, keepsPositionInSixteenDotThirtyTwoExactly) {
+TEST(Mtdata2, positionInFp1632IsDecodedExactly) {
   const Mtdata2 m =
       decoded(from_hex("FA FF 36 53 10 20 02 FF FF 10 60 04 33 7F 97 9C 20 10 10 3F 35 04 F3 00 00 "
                        "00 00 00 00 00 00 3F 35 04 F3 50 42 0C 86 01 47 28 "
@@ -54,7 +54,7 @@ TEST(Mtdata2, keepsPositionInSixteenDotThirtyTwoExactly) {
   EXPECT_EQ(m.status_word, 0x01800047U);
 }
 
-TEST(Mtdata2, readsFormatAndFrameOfTheId) {
+TEST(Mtdata2, packetIdGivesFormatAndFrame) {
   const Mtdata2 m = decoded(from_hex(
       "FA FF 36 13 20 15 10 00 10 00 00 00 00 00 00 00 00 00 00 FF F8 00 00 6C"));  // 12.20, NED
   ASSERT_TRUE(m.quaternion);
@@ -62,7 +62,7 @@ TEST(Mtdata2, readsFormatAndFrameOfTheId) {
   EXPECT_EQ(m.orientation_frame, LocalFrame::ned);
 }
 
-TEST(Mtdata2, decodesAReceiversFix) {
+TEST(Mtdata2, gnssFixOfTheReceiverIsDecoded) {
   const Mtdata2 m =
       decoded(from_hex("FA FF 36 7C 70 10 5E 02 F5 C9 2A 07 E3 01 14 0D 2F 18 37 00 00 00 05 0E E3 "
                        "2A 24 03 01 0B 00 07 15 22 E8 22 61 2F "
@@ -87,7 +87,7 @@ TEST(Mtdata2, decodesAReceiversFix) {
   EXPECT_EQ(m.packet_counter, 43416);
 }
 
-TEST(Mtdata2, tornPayloadsAreRefusedWhole) {
+TEST(Mtdata2, truncatedPayloadsAreRefusedWhole) {
   const std::vector<std::uint8_t> payload = from_hex("10 20 02 FF FF 10 60 04 33 7F 97 9C");
   Mtdata2 out;
   out.packet_counter = 77;
@@ -105,7 +105,7 @@ TEST(Mtdata2, unknownPacketsAreSkipped) {
   EXPECT_EQ(out.packet_counter, 7);
 }
 
-TEST(Mtdata2, knownPacketsOfImpossibleSizeOrValueAreRefused) {
+TEST(Mtdata2, packetsOfWrongSizeOrValueAreRefused) {
   struct Case {
     const char* bytes;
     const char* what;
@@ -131,20 +131,20 @@ TEST(Mtdata2, knownPacketsOfImpossibleSizeOrValueAreRefused) {
   }
 }
 
-TEST(Mtdata2, aStatusByteIsOne) {
+TEST(Mtdata2, statusByteIsDecoded) {
   Mtdata2 out;
   ASSERT_TRUE(decode_mtdata2(from_hex("E0 10 01 07"), &out));
   EXPECT_EQ(out.status_byte, 0x07);
 }
 
-TEST(Mtdata2, aListOfSatellitesIsAReceiversMessage) {
+TEST(Mtdata2, satelliteListIsDecoded) {
   Mtdata2 out;
   ASSERT_TRUE(
       decode_mtdata2(from_hex("70 20 10 02 F5 C9 2A 02 00 00 00 00 05 2B 07 06 0A 1F 0F"), &out));
   EXPECT_TRUE(out.satellites);
 }
 
-TEST(Mtdata2, thePacketsLengthOutranksItsFormatBits) {
+TEST(Mtdata2, packetLengthOverridesFormatBits) {
   Mtdata2 out;
   ASSERT_TRUE(decode_mtdata2(from_hex("50 23 04 42 13 40 00"), &out));
   EXPECT_EQ(out.altitude_ellipsoid_m, 36.8125);

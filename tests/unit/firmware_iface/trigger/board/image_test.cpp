@@ -95,9 +95,11 @@ class QemuBoard {
 struct TriggerBoardImage : testing::Test {
   void SetUp() override {
     if (std::string(VERGENCE_BOARD_IMAGE).empty())
-      GTEST_SKIP() << "no image of the trigger board: gcc-arm-none-eabi was not there to build it";
+      GTEST_SKIP() << "needs the trigger board's image: sudo apt install gcc-arm-none-eabi, then "
+                      "configure again";
     if (std::string(VERGENCE_QEMU_ARM).empty())
-      GTEST_SKIP() << "no qemu-system-arm to run the trigger board's image in";
+      GTEST_SKIP()
+          << "needs qemu-system-arm: sudo apt install qemu-system-arm, then configure again";
   }
   static Bytes config(std::uint32_t millihertz, std::uint32_t dither_us = 0) {
     TriggerConfig c{};
@@ -123,7 +125,7 @@ struct TriggerBoardImage : testing::Test {
   }
 };
 
-TEST_F(TriggerBoardImage, saysWhatItIsAndRefusesWhatItIsNot) {
+TEST_F(TriggerBoardImage, answersHelloAndRefusesRateZero) {
   QemuBoard board;
   const TriggerFrame hello = board.ask(trigger_hello, {trigger_protocol_version});
   TriggerInfo info{};
@@ -144,7 +146,7 @@ TEST_F(TriggerBoardImage, saysWhatItIsAndRefusesWhatItIsNot) {
             trigger_crc32(good.data(), good.size()));
 }
 
-TEST_F(TriggerBoardImage, pulsesAreNumberedWithoutGapThroughStopAndStart) {
+TEST_F(TriggerBoardImage, pulseNumbersContinueAcrossStopAndStart) {
   QemuBoard board;
   (void)board.ask(trigger_config, config(20'000, 5'000));
   const TriggerStatus started = status(board.ask(trigger_start));

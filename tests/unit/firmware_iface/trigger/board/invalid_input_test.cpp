@@ -8,7 +8,7 @@ namespace {
 
 using Bytes = VirtualBoard::Bytes;
 
-TEST(BoardInvalidInput, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThenItIsAnswered) {
+TEST(BoardInvalidInput, stalledHostLosesCountedEventsOnly) {
   VirtualBoard b;
   b.start(100'000);
   b.run_for_us(20'000);
@@ -27,7 +27,7 @@ TEST(BoardInvalidInput, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThe
   EXPECT_GT(s.pulses, 190U) << "pulses go on";
 }
 
-TEST(BoardInvalidInput, aFloodOfPingsDropsAnswersAndNothingElse) {
+TEST(BoardInvalidInput, pingFloodDropsOnlyItsAnswers) {
   VirtualBoard b;
   b.deaf = true;
   for (int i = 0; i < 1000; ++i) b.send(trigger_ping, {1, 0, 0, 0});
@@ -38,7 +38,7 @@ TEST(BoardInvalidInput, aFloodOfPingsDropsAnswersAndNothingElse) {
   EXPECT_EQ(b.board.outbox.dropped, 1000U - (outbox_capacity - 1));
 }
 
-TEST(BoardInvalidInput, edgesLostBeforeTheCoreAreInTheStatus) {
+TEST(BoardInvalidInput, lostEdgesAreCountedInTheStatus) {
   VirtualBoard b;
   board_edges_lost(&b.board, 17);
   b.run_for_us(1'100'000);

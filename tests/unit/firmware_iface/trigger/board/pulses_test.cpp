@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint64_t kUs = VirtualBoard::kHz / 1'000'000;
 
-TEST(BoardSchedule, aMillionPulsesAreExactToACount) {
+TEST(BoardSchedule, millionPulsesAreExactToOneCount) {
   for (const std::uint32_t millihertz : {29'970U, 30'000U, 7U, 999'983U, 33'333U}) {
     PulseSchedule s{};
     schedule_set(&s, VirtualBoard::kHz, millihertz, 0);
@@ -40,13 +40,13 @@ TEST(BoardSchedule, variedIntervalsFollowTheSharedBits) {
   }
 }
 
-TEST(BoardSchedule, whatIsVariedByIsRoundedToACount) {
+TEST(BoardSchedule, variationIsRoundedToOneCount) {
   PulseSchedule s{};
   schedule_set(&s, 1'500'000, 1000, 1);
   EXPECT_EQ(s.vary, 2U);
 }
 
-TEST(BoardPulses, goOutOnTheirGridWithTheirWidthAndLines) {
+TEST(BoardPulses, keepGridWidthAndLines) {
   VirtualBoard b;
   TriggerConfig c = VirtualBoard::config(29'970);
   c.lines = 0x5;
@@ -75,7 +75,7 @@ TEST(BoardPulses, goOutOnTheirGridWithTheirWidthAndLines) {
         kUs / 2 + 1);
 }
 
-TEST(BoardPulses, oneThatTheHardwareRefusedComesLateAndSaysSo) {
+TEST(BoardPulses, refusedPulseIsSentLateAndFlagged) {
   VirtualBoard b;
   b.start(100'000);
   ASSERT_TRUE(b.armed);
@@ -94,7 +94,7 @@ TEST(BoardPulses, oneThatTheHardwareRefusedComesLateAndSaysSo) {
   EXPECT_EQ(events[2].tick - events[1].tick, 10'000U) << "the others stay on the grid";
 }
 
-TEST(BoardPulses, aBoardThatWasHeldUpLeavesNumbersOutInsteadOfCatchingUp) {
+TEST(BoardPulses, delayedBoardSkipsNumbersToKeepTheGrid) {
   VirtualBoard b;
   b.start(100'000);
   b.run_for_us(15'000);
@@ -115,7 +115,7 @@ TEST(BoardPulses, aBoardThatWasHeldUpLeavesNumbersOutInsteadOfCatchingUp) {
   EXPECT_EQ((b.made[1].count - armed_count) % (10'000 * kUs), 0U);
 }
 
-TEST(BoardPulses, areArmedInTimeButNeverLongAhead) {
+TEST(BoardPulses, areArmedAtMostAQuarterSecondAhead) {
   VirtualBoard b;
   b.configure(VirtualBoard::config(100));  // one in ten seconds
   b.send(trigger_start);
@@ -151,7 +151,7 @@ struct WithFeedback : testing::Test {
   }
 };
 
-TEST_F(WithFeedback, exposuresOfAllLinesStandInTheEventThatComesWhenTheyAreOver) {
+TEST_F(WithFeedback, eventFollowsAllExposuresAndCarriesThem) {
   b.on_pulse = [this](const BoardPulse& p) {
     exposure(0, p.count, 12, 8012);
     exposure(1, p.count, 14, 4000, true);
@@ -173,7 +173,7 @@ TEST_F(WithFeedback, exposuresOfAllLinesStandInTheEventThatComesWhenTheyAreOver)
   }
 }
 
-TEST_F(WithFeedback, aMissedTriggerIsAnEventWithoutExposureAtTheNextPulse) {
+TEST_F(WithFeedback, missedTriggerGivesEventWithoutExposure) {
   b.on_pulse = [this](const BoardPulse& p) {
     if (p.number != 3) exposure(0, p.count, 10, 5000);
     exposure(1, p.count, 10, 5000);
@@ -189,7 +189,7 @@ TEST_F(WithFeedback, aMissedTriggerIsAnEventWithoutExposureAtTheNextPulse) {
   }
 }
 
-TEST_F(WithFeedback, anExposureThatOutlastsTheIntervalHasNoEndAndSpoilsNoOther) {
+TEST_F(WithFeedback, exposureBeyondTheIntervalHasNoEnd) {
   b.on_pulse = [this](const BoardPulse& p) {
     if (p.number % 2 == 0)
       exposure(0, p.count, 10, 14'000);  // a camera that ignores every other pulse
@@ -207,7 +207,7 @@ TEST_F(WithFeedback, anExposureThatOutlastsTheIntervalHasNoEndAndSpoilsNoOther) 
   }
 }
 
-TEST_F(WithFeedback, theLastEventComesWithoutAnotherPulse) {
+TEST_F(WithFeedback, lastEventIsSentAfterStop) {
   begin();
   b.run_for_us(2'000);
   b.send(trigger_stop);
@@ -218,7 +218,7 @@ TEST_F(WithFeedback, theLastEventComesWithoutAnotherPulse) {
   EXPECT_EQ(events[0].exposure[0].start_us, TRIGGER_NOT_SEEN);
 }
 
-TEST_F(WithFeedback, ofABouncingLineTheFirstStartAndTheFirstEndCount) {
+TEST_F(WithFeedback, bouncingLineCountsFirstStartAndFirstEnd) {
   b.on_pulse = [this](const BoardPulse& p) {
     b.edge_at(p.count + 3 * kUs, input(0), false);
     for (const std::uint64_t us : {10U, 20U, 5000U, 5010U})
@@ -235,7 +235,7 @@ TEST_F(WithFeedback, ofABouncingLineTheFirstStartAndTheFirstEndCount) {
   }
 }
 
-TEST_F(WithFeedback, anEdgeOlderThanItsPulseIsNoneOfIt) {
+TEST_F(WithFeedback, edgeBeforeItsPulseIsIgnored) {
   b.on_pulse = nullptr;
   begin();
   b.run_for_us(2'000);
@@ -251,7 +251,7 @@ TEST_F(WithFeedback, anEdgeOlderThanItsPulseIsNoneOfIt) {
   EXPECT_EQ(events[0].exposure[0].start_us, 3000);
 }
 
-TEST_F(WithFeedback, edgesWhileNobodyAskedAreNothing) {
+TEST_F(WithFeedback, edgesBeforeConfigurationAreIgnored) {
   b.edge_at(b.now + 1000, input(0), true);
   b.edge_at(b.now + 2000, input(1), false);
   b.edge_at(b.now + 3000, board_input_pps, true);
@@ -264,7 +264,7 @@ TEST_F(WithFeedback, edgesWhileNobodyAskedAreNothing) {
   EXPECT_EQ(b.status().pps_age_ms, 0xFFFFFFFFU);
 }
 
-TEST(BoardInputs, insEdgesOfTheAskedKindAreCountedAndStamped) {
+TEST(BoardInputs, configuredInsEdgesAreCountedAndStamped) {
   VirtualBoard b;
   TriggerConfig c = VirtualBoard::config(100'000);
   c.ins_edge = trigger_edge_falling;

@@ -9,7 +9,7 @@
 namespace vergence {
 namespace {
 
-TEST(BoardRecords, aFullRingDropsTheNewestAndCounts) {
+TEST(BoardRecords, fullRingDropsTheNewestAndCounts) {
   auto ring = std::make_unique<RecordRing>();
   for (std::uint32_t i = 0; i < record_ring_capacity + 5; ++i)
     record_push(ring.get(), {i, 1, true, false});
@@ -22,7 +22,7 @@ TEST(BoardRecords, aFullRingDropsTheNewestAndCounts) {
   EXPECT_FALSE(record_pop(ring.get(), &record));
 }
 
-TEST(BoardRecords, oneWritesWhileAnotherReadsAndNothingIsTornOrLostUncounted) {
+TEST(BoardRecords, concurrentReadTearsNothingAndCountsLosses) {
   auto ring = std::make_unique<RecordRing>();
   constexpr std::uint32_t kAll = 200'000;
   std::jthread producer([&ring] {

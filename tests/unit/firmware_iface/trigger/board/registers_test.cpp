@@ -63,7 +63,8 @@ struct BoardPort : testing::Test {
   void SetUp() override {
     if (!mapped)
       GTEST_SKIP()
-          << "something else of this process lives at 0x40000000, where the board's registers are";
+          << "needs 0x40000000 to 0x40030000, where the board's registers are, unmapped in "
+             "this process: run the test again (the address layout is random)";
     std::memset(reinterpret_cast<void*>(kBegin), 0, kSize);  // NOLINT(performance-no-int-to-ptr)
     StampRecord record{};
     while (hal_stamped(&record)) {
@@ -98,7 +99,7 @@ struct BoardPort : testing::Test {
   static inline bool mapped = false;
 };
 
-TEST_F(BoardPort, countersRunInStepAndCapturesAreWiredInPairs) {
+TEST_F(BoardPort, startSynchronisesTimersAndPairsCaptures) {
   EXPECT_EQ(at(kTim2, arr), 0xFFFFFFFFU);
   EXPECT_EQ(at(kTim2, psc), 0U);
   EXPECT_EQ(at(kTim2, cr2), 0x10U) << "MMS 001: enable is the trigger";
@@ -119,7 +120,7 @@ TEST_F(BoardPort, countersRunInStepAndCapturesAreWiredInPairs) {
   EXPECT_EQ(at(kGpiob, moder) & 0xF00000U, 0U);
 }
 
-TEST_F(BoardPort, aConfigurationSetsPolaritiesBeforePins) {
+TEST_F(BoardPort, configurationSetsPolaritiesAndPins) {
   configure();
   EXPECT_EQ(at(kTim2, ccer), 0x301U) << "CC1E; CC3E, CC3P";
   EXPECT_EQ(at(kTim2, ccmr1), 0x4040U) << "all forced inactive";
@@ -144,7 +145,7 @@ TEST_F(BoardPort, aConfigurationSetsPolaritiesBeforePins) {
   EXPECT_EQ(at(kExti, imr), 0U);
 }
 
-TEST_F(BoardPort, theCompareUnitMakesBothEdgesOfAllLinesAtOneCount) {
+TEST_F(BoardPort, compareUnitMakesBothEdgesOfAllLines) {
   configure();
   at(kTim2, cnt) = 1000;
   ASSERT_TRUE(hal_arm(11'000, 500, 0x5));
@@ -178,7 +179,7 @@ TEST_F(BoardPort, theCompareUnitMakesBothEdgesOfAllLinesAtOneCount) {
   EXPECT_TRUE(hal_arm(20'000, 500, 0x5));
 }
 
-TEST_F(BoardPort, anInterruptThatCameAfterTheWholePulseEndsIt) {
+TEST_F(BoardPort, interruptAfterThePulseEndsIt) {
   configure();
   ASSERT_TRUE(hal_arm(11'000, 500, 0x4));
   EXPECT_EQ(at(kTim2, dier), 8U);
@@ -190,7 +191,7 @@ TEST_F(BoardPort, anInterruptThatCameAfterTheWholePulseEndsIt) {
   EXPECT_EQ(at(kTim2, dier), 0U);
 }
 
-TEST_F(BoardPort, nothingIsArmedOrTakenBackAtTheLastMoment) {
+TEST_F(BoardPort, armAndDisarmAreRefusedTooNearTheEdge) {
   configure();
   at(kTim2, cnt) = 0xFFFFFF00;
   EXPECT_FALSE(hal_arm(0x00000080, 500, 0x1)) << "384 counts away, across the counter's wrap";
@@ -208,7 +209,7 @@ TEST_F(BoardPort, nothingIsArmedOrTakenBackAtTheLastMoment) {
   EXPECT_TRUE(nothing_stamped());
 }
 
-TEST_F(BoardPort, edgesThatTheCompareUnitDidNotMakeAreForcedAndSaidToBeLate) {
+TEST_F(BoardPort, missedEdgesAreForcedAndFlaggedLate) {
   configure();
   ASSERT_TRUE(hal_arm(11'000, 500, 0x1));
   at(kTim2, sr) = 0;
@@ -232,7 +233,7 @@ TEST_F(BoardPort, edgesThatTheCompareUnitDidNotMakeAreForcedAndSaidToBeLate) {
   EXPECT_TRUE(nothing_stamped());
 }
 
-TEST_F(BoardPort, exposuresAreStampedByCaptureEachEdgeByItsChannel) {
+TEST_F(BoardPort, exposureEdgesAreStampedByCapture) {
   configure();
   at(kTim5, sr) = 0x2;
   at(kTim5, ccr1) = 5000;
@@ -272,7 +273,7 @@ TEST_F(BoardPort, exposuresAreStampedByCaptureEachEdgeByItsChannel) {
   (void)stamped();
 }
 
-TEST_F(BoardPort, ppsAndInsHaveTheCapturesTimeOrElseTheInterrupts) {
+TEST_F(BoardPort, ppsAndInsUseCaptureElseInterruptTime) {
   configure();
   at(kTim2, cnt) = 0x12345678;
   at(kExti, pr) = 0x40;
@@ -300,7 +301,7 @@ TEST_F(BoardPort, ppsAndInsHaveTheCapturesTimeOrElseTheInterrupts) {
   EXPECT_EQ(stamped().count, 0x12340010U) << "no capture came";
 }
 
-TEST_F(BoardPort, theLineRunsAt921600AndStampsItsBytes) {
+TEST_F(BoardPort, lineRunsAt921600AndStampsItsBytes) {
   line_start(84'000'000);
   EXPECT_EQ(at(kUsart1, 0x08), 91U) << "84 MHz / 91 = 923 077, 0.16 % fast";
   EXPECT_EQ(at(kUsart1, 0x0C), 0x202CU) << "UE, RXNEIE, TE, RE";

@@ -8,7 +8,7 @@ namespace {
 
 using Bytes = VirtualBoard::Bytes;
 
-TEST(BoardTalk, whatIsRefusedIsRefusedByName) {
+TEST(BoardTalk, invalidMessagesAreAnsweredByErrorCode) {
   VirtualBoard b;
   b.send(trigger_hello, {trigger_protocol_version + 1});
   const auto errors = b.take(trigger_error);
@@ -34,7 +34,7 @@ TEST(BoardTalk, whatIsRefusedIsRefusedByName) {
   EXPECT_EQ(s.frames_refused, 2U) << "the two of a wrong size";
 }
 
-TEST(BoardTalk, pingCarriesBothTicks) {
+TEST(BoardTalk, pongCarriesReceiveAndSendTicks) {
   VirtualBoard b;
   b.run_for_us(1'000'000);
   const Bytes ping = VirtualBoard::framed(trigger_ping, 77, {4, 3, 2, 1});
@@ -59,7 +59,7 @@ struct Refusal {
   int code;
 };
 
-TEST(BoardConfig, isRefusedByCodeAndThenTheOldOneHolds) {
+TEST(BoardConfig, invalidConfigIsRefusedAndTheOldKept) {
   const Refusal refusals[] = {
       {"no line", [](TriggerConfig* c) { c->lines = 0; }, trigger_error_line},
       {"a fifth line", [](TriggerConfig* c) { c->lines = 0x10; }, trigger_error_line},
@@ -106,7 +106,7 @@ TEST(BoardConfig, isRefusedByCodeAndThenTheOldOneHolds) {
   EXPECT_EQ(b.error(), trigger_error_not_stopped);
 }
 
-TEST(BoardConfig, withoutPpsOrInsTheirEdgesAreRefused) {
+TEST(BoardConfig, edgesOfAbsentInputsAreRefused) {
   BoardDescription bare = VirtualBoard::usual();
   bare.has_pps = bare.has_ins = false;
   VirtualBoard b(bare);
@@ -120,7 +120,7 @@ TEST(BoardConfig, withoutPpsOrInsTheirEdgesAreRefused) {
   EXPECT_EQ(b.error(), trigger_error_line);
 }
 
-TEST(BoardConfig, statusNamesItByItsCrc) {
+TEST(BoardConfig, statusCarriesItsCrc) {
   VirtualBoard b;
   const TriggerConfig c = VirtualBoard::config(12'345);
   Bytes payload(trigger_config_payload_size);
@@ -129,13 +129,13 @@ TEST(BoardConfig, statusNamesItByItsCrc) {
   EXPECT_EQ(b.status().configuration, trigger_crc32(payload.data(), payload.size()));
 }
 
-TEST(BoardStates, statusComesEverySecondAndWhenTheStateChanges) {
+TEST(BoardStates, statusIsSentEverySecond) {
   VirtualBoard b;
   b.run_for_us(10'500'000);
   EXPECT_EQ(b.take(trigger_status).size(), 11U) << "at boot, then every second";
 }
 
-TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
+TEST(BoardStates, stateChangeIsSentAtOnce) {
   VirtualBoard b;
   b.start(10'000);
   b.run_for_us(50'000);
@@ -151,7 +151,7 @@ TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
   EXPECT_EQ(s.state, trigger_running);
 }
 
-TEST(BoardStates, stopIsAnsweredAfterAPulseThatCouldNotBeTakenBack) {
+TEST(BoardStates, stopIsAnsweredAfterAnArmedPulse) {
   VirtualBoard b;
   b.start(100'000);
   ASSERT_TRUE(b.armed);
@@ -174,7 +174,7 @@ TEST(BoardStates, stopIsAnsweredAfterAPulseThatCouldNotBeTakenBack) {
   EXPECT_EQ(b.frames[1].sequence, 99);
 }
 
-TEST(BoardStates, aPauseLeavesOutSoManyNumbersAndKeepsTheGrid) {
+TEST(BoardStates, pauseSkipsItsNumbersAndKeepsTheGrid) {
   VirtualBoard b;
   b.start(100'000);
   b.run_for_us(46'500);  // numbers 0..4 are out, 5 is armed
@@ -190,7 +190,7 @@ TEST(BoardStates, aPauseLeavesOutSoManyNumbersAndKeepsTheGrid) {
   }
 }
 
-TEST(BoardStates, aPauseCanBeEndedAndIsEndedByStop) {
+TEST(BoardStates, pauseOfZeroOrStopEndsAPause) {
   VirtualBoard b;
   b.start(100'000);
   b.run_for_us(20'000);

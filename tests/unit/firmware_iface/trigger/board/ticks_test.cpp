@@ -51,7 +51,7 @@ struct Disciplined : testing::Test {
   }
 };
 
-TEST(BoardTicks, withoutPpsTheyAreTheCrystals) {
+TEST(BoardTicks, ticksFollowTheCrystalWithoutPps) {
   VirtualBoard b;
   for (const std::uint64_t s : {1ULL, 60ULL, 86'400ULL, 100'000ULL}) {
     b.run_until(1'000'000 + s * VirtualBoard::kHz);
@@ -62,7 +62,7 @@ TEST(BoardTicks, withoutPpsTheyAreTheCrystals) {
   }
 }
 
-TEST_F(Disciplined, beforeTheHostCameTheRateIsTakenAtOnce) {
+TEST_F(Disciplined, rateIsTakenAtOnceBeforeHello) {
   pps.ppm = 50;
   begin(false);
   feed(1, 7);
@@ -77,7 +77,7 @@ TEST_F(Disciplined, beforeTheHostCameTheRateIsTakenAtOnce) {
 struct DisciplinedSlowly : Disciplined, testing::WithParamInterface<double> {};
 INSTANTIATE_TEST_SUITE_P(BothWays, DisciplinedSlowly, testing::Values(50.0, -50.0));
 
-TEST_P(DisciplinedSlowly, afterHelloItTakesAMinuteAndNoRateStepOfMoreThanTheStated) {
+TEST_P(DisciplinedSlowly, afterHelloRateIsSteeredInSmallSteps) {
   pps.ppm = GetParam();
   begin(true);
   auto rate_before = static_cast<double>(b.board.ticks.segment.rate);
@@ -100,7 +100,7 @@ TEST_P(DisciplinedSlowly, afterHelloItTakesAMinuteAndNoRateStepOfMoreThanTheStat
   EXPECT_LT(std::abs(error_us(399.4) - kept), 2);
 }
 
-TEST_F(Disciplined, ticksNeverGoBackAndNeverStep) {
+TEST_F(Disciplined, ticksAreMonotonicAndSmooth) {
   pps.ppm = -73;
   pps.jitter_us = 30;
   begin(true);
@@ -120,7 +120,7 @@ TEST_F(Disciplined, ticksNeverGoBackAndNeverStep) {
   }
 }
 
-TEST_F(Disciplined, jitterOfTheReceiverIsAveraged) {
+TEST_F(Disciplined, receiverJitterIsAveraged) {
   pps.ppm = 20;
   pps.jitter_us = 0.5;
   begin(false);
@@ -134,13 +134,13 @@ TEST_F(Disciplined, jitterOfTheReceiverIsAveraged) {
   EXPECT_LT(worst, 3);
 }
 
-TEST_F(Disciplined, whenPpsIsGoneTheRateStays) {
+TEST_F(Disciplined, rateIsKeptAfterPpsIsLost) {
   pps.ppm = 50;
   begin(false);
   feed(1, 60);
   const double before = error_us(59.4);
   b.run_until(pps.count(65));
-  EXPECT_EQ(b.status().pps_locked, 0) << "said within five seconds";
+  EXPECT_EQ(b.status().pps_locked, 0) << "reported within five seconds";
   b.run_until(pps.count(659));
   const double after = error_us(659);
   EXPECT_LT(std::abs(after - before), 600 * 0.02 + 2) << "0.02 ppm: a count in a second";
@@ -149,7 +149,7 @@ TEST_F(Disciplined, whenPpsIsGoneTheRateStays) {
   EXPECT_EQ(b.status().pps_locked, 1);
 }
 
-TEST_F(Disciplined, edgesThatFitNothingAreReportedButNotFollowed) {
+TEST_F(Disciplined, spuriousEdgesAreReportedButNotFollowed) {
   pps.ppm = 10;
   begin(false);
   feed(1, 30);
@@ -165,7 +165,7 @@ TEST_F(Disciplined, edgesThatFitNothingAreReportedButNotFollowed) {
   EXPECT_LT(std::abs(error_us(59.4) - before), 2);
 }
 
-TEST_F(Disciplined, anEdgeThatIsAlmostRightIsNotFollowedEither) {
+TEST_F(Disciplined, edgesOffBy400usAreNotFollowed) {
   pps.ppm = 10;
   begin(false);
   feed(1, 30);
@@ -180,7 +180,7 @@ TEST_F(Disciplined, anEdgeThatIsAlmostRightIsNotFollowedEither) {
   EXPECT_LT(std::abs(error_us(89.4) - before), 2);
 }
 
-TEST_F(Disciplined, thePhaseIsBroughtBackAndWhatSteeredItEndsWithPps) {
+TEST_F(Disciplined, movedPhaseIsSteeredUntilPpsIsLost) {
   pps.ppm = 30;
   begin(false);
   feed(1, 30);
@@ -212,7 +212,7 @@ TEST_F(Disciplined, thePhaseIsBroughtBackAndWhatSteeredItEndsWithPps) {
   EXPECT_LT(std::abs(gone - before), 60);
 }
 
-TEST(BoardTicks, whatWasStampedBeforeARateChangedKeepsItsTick) {
+TEST(BoardTicks, rateChangeKeepsTicksOfEarlierStamps) {
   TickDiscipline d{};
   tick_init(&d, 84'000'000, 200, 0);
   const std::uint64_t second = 84'000'000 + 12'600;  // 150 ppm
@@ -227,7 +227,7 @@ TEST(BoardTicks, whatWasStampedBeforeARateChangedKeepsItsTick) {
   EXPECT_EQ(tick_of(&d, told + second) - at_told, 1'000'000U);
 }
 
-TEST_F(Disciplined, aSignalThatIsNoPpsIsNeverLockedTo) {
+TEST_F(Disciplined, signalOfWrongPeriodNeverLocks) {
   begin(false);
   for (int k = 1; k < 40;
        ++k)  // each second by itself is within the crystal's 200 ppm, but they do not agree
@@ -246,7 +246,7 @@ TEST_F(Disciplined, aSignalThatIsNoPpsIsNeverLockedTo) {
   EXPECT_EQ(board_tick(&b.board, b.now), (b.now - 1'000'000 + 42) / 84) << "the crystal's ticks";
 }
 
-TEST_F(Disciplined, aSecondPhaseIsTakenOverAfterAFewSeconds) {
+TEST_F(Disciplined, newPhaseLocksWithinSevenSeconds) {
   pps.ppm = 5;
   begin(false);
   feed(1, 30);
