@@ -1,9 +1,8 @@
 #include "app/checkerboard/board_detector.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <map>
 
-#include <Eigen/Eigenvalues>
 #include <opencv2/core.hpp>
 
 #include "app/checkerboard/aprilgrid.hpp"
@@ -13,25 +12,6 @@ namespace vergence::app {
 namespace {
 
 constexpr std::size_t kMinCorners = 6;
-constexpr double kThinnest = 0.5;  // squares
-
-/// Where corners lie on the board, in squares.
-struct Places {
-  double n = 0;
-  Vec2 sum = Vec2::Zero();
-  Mat2 squares = Mat2::Zero();
-
-  void count(const Vec2& at, double times) {
-    n += times;
-    sum += times * at;
-    squares += times * at * at.transpose();
-  }
-  /// Least singular value about their mean: by how much they are off the line that fits best.
-  [[nodiscard]] double thickness() const {
-    const Mat2 centred = squares - sum * sum.transpose() / n;
-    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Mat2>(centred).eigenvalues()(0)));
-  }
-};
 
 std::vector<Vec2> pixels_of(const BoardCorners& corners) {
   std::vector<Vec2> pixels;
@@ -56,16 +36,10 @@ BoardCorners find_any_board(const ImageView& image, const BoardPattern& board, B
 
 bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board) {
   if (corners.size() < std::min(kMinCorners, board.corners())) return false;
-  const auto place = [&](const BoardCorner& c) -> Vec2 {
-    return board.corner(c.index).head<2>() / board.square;
-  };
-  Places all;
-  for (const BoardCorner& c : corners) all.count(place(c), 1);
-  return std::all_of(corners.begin(), corners.end(), [&](const BoardCorner& c) {
-    Places others = all;
-    others.count(place(c), -1);
-    return others.thickness() > kThinnest;
-  });
+  std::map<double, int> in_row;
+  for (const BoardCorner& c : corners) ++in_row[board.corner(c.index).y()];
+  return std::count_if(in_row.begin(), in_row.end(),
+                       [](const auto& row) { return row.second >= 2; }) >= 2;
 }
 
 BoardCorners find_board(const ImageView& image, const BoardPattern& board, BoardSearch search,

@@ -4,9 +4,9 @@
 
 namespace vergence::app {
 
-/// At least six corners (of a board of fewer: all), and neither all nor all but one of them on a
-/// line. With others there is no homography, and nothing that begins with one: OpenCV throws, at
-/// that view and at all views together.
+/// True with at least six corners (of a board of fewer: all), of which two rows have two: no three
+/// of those four lie on a line. Without a homography OpenCV throws, at that view and at all views
+/// together.
 [[nodiscard]] bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board);
 
 /// Detects the target in an image: of a checkerboard all corners or none, of an AprilGrid or a

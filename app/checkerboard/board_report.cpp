@@ -103,22 +103,6 @@ std::string baseline_message(const BoardReport& r) {
   return text + "\n";
 }
 
-/// Where to look first: the views that fit least of those used.
-std::string worst_views(const BoardReport& r) {
-  constexpr std::size_t kShown = 5;
-  std::vector<const BoardViewResult*> used;
-  for (const BoardViewResult& v : r.found.views)
-    if (v.used) used.push_back(&v);
-  const std::size_t shown = std::min(kShown, used.size());
-  std::partial_sort(
-      used.begin(), used.begin() + static_cast<std::ptrdiff_t>(shown), used.end(),
-      [](const BoardViewResult* a, const BoardViewResult* b) { return a->rms_px > b->rms_px; });
-  std::string text = "worst views used:";
-  for (std::size_t i = 0; i < shown; ++i)
-    text += fmt::format("{} {} {:.3f} px", i == 0 ? "" : ",", used[i]->name, used[i]->rms_px);
-  return shown == 0 ? "" : text + "\n";
-}
-
 }  // namespace
 
 std::string format_report(const BoardReport& r) {
@@ -130,13 +114,11 @@ std::string format_report(const BoardReport& r) {
                                  rig.frames, refused);
   for (const BoardViewResult& v : r.found.views)
     if (!v.used) text += fmt::format("  refused: {}, {:.3g} px rms\n", v.name, v.rms_px);
-  text += worst_views(r);
   text += fmt::format("reprojection {:.4f} px rms\n\n", rig.reprojection_px);
   text += lens_table(r) + "± 1 σ\n\n";
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
     text += place_table(r, k) + "\n";
   if (rig.cameras > 1) text += baseline_message(r) + "\n";
-  text += r.coverage.grid() + "corners a cell: · none, - up to 9, + up to 39, # more\n";
   const auto needs = r.coverage.needs();
   text += needs.empty() ? "Nothing is missing: every part of the images, tilts and distances.\n"
                         : fmt::format("Still missing: {}.\n", fmt::join(needs, "; "));

@@ -19,8 +19,7 @@ struct BoardReport {
   std::optional<double> measured_baseline{};  // m
 };
 
-/// Tables for a terminal: lenses, places with their sigmas, views refused, coverage and what it
-/// lacks.
+/// Tables for a terminal: lenses, places with their sigmas, views refused, missing coverage.
 [[nodiscard]] std::string format_report(const BoardReport& report);
 /// Formats the report as JSON; every key has its unit. docs/calibration.md.
 [[nodiscard]] nlohmann::ordered_json json_report(const BoardReport& report);

@@ -1,8 +1,5 @@
 
 #include <chrono>
-#include <condition_variable>
-#include <exception>
-#include <mutex>
 #include <thread>
 
 #include <fmt/format.h>
@@ -50,126 +47,82 @@ void make_empty_folder(const fs::path& folder) {
                      ": is not empty; --keep-views needs a new or empty directory");
 }
 
-/// Sets of images from the cameras, the board in them, until nothing is missing. Its thread looks,
-/// the caller's watches.
+/// Takes views of the target from the cameras' images.
+///
+/// Threads  One; another one stops the source when a signal comes.
 class Collection {
  public:
   Collection(const CalibrateRequest& request, const CalibratedRig& rig, double focal_px,
-             Acquisition* source)
+             Acquisition* source, Progress* progress)
       : request_(request),
         rig_(rig),
         source_(source),
+        progress_(progress),
         collector_(Coverage(request.board, rig.names, rig.sizes, focal_px), rig.sizes[0].width) {}
 
-  /// Until the source ends, nothing is missing, or a signal comes. Throws what looking threw.
-  void run(const SignalGuard& signals, Progress* progress) {
-    std::thread detecting([this] { detect_loop(); });
-    std::unique_lock lock(mutex_);
-    while (!changed_.wait_for(lock, std::chrono::milliseconds(50), [this] { return done_; })) {
-      if (signals.stop_requested()) source_->stop();
-      show_progress(progress);
-    }
-    show_progress(progress);
-    lock.unlock();
-    detecting.join();
-    if (failure_) std::rethrow_exception(failure_);
-  }
-  [[nodiscard]] const std::vector<BoardView>& views() const noexcept { return collector_.views(); }
-  [[nodiscard]] bool complete() const { return collector_.complete(); }
-
- private:
-  void detect_loop() {
-    try {
-      detect_all();
-    } catch (...) {  // out of a thread it would end the program
-      failure_ = std::current_exception();
+  /// Until the source ends, nothing is missing, or a signal comes.
+  void run(const SignalGuard& signals) {
+    const std::jthread stopper([this, &signals](const std::stop_token& ended) {
+      while (!ended.stop_requested() && !signals.stop_requested())
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
       source_->stop();
-    }
-    const std::lock_guard lock(mutex_);
-    done_ = true;
-    changed_.notify_one();
-  }
-
-  void detect_all() {
+    });
     for (Acquired item; source_->next(&item);) {
-      if (const auto* event = std::get_if<DeviceEvent>(&item)) on_event(*event);
+      if (const auto* event = std::get_if<DeviceEvent>(&item)) report(*event);
       const auto* frame = std::get_if<AcquiredFrame>(&item);
       if (frame == nullptr) continue;
-      offer(frame->rig);
+      if (!collector_.complete()) offer(frame->rig);
       source_->release(*frame);
-      if (complete_) source_->stop();
+      if (collector_.complete()) source_->stop();
     }
   }
+  [[nodiscard]] const std::vector<BoardView>& views() const noexcept { return collector_.views(); }
 
-  void on_event(const DeviceEvent& event) {
+ private:
+  void report(const DeviceEvent& event) {
     const bool gone = event.kind == DeviceEvent::Kind::camera_disconnected;
-    if (!gone && event.kind != DeviceEvent::Kind::camera_reconnected) return;
-    const std::lock_guard lock(mutex_);
-    messages_.push_back(
-        fmt::format("camera {} is {}", event.camera, gone ? "gone; waiting for it" : "back"));
+    if (gone || event.kind == DeviceEvent::Kind::camera_reconnected)
+      progress_->print(fmt::format("vergence: camera {} {}", event.camera,
+                                   gone ? "is disconnected; waiting for it" : "is reconnected"));
   }
 
   void offer(const RigFrame& frame) {
     BoardView seen;
-    seen.name = fmt::format("view {}", collector_.views().size());
-    for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      seen.corners[at] =
-          find_board(frame.images[at], request_.board, BoardSearch::quick, seen.corners[0]);
-    }
     const std::size_t number = collector_.views().size();
-    const OfferResult verdict = collector_.offer(seen);
-    if (verdict == OfferResult::taken && request_.keep_views) keep(frame, number);
+    seen.name = fmt::format("view {}", number);
+    for (std::size_t k = 0; k < rig_.sizes.size(); ++k)
+      seen.corners[k] =
+          find_board(frame.images[k], request_.board, BoardSearch::quick, seen.corners[0]);
+    const OfferResult result = collector_.offer(seen);
+    if (result == OfferResult::taken && request_.keep_views) keep(frame, number);
     const auto needs = collector_.coverage().needs();
-    complete_ = needs.empty();
-    const std::lock_guard lock(mutex_);
-    ++sets_;
-    activity_ =
-        fmt::format("{} views · {}{}", collector_.views().size(), phrase(verdict),
+    state_.state = "calibrate";
+    ++state_.frame;
+    state_.activity =
+        fmt::format("{} views · {}{}", collector_.views().size(), phrase(result),
                     needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
+    progress_->update(state_);
   }
 
   void keep(const RigFrame& frame, std::size_t number) {
-    for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
-      const ImageView image = frame.images[static_cast<std::size_t>(k)];
-      if (image.empty()) continue;
+    for (std::size_t k = 0; k < rig_.sizes.size(); ++k) {
+      if (frame.images[k].empty()) continue;
       const fs::path file =
-          *request_.keep_views /
-          fmt::format("{}_{:03}.png", rig_.names[static_cast<std::size_t>(k)], number);
+          *request_.keep_views / fmt::format("{}_{:03}.png", rig_.names[k], number);
       try {
-        write_png(file, image);
-        continue;
-      } catch (const InputError&) {  // said below
+        write_png(file, frame.images[k]);
+      } catch (const InputError& e) {
+        progress_->print(fmt::format("vergence: {}; the view is used all the same", e.what()));
       }
-      const std::lock_guard lock(mutex_);
-      messages_.push_back(file.string() + ": cannot be written; the view is used all the same");
     }
-  }
-
-  /// Under the lock.
-  void show_progress(Progress* progress) {
-    for (const std::string& message : messages_) progress->print("vergence: " + message);
-    messages_.clear();
-    ProgressState state;
-    state.state = "calibrate";
-    state.frame = sets_;
-    state.activity = activity_;
-    progress->update(state);
   }
 
   const CalibrateRequest& request_;
   const CalibratedRig& rig_;
   Acquisition* source_;
-  ViewCollector collector_;       // of the looking thread, until it has ended
-  bool complete_ = false;         // likewise
-  std::exception_ptr failure_{};  // likewise
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool done_ = false;
-  std::uint64_t sets_ = 0;
-  std::string activity_ = "waiting for images";
-  std::vector<std::string> messages_;
+  Progress* progress_;
+  ProgressState state_{};
+  ViewCollector collector_;
 };
 
 CalibratedRig rig_of(const Configuration& c, const DriveDevices& devices) {
@@ -199,9 +152,9 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   Acquisition::Options options = devices.acquisition_options();
   options.tie_host = monotonic_now();
   Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), options);
-  Collection collection(request, rig, nominal_rig(c).intrinsics[0].fx, &source);
+  Collection collection(request, rig, nominal_rig(c).intrinsics[0].fx, &source, &progress);
   start_acquisition(&source);
-  collection.run(signals, &progress);
+  collection.run(signals);
   source.join();
   progress.finish();
   const auto stopped = signals.stop_code();

@@ -190,15 +190,13 @@ ExitCode calibrate_images(const CalibrateRequest& request,
     files.push_back(matching_files(patterns[k], kOptions[k]));
   std::vector<std::string> remarks;
   const auto views = group_views(files, &remarks);
-  std::string activity;
   BoardImages images =
       read_board_images(views, request.board, [&](std::size_t done, std::size_t found) {
         ProgressState state;
         state.state = "calibrate";
         state.frame = done;
         state.frames = views.size();
-        activity = fmt::format("{} with the board", found);
-        state.activity = activity;
+        state.activity = fmt::format("{} with the board", found);
         progress.update(state);
       });
   progress.finish();

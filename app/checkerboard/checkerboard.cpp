@@ -6,6 +6,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "app/checkerboard/tag_corners.hpp"
+
 namespace vergence::app {
 namespace {
 
@@ -17,12 +19,6 @@ constexpr double kBlur =
     0.7;  // px: the refinement's interpolation shifts corners of sharper images
 constexpr int kRefineSteps = 100;
 constexpr double kRefineTolerance = 1e-4;  // px
-
-cv::Mat matrix_of(const ImageView& image) {
-  // cv::Mat has no view of constant pixels; nothing below writes them.
-  return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
-          static_cast<std::size_t>(image.stride)};
-}
 
 double smallest_spacing(const std::vector<cv::Point2f>& corners, const BoardPattern& board) {
   const auto n = static_cast<std::size_t>(board.columns);

@@ -1,13 +1,14 @@
 #include "app/checkerboard/conversion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
 namespace {
@@ -29,13 +30,9 @@ bool is_ros_folder(const std::string& out, CalibrationFormat format) {
 }  // namespace
 
 CalibrationFormat parse_format(const std::string& word) {
-  static const std::vector<std::string> kFormatNames{"vergence", "kalibr", "ros", "opencv"};
-  const auto at = std::find(kFormatNames.begin(), kFormatNames.end(), word);
-  if (at == kFormatNames.end())
-    throw InputError(fmt::format("\"{}\" is no form of a calibration{}; it is one of {}",
-                                 word.substr(0, 60), did_you_mean(word, kFormatNames),
-                                 fmt::join(kFormatNames, ", ")));
-  return static_cast<CalibrationFormat>(at - kFormatNames.begin());
+  constexpr std::array<std::string_view, 4> kFormatNames{"vergence", "kalibr", "ros", "opencv"};
+  return static_cast<CalibrationFormat>(std::find(kFormatNames.begin(), kFormatNames.end(), word) -
+                                        kFormatNames.begin());
 }
 
 ImageSize parse_size(const std::string& text) {

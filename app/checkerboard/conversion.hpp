@@ -10,7 +10,7 @@
 /// `vergence calibrate convert IN OUT`.
 namespace vergence::app {
 
-/// `vergence`, `kalibr`, `ros`, `opencv`. InputError: another word, with the nearest.
+/// `vergence`, `kalibr`, `ros` or `opencv`, as the option `--to` checks.
 [[nodiscard]] CalibrationFormat parse_format(const std::string& word);
 /// `640x480`. InputError: no such thing.
 [[nodiscard]] ImageSize parse_size(const std::string& text);

@@ -14,7 +14,6 @@ namespace {
 constexpr std::array kPartNames{"top left", "top",         "top right", "left",        "the middle",
                                 "right",    "bottom left", "bottom",    "bottom right"};
 constexpr std::array kTiltNames{"right", "left", "bottom", "top"};
-constexpr int kFewCorners = 10, kManyCorners = 40;  // a cell, in the grid's characters
 
 std::size_t part_of(double share) { return share < 1.0 / 3 ? 0 : share < 2.0 / 3 ? 1 : 2; }
 
@@ -39,11 +38,7 @@ void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) cons
   const ImageSize size = sizes_[camera];
   std::array<int, kParts> parts{};
   for (const BoardCorner& c : view.corners[camera]) {
-    const double x = std::clamp(c.pixel.x() / size.width, 0.0, 0.999),
-                 y = std::clamp(c.pixel.y() / size.height, 0.0, 0.999);
-    ++seen->cells[static_cast<std::size_t>(y * kRows) * kColumns +
-                  static_cast<std::size_t>(x * kColumns)];
-    ++parts[part_of(y) * 3 + part_of(x)];
+    ++parts[part_of(c.pixel.y() / size.height) * 3 + part_of(c.pixel.x() / size.width)];
   }
   for (std::size_t i = 0; i < kParts; ++i) seen->parts[i] = std::max(seen->parts[i], parts[i]);
 }
@@ -133,26 +128,6 @@ std::vector<std::string> Coverage::needs() const {
     needs.push_back(fmt::format("{} more view{}", kEnoughViews - views_,
                                 kEnoughViews - views_ == 1 ? "" : "s"));
   return needs;
-}
-
-std::string Coverage::grid() const {
-  std::string text;
-  for (const std::string& name : names_) text += fmt::format("{:<{}}", name, 2 * kColumns + 3);
-  text.erase(text.find_last_not_of(' ') + 1);
-  text += '\n';
-  for (std::size_t row = 0; row < kRows; ++row) {
-    std::string line;
-    for (std::size_t k = 0; k < seen_.size(); ++k) {
-      if (k > 0) line += "    ";
-      for (std::size_t column = 0; column < kColumns; ++column) {
-        const int n = seen_[k].cells[row * kColumns + column];
-        line += column > 0 ? " " : "";
-        line += n == 0 ? "·" : n < kFewCorners ? "-" : n < kManyCorners ? "+" : "#";
-      }
-    }
-    text += line + '\n';
-  }
-  return text;
 }
 
 }  // namespace vergence::app

@@ -9,8 +9,7 @@
 
 namespace vergence::app {
 
-/// Coverage of the views so far, and missing
-/// parts of each image, tilts, sizes and number.
+/// Coverage of the views so far: missing parts of each image, tilts, sizes and number.
 ///
 /// Parts    Nine of each image, the outer ones a third wide: distortion is determined where the
 ///          corners are, and nowhere else.
@@ -19,8 +18,6 @@ namespace vergence::app {
 /// Sizes    Once as near as both cameras let it come, once clearly farther.
 class Coverage {
  public:
-  static constexpr std::size_t kColumns = 12, kRows = 8;  // cells of the grid that is shown
-
   /// `names` and `sizes` one a camera; `focal_px` of camera 0, roughly: it only serves the tilts.
   Coverage(const BoardPattern& board, std::vector<std::string> names, std::vector<ImageSize> sizes,
            double focal_px);
@@ -32,13 +29,10 @@ class Coverage {
   /// left edge nearer", "5 more views".
   [[nodiscard]] std::vector<std::string> needs() const;
   [[nodiscard]] std::size_t views() const noexcept { return views_; }
-  /// Corners a cell, the cameras side by side, each line with its end.
-  [[nodiscard]] std::string grid() const;
 
  private:
   static constexpr std::size_t kParts = 9, kTilts = 4;
   struct Seen {
-    std::array<int, kColumns * kRows> cells{};
     std::array<int, kParts> parts{};  // of the view that has most there
   };
   /// Pose of the target in front of camera 0.

@@ -19,17 +19,10 @@ CameraModelKind parse_model(const std::string& word) {
 }
 
 BoardPattern board_of(const CalibrateOptions& a) {
-  const int boards =
-      (a.board.empty() ? 0 : 1) + (a.aprilgrid.empty() ? 0 : 1) + (a.charuco.empty() ? 0 : 1);
-  if (boards == 0)
+  if (a.board.empty() && a.aprilgrid.empty() && a.charuco.empty())
     throw InputError(
         "the calibration target is missing; give --checkerboard 9x6 (inner corners), --aprilgrid "
         "6x6 (tags) or --charuco 11x8 (squares)");
-  if (boards > 1)
-    throw InputError("--checkerboard, --aprilgrid and --charuco exclude one another; give one");
-  if (!a.square)
-    throw InputError(fmt::format("--square is missing: the side of a {} in metres, like 0.025",
-                                 a.aprilgrid.empty() ? "square" : "tag"));
   if (!a.aprilgrid.empty()) return parse_aprilgrid(a.aprilgrid, *a.square, a.spacing);
   if (!a.board.empty()) return parse_checkerboard(a.board, *a.square);
   if (!a.marker)
@@ -38,13 +31,10 @@ BoardPattern board_of(const CalibrateOptions& a) {
 }
 
 CalibrateRequest request_of(const CalibrateOptions& a) {
-  const BoardPattern board = board_of(a);
-  if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100))
-    throw InputError("--baseline needs metres, more than 0 and less than 100");
   if (a.sixth_order && a.model == "equidistant")
     throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
   CalibrateRequest r;
-  r.board = board;
+  r.board = board_of(a);
   r.model = parse_model(a.model);
   r.sixth_order = a.sixth_order;
   r.out = a.out;
@@ -77,8 +67,6 @@ ExitCode convert(const CalibrateOptions& a) {
 }
 
 ExitCode calibrate_target(const CalibrateOptions& a) {
-  if (a.right.empty() && !a.more_cameras.empty())
-    throw InputError("--camera is for a third and fourth camera; --right comes first");
   std::vector<std::vector<std::string>> patterns{a.left};
   if (!a.right.empty()) patterns.push_back(a.right);
   for (const std::string& pattern : a.more_cameras) patterns.push_back({pattern});

@@ -41,12 +41,7 @@ std::string format_info(const Intrinsics& lens, const std::string& name, const c
 std::array<std::string, 2> format_ros(const CalibrationFile& calibration, Remarks* remarks) {
   const RigCalibration& rig = calibration.rig;
   const Intrinsics &l = rig.intrinsics[0], &r = rig.intrinsics[1];
-  if (l.kind != r.kind)
-    throw InputError(
-        "cameras.1.model is not that of camera 0; a pair of camera_info is rectified with one "
-        "model");
-  if (l.width != r.width || l.height != r.height)
-    throw InputError("cameras.1.size is not that of camera 0; a pair of camera_info has one size");
+  detail::check_pair(calibration, "a pair of camera_info", remarks);
   std::array<cv::Mat, 2> K, D;
   for (std::size_t k = 0; k < 2; ++k) {
     const Intrinsics& lens = rig.intrinsics[k];
@@ -68,8 +63,6 @@ std::array<std::string, 2> format_ros(const CalibrationFile& calibration, Remark
   } catch (const cv::Exception& error) {
     throw InputError(std::string("this rig cannot be rectified for camera_info: ") + error.err);
   }
-  detail::remark_more_cameras(calibration, "a pair of camera_info", remarks);
-  detail::remark_lost(calibration, "camera_info", remarks);
   return {format_info(l, calibration.names[0], K[0], R_l, P_l),
           format_info(r, calibration.names[1], K[1], R_r, P_r)};
 }

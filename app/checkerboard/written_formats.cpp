@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -31,10 +32,18 @@ void remark_lost(const CalibrationFile& calibration, const char* format, Remarks
       sigmas ? "sigmas, " : ""));
 }
 
-void remark_more_cameras(const CalibrationFile& calibration, const char* format, Remarks* remarks) {
-  if (calibration.rig.cameras > 2)
+void check_pair(const CalibrationFile& calibration, const char* format, Remarks* remarks) {
+  const RigCalibration& rig = calibration.rig;
+  const Intrinsics &l = rig.intrinsics[0], &r = rig.intrinsics[1];
+  for (const auto& [key, same] : {std::pair("model", l.kind == r.kind),
+                                  std::pair("size", l.width == r.width && l.height == r.height)})
+    if (!same)
+      throw InputError(
+          fmt::format("cameras.1.{0} is not that of camera 0; {1} has one {0}", key, format));
+  if (rig.cameras > 2)
     remarks->push_back(fmt::format("{} holds two cameras; {} of {} are left out", format,
-                                   calibration.rig.cameras - 2, calibration.rig.cameras));
+                                   rig.cameras - 2, rig.cameras));
+  remark_lost(calibration, format, remarks);
 }
 
 }  // namespace detail
@@ -77,12 +86,8 @@ std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks) 
 
 std::array<std::string, 2> format_opencv(const CalibrationFile& calibration, Remarks* remarks) {
   const RigCalibration& rig = calibration.rig;
-  const Intrinsics &l = rig.intrinsics[0], &r = rig.intrinsics[1];
-  if (l.kind != r.kind)
-    throw InputError(
-        "cameras.1.model is not that of camera 0; an OpenCV stereo file has one model");
-  if (l.width != r.width || l.height != r.height)
-    throw InputError("cameras.1.size is not that of camera 0; an OpenCV stereo file has one size");
+  const Intrinsics& l = rig.intrinsics[0];
+  detail::check_pair(calibration, "an OpenCV stereo file", remarks);
   const bool fisheye = l.kind == CameraModelKind::pinhole_equidistant;
   std::string lenses = fmt::format("image_width: {}\nimage_height: {}\nfisheye_model: {}\n",
                                    l.width, l.height, fisheye ? 1 : 0);
@@ -97,8 +102,6 @@ std::array<std::string, 2> format_opencv(const CalibrationFile& calibration, Rem
   }
   const Transform& T = rig.T_camera_left[1];
   const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = T.R;
-  detail::remark_more_cameras(calibration, "an OpenCV stereo file", remarks);
-  detail::remark_lost(calibration, "an OpenCV stereo file", remarks);
   return {lenses, format_matrix("R", 3, 3, std::span(R.data(), 9)) +
                       format_matrix("T", 3, 1, std::span(T.t.data(), 3))};
 }

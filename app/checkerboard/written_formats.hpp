@@ -34,8 +34,9 @@ namespace vergence::app {
 namespace detail {
 /// Remarks what every one of these formats lacks; `serials`, `names`: the format lacks those, too.
 void remark_lost(const CalibrationFile& calibration, const char* format, Remarks* remarks);
-/// Remarks cameras beyond the pair that a format holds.
-void remark_more_cameras(const CalibrationFile& calibration, const char* format, Remarks* remarks);
+/// The same for a format of a pair, and remarks cameras beyond it. InputError: the two cameras
+/// differ in model or size.
+void check_pair(const CalibrationFile& calibration, const char* format, Remarks* remarks);
 }  // namespace detail
 
 }  // namespace vergence::app

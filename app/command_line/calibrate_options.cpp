@@ -61,12 +61,16 @@ void declare_board(CLI::App& command, CalibrateOptions& o) {
       ->type_name("NxN")
       ->group("Target");
   command.add_option("--aprilgrid", o.aprilgrid, "Tags of an AprilGrid (36h11): 6x6")
+      ->excludes("--checkerboard")
       ->type_name("NxN")
       ->group("Target");
   command.add_option("--charuco", o.charuco, "Squares of a ChArUco target: 11x8")
+      ->excludes("--checkerboard")
+      ->excludes("--aprilgrid")
       ->type_name("NxN")
       ->group("Target");
   command.add_option("--square", o.square, "Size of a square or tag in metres")
+      ->required()
       ->type_name("M")
       ->group("Target");
   command
@@ -88,6 +92,7 @@ void declare_board(CLI::App& command, CalibrateOptions& o) {
       ->group("Calibration");
   command.add_flag("--k3", o.sixth_order, "radtan: also estimate k3")->group("Calibration");
   command.add_option("--baseline", o.baseline, "Measured baseline in metres, for comparison")
+      ->check(CLI::Range(0.001, 100.0))
       ->type_name("M")
       ->group("Calibration");
   declare_out(command, o);
@@ -106,6 +111,7 @@ void declare_target(CLI::App& command, CalibrateOptions& o) {
       ->type_name("GLOB")
       ->group("Input");
   command.add_option("--camera", o.more_cameras, "Images of a third and a fourth camera")
+      ->needs("--right")
       ->type_name("GLOB")
       ->allow_extra_args(false)
       ->group("Input");
@@ -169,6 +175,7 @@ void declare_convert(CLI::App& command, CalibrateOptions& o) {
       ->type_name("FILE|DIR");
   command
       .add_option("--to", o.to, "Format of OUT: vergence, kalibr, ros, opencv [by the name of OUT]")
+      ->check(CLI::IsMember({"vergence", "kalibr", "ros", "opencv"}))
       ->type_name("NAME")
       ->group("Output");
   command.add_flag("--force", o.force, "Overwrite existing files")->group("Output");

@@ -70,8 +70,8 @@ UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
   if (!argument.option) argument.why = did_you_mean(argument.name, command_names(command));
   if (argument.why.empty())
     argument.why =
-        why_withdrawn(Withdrawn::Kind::option,
-                      full_name(command) + " " + (argument.option ? argument.name : "CONFIG"));
+        new_name(Renamed::Kind::option,
+                 full_name(command) + " " + (argument.option ? argument.name : "CONFIG"));
   return argument;
 }
 
@@ -108,9 +108,7 @@ void check_command(CLI::App& root, int argc, const char* const* argv) {
   auto words = command_names(root);
   words.insert(words.end(), {"help", "version"});
   if (std::find(words.begin(), words.end(), argument) != words.end()) return;
-  const std::string why = why_withdrawn(Withdrawn::Kind::command, argument);
-  throw InputError("unknown command \"" + argument + "\"" +
-                   (why.empty() ? did_you_mean(argument, words) : why) +
+  throw InputError("unknown command \"" + argument + "\"" + did_you_mean(argument, words) +
                    " ('vergence --help' lists the commands)");
 }
 

@@ -1,4 +1,5 @@
 #include <memory>
+#include <numbers>
 
 #include "app/commands/commands.hpp"
 #include "app/simulation/experiment.hpp"
@@ -11,15 +12,23 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
       "simulate", "Repeat the calibration experiment on simulated point clouds");
   command->group("Research");
   SimulationOptions& s = a->simulation;
-  command->add_option("--points", s.points, "Number of points of the cloud")->capture_default_str();
-  command->add_option("--radius", s.radius, "Radius of the cloud, m")->capture_default_str();
+  command->add_option("--points", s.points, "Number of points of the cloud")
+      ->check(CLI::Range(5, 100000))
+      ->capture_default_str();
+  command->add_option("--radius", s.radius, "Radius of the cloud, m")
+      ->check(CLI::Range(1e-3, 1e4))
+      ->capture_default_str();
   command
       ->add_option("--shape", a->shape, "ball: points fill a ball; shell: they lie on its surface")
       ->check(CLI::IsMember({"ball", "shell"}))
       ->capture_default_str();
   command->add_option("--noise", a->noise, "Noise levels in pixels per coordinate")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  command->add_option("--runs", a->runs, "Random problems per noise level")->capture_default_str();
+  command->add_option("--runs", a->runs, "Random problems per noise level")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
   command->add_option("--seed", a->seed, "Seed of the random problems")->capture_default_str();
   command
       ->add_option("--generator", a->generator,
@@ -29,20 +38,25 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option("--start-position", s.start_position,
                    "Maximum initial error of the rig positions, m per axis")
+      ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
   command
       ->add_option("--start-rotation", s.start_rotation,
                    "Maximum initial error of the stereo rotation, rad per axis")
+      ->check(CLI::Range(0.0, std::numbers::pi))
       ->capture_default_str();
   command
       ->add_option("--start-translation", s.start_translation,
                    "Maximum initial error of the stereo translation, m per axis")
+      ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
   command
       ->add_option("--length", a->length, "exact: baseline length known exactly; measured: to 1 mm")
       ->check(CLI::IsMember({"exact", "measured"}))
       ->capture_default_str();
-  command->add_option("--cameras", s.cameras, "Number of cameras, 2 to 4")->capture_default_str();
+  command->add_option("--cameras", s.cameras, "Number of cameras, 2 to 4")
+      ->check(CLI::Range(2, 4))
+      ->capture_default_str();
   command->add_option("--json", a->json, "Write JSON to this file, one object per noise level");
   command->footer(
       "Example: vergence simulate --runs 20 --noise 0.1\nExit codes: 0 success; 2 bad arguments.");

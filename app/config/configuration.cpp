@@ -152,14 +152,14 @@ std::string suggestion(const std::string& name) {
   // The items of a list have the same keys: the table has item 0's.
   std::string in_table = entry.name;
   if (in_table.starts_with("cameras.") && in_table.size() > 8) in_table[8] = '0';
-  const std::string why = why_withdrawn(Withdrawn::Kind::key, in_table);
+  const std::string why = new_name(Renamed::Kind::key, in_table);
   throw InputError(entry.origin + ": unknown key \"" + shown + "\"" +
                    (why.empty() ? suggestion(entry.name) : why));
 }
 
 /// Suggests a keyword instead of one that the key does not have; empty if nothing is close.
 std::string value_suggestion(const std::string& value, const Key& key) {
-  const std::string why = why_withdrawn(Withdrawn::Kind::value, key.name + " " + value);
+  const std::string why = new_name(Renamed::Kind::value, key.name + " " + value);
   return why.empty() ? did_you_mean(value, key.words) : why;
 }
 
@@ -318,10 +318,9 @@ std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
     if (!item) continue;
     const std::vector<std::string> words{"poses", "ins", "images", "pulses"};
     if (!entry.scalar || std::find(words.begin(), words.end(), entry.value) == words.end())
-      throw InputError(fmt::format("{}: record lists \"{}\"{}{}; it takes {}", entry.origin,
-                                   entry.value.substr(0, 60),
-                                   why_withdrawn(Withdrawn::Kind::record_topic, entry.value),
-                                   did_you_mean(entry.value, words), fmt::join(words, ", ")));
+      throw InputError(fmt::format("{}: record lists \"{}\"{}; it takes {}", entry.origin,
+                                   entry.value.substr(0, 60), did_you_mean(entry.value, words),
+                                   fmt::join(words, ", ")));
     entry.name = std::string(kGroup) + entry.value;
     entry.value = "on";
   }
@@ -414,8 +413,6 @@ constexpr std::size_t kShown = 60;  // bytes of a text from outside in a message
 std::string no_such_option(const std::string& name, const CameraSettings& camera) {
   std::vector<std::string> names;
   for (const OptionRow& row : option_rows(camera.options)) names.push_back(row.name);
-  if (const std::string why = why_withdrawn(Withdrawn::Kind::camera_option, name); !why.empty())
-    return fmt::format("there is no option \"{}\"{}", name, why);
   const std::string near = did_you_mean(name, names);
   return fmt::format("there is no option \"{}\"{} {} cameras have {}", name.substr(0, kShown),
                      near.empty() ? ";" : near, camera.driver, fmt::join(names, ", "));

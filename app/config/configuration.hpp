@@ -152,7 +152,6 @@ struct PublishSettings {
   std::string pose_stream{};  // unix:///PATH, udp://HOST:PORT
   std::string http{};         // HOST:PORT of the live page
   std::string token_file{};   // its first line; empty: a new token each session
-  int viewers = 4;
 };
 
 /// `sessions:` the folders that drives leave side by side.

@@ -219,7 +219,6 @@ Group publish() {
       .text("token_file", &P::token_file, 400,
             "File whose first line is the page's token, 16 to 128 letters and digits; empty: a "
             "new one each session, shown when it starts.")
-      .integer("viewers", &P::viewers, 1, 16, "viewers", "Maximum number of simultaneous viewers.")
       .done();
 }
 

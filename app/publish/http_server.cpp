@@ -24,12 +24,9 @@ using std::chrono::milliseconds;
 
 constexpr unsigned kPatience = 4;  // s: for a request to arrive, for an answer to be read
 constexpr int kBacklog = 1024;
-constexpr int kSendBuffer =
-    256 * 1024;  // bytes: a slow viewer sees the newest, not the last minute
 
 /// Content security policy: nothing but the page's own content.
-constexpr std::array<std::pair<const char*, const char*>, 6> kHeaders{{
-    {"Connection", "close"},
+constexpr std::array<std::pair<const char*, const char*>, 5> kHeaders{{
     {"Cache-Control", "no-store"},
     {"X-Content-Type-Options", "nosniff"},
     {"X-Frame-Options", "DENY"},
@@ -95,7 +92,6 @@ FileDescriptor listen_at(const HostPort& address) {
   FileDescriptor socket(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   constexpr int kOn = 1;
   (void)::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &kOn, sizeof kOn);
-  (void)::setsockopt(socket.get(), SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);
   const bool listens = socket && ::bind(socket.get(), found->ai_addr, found->ai_addrlen) == 0 &&
                        ::listen(socket.get(), kBacklog) == 0;
   const int error = errno;
@@ -107,25 +103,21 @@ FileDescriptor listen_at(const HostPort& address) {
   return socket;
 }
 
-std::string_view header_of(MHD_Connection* c, const char* name) noexcept {
-  const char* value = ::MHD_lookup_connection_value(c, MHD_HEADER_KIND, name);
+std::string_view value_of(MHD_Connection* c, MHD_ValueKind kind, const char* name) noexcept {
+  const char* value = ::MHD_lookup_connection_value(c, kind, name);
   return value == nullptr ? std::string_view() : value;
 }
 
-/// Takes the response over.
-bool send(MHD_Connection* c, unsigned status, const char* type, MHD_Response* response) noexcept {
+bool send(MHD_Connection* c, unsigned status, const char* type, std::string_view body) {
+  std::string bytes(body);
+  MHD_Response* response =
+      ::MHD_create_response_from_buffer(bytes.size(), bytes.data(), MHD_RESPMEM_MUST_COPY);
   if (response == nullptr) return false;
   (void)::MHD_add_response_header(response, "Content-Type", type);
   for (const auto& [name, value] : kHeaders) (void)::MHD_add_response_header(response, name, value);
   const bool queued = ::MHD_queue_response(c, status, response) == MHD_YES;
   ::MHD_destroy_response(response);
   return queued;
-}
-
-bool send(MHD_Connection* c, unsigned status, const char* type, std::string_view body) {
-  std::string bytes(body);
-  return send(c, status, type,
-              ::MHD_create_response_from_buffer(bytes.size(), bytes.data(), MHD_RESPMEM_MUST_COPY));
 }
 
 }  // namespace
@@ -147,10 +139,10 @@ HttpDecision decide(const HttpRequest& r, const HttpPolicy& policy) noexcept {
   }
   if (r.method != "GET") return {HttpRoute::refuse, 405, "only GET and POST are understood"};
   if (r.path == "/") return {HttpRoute::page, 200, ""};
-  if (r.path != "/events") return {HttpRoute::refuse, 404, "there is no such page"};
+  if (r.path != "/state") return {HttpRoute::refuse, 404, "there is no such page"};
   if (policy.token_to_read && !same_token(r.token, policy.token))
     return {HttpRoute::refuse, 403, "the token is not that of this session"};
-  return {HttpRoute::events, 200, ""};
+  return {HttpRoute::state, 200, ""};
 }
 
 /// No exception may pass through the library.
@@ -162,15 +154,18 @@ struct HttpServer::Callbacks {
     HttpRequest r;
     r.method = method;
     r.path = url;
-    r.host = header_of(c, "Host");
-    r.origin = header_of(c, "Origin");
-    r.token = header_of(c, "X-Vergence-Token");
+    const auto header = [c](const char* name) { return value_of(c, MHD_HEADER_KIND, name); };
+    const auto query = [c](const char* name) { return value_of(c, MHD_GET_ARGUMENT_KIND, name); };
+    r.host = header("Host");
+    r.origin = header("Origin");
+    r.token = header("X-Vergence-Token");
     r.token_in_header = !r.token.empty();
-    if (const char* token = ::MHD_lookup_connection_value(c, MHD_GET_ARGUMENT_KIND, "token");
-        token != nullptr && !r.token_in_header)
-      r.token = token;
-    const std::string_view length = header_of(c, "Content-Length");
-    r.has_body = (!length.empty() && length != "0") || !header_of(c, "Transfer-Encoding").empty();
+    if (!r.token_in_header) r.token = query("token");
+    const std::string_view length = header("Content-Length");
+    r.has_body = (!length.empty() && length != "0") || !header("Transfer-Encoding").empty();
+    r.epoch = query("epoch");
+    r.after = query("after");
+    r.image = query("image");
     try {
       return static_cast<HttpServer*>(server)->answer(c, r) ? MHD_YES : MHD_NO;
     } catch (const std::exception&) {
@@ -194,43 +189,23 @@ struct HttpServer::Callbacks {
     if (socket != nullptr) (void)::shutdown(socket->connect_fd, SHUT_RDWR);
     asking.pop_front();
   }
-
-  static ssize_t read(void* viewer, std::uint64_t /*at*/, char* to, std::size_t most) noexcept {
-    auto* v = static_cast<Viewer*>(viewer);
-    if (!v->pending()) {
-      v->asleep = true;
-      ::MHD_suspend_connection(v->connection);
-      return 0;
-    }
-    const std::size_t n = v->out.copy(to, most, v->sent);
-    v->sent += n;
-    return static_cast<ssize_t>(n);
-  }
-
-  static void gone(void* viewer) noexcept {
-    auto* v = static_cast<Viewer*>(viewer);
-    v->server->viewers_.remove_if([v](const Viewer& other) { return &other == v; });
-  }
 };
 
 HttpServer::HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page,
-                       std::size_t viewers, Action action)
-    : policy_(std::move(policy)), page_(page), max_viewers_(viewers), action_(std::move(action)) {
+                       Handler handler)
+    : policy_(std::move(policy)), page_(page), handler_(std::move(handler)) {
   FileDescriptor listener = listen_at(address);
   daemon_.reset(::MHD_start_daemon(
-      MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, &Callbacks::request, this,
-      MHD_OPTION_NOTIFY_CONNECTION, &Callbacks::connection, this, MHD_OPTION_LISTEN_SOCKET,
-      listener.get(), MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-      kRequestBytes, MHD_OPTION_CONNECTION_TIMEOUT, kPatience, MHD_OPTION_STRICT_FOR_CLIENT, 1,
-      MHD_OPTION_END));
+      MHD_USE_EPOLL, 0, nullptr, nullptr, &Callbacks::request, this, MHD_OPTION_NOTIFY_CONNECTION,
+      &Callbacks::connection, this, MHD_OPTION_LISTEN_SOCKET, listener.get(),
+      MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_MEMORY_LIMIT, kRequestBytes,
+      MHD_OPTION_CONNECTION_TIMEOUT, kPatience, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END));
   if (daemon_ == nullptr)
     throw InputError("publish.http: the system has no memory or files left for the page");
   listener.release();
 }
 
-HttpServer::~HttpServer() {
-  for (Viewer& viewer : viewers_) wake(&viewer);  // the library does not stop above sleepers
-}
+HttpServer::~HttpServer() = default;
 
 void HttpServer::StopDaemon::operator()(MHD_Daemon* daemon) const noexcept {
   ::MHD_stop_daemon(daemon);
@@ -241,73 +216,14 @@ void HttpServer::step(milliseconds timeout) {
 }
 
 bool HttpServer::answer(MHD_Connection* c, const HttpRequest& request) {
-  HttpDecision decision = decide(request, policy_);
-  if (decision.route == HttpRoute::events && viewers_.size() >= max_viewers_)
-    decision = {HttpRoute::refuse, 503, "as many as publish.viewers allows are looking already"};
-  switch (decision.route) {
-    case HttpRoute::refuse:
-      return send(c, decision.status, "text/plain; charset=utf-8",
-                  std::string(decision.message) + "\n");
-    case HttpRoute::page:
-      return send(c, decision.status, "text/html; charset=utf-8", page_);
-    case HttpRoute::events:
-      return begin_events(c);
-    default:
-      action_(decision.route);
-      return send(c, decision.status, "text/plain", "");
-  }
-}
-
-bool HttpServer::begin_events(MHD_Connection* c) {
-  constexpr std::size_t kBlock = 16384;  // bytes that are sent at a time
-  viewers_.push_back({this, c, "retry: 1000\n\n"});
-  MHD_Response* response = ::MHD_create_response_from_callback(
-      MHD_SIZE_UNKNOWN, kBlock, &Callbacks::read, &viewers_.back(), &Callbacks::gone);
-  if (response == nullptr) viewers_.pop_back();
-  return send(c, 200, "text/event-stream", response);
-}
-
-void HttpServer::wake(Viewer* viewer) noexcept {
-  if (std::exchange(viewer->asleep, false)) ::MHD_resume_connection(viewer->connection);
-}
-
-bool HttpServer::send_event(Viewer* viewer, std::string_view name, std::string_view json) {
-  if (viewer->pending() || json.size() > kMaxEventBytes) return false;
-  viewer->out = fmt::format("event: {}\ndata: {}\n\n", name, json);
-  viewer->sent = 0;
-  wake(viewer);
-  return true;
-}
-
-void HttpServer::broadcast(std::string_view name, std::string_view json, Skipped skipped) {
-  for (Viewer& v : viewers_) {
-    if (!v.greeted) continue;
-    if (skipped == Skipped::greet_again)
-      v.greeted = send_event(&v, name, json);
-    else if (!v.pending())
-      (void)send_event(&v, name, json);
-    else if (v.sent == 0 && v.out.size() + json.size() <= kMaxEventBytes)
-      v.out += fmt::format("event: {}\ndata: {}\n\n", name, json);  // behind what is just made
-  }
-}
-
-void HttpServer::greet(std::string_view name, const std::function<std::string()>& json) {
-  std::string text;
-  for (Viewer& v : viewers_) {
-    if (v.greeted || v.pending()) continue;
-    if (text.empty()) text = json();
-    v.greeted = true;
-    (void)send_event(&v, name, text);
-  }
-}
-
-void HttpServer::flush(milliseconds timeout) {
-  const auto end = std::chrono::steady_clock::now() + timeout;
-  const auto waits = [this] {
-    return std::any_of(viewers_.begin(), viewers_.end(),
-                       [](const Viewer& v) { return v.pending(); });
-  };
-  while (waits() && std::chrono::steady_clock::now() < end) step(milliseconds(20));
+  const HttpDecision decision = decide(request, policy_);
+  if (decision.route == HttpRoute::refuse)
+    return send(c, decision.status, "text/plain; charset=utf-8",
+                std::string(decision.message) + "\n");
+  if (decision.route == HttpRoute::page)
+    return send(c, decision.status, "text/html; charset=utf-8", page_);
+  const std::string body = handler_(decision.route, request);
+  return send(c, body.empty() ? 204 : decision.status, "application/json", body);
 }
 
 }  // namespace vergence::app

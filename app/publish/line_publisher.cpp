@@ -47,14 +47,8 @@ void LinePublisher::on_start(const SessionStart& start) noexcept {
   started_.store(true, std::memory_order_release);
 }
 
-void LinePublisher::on_frame(const RigFrame& frame) noexcept {
-  builder_.add(frame);
-  if (images_.copy(frame)) images_.finish();
-}
-
-void LinePublisher::on_pose(const PoseSample& sample) noexcept {
-  if (!frames_.push(builder_.add(sample, monotonic_now())))
-    dropped_.fetch_add(1, std::memory_order_relaxed);
+void LinePublisher::on_pose(const FrameReport& report) noexcept {
+  if (!reports_.push(report)) dropped_.fetch_add(1, std::memory_order_relaxed);
   wake();
 }
 
@@ -111,12 +105,12 @@ void LinePublisher::drain() {
     alignment_line_ = alignment_line(alignment);
   }
   if (changed) socket_->greet(calibration_line_ + alignment_line_);
-  for (LiveFrame frame; frames_.pop(&frame);) send(frame);
+  for (FrameReport report; reports_.pop(&report);) send(report);
 }
 
-void LinePublisher::send(const LiveFrame& frame) {
-  const PoseSample& pose = frame.pose;
-  newest_ = frame;
+void LinePublisher::send(const FrameReport& report) {
+  const PoseSample& pose = report.pose;
+  newest_ = report;
   std::optional<EnuPose> in_enu;
   if (alignment_ && pose.status != PoseStatus::lost) in_enu = alignment_->of(pose.T_world_left);
   const std::optional<ClockTie>& tie = start_.tie;
@@ -126,7 +120,7 @@ void LinePublisher::send(const LiveFrame& frame) {
   socket_->send(line_);
   ++lines_;
   const HostStamp sent = monotonic_now();
-  behind_pose_.add((sent - frame.out).to_seconds() * 1e3);
+  behind_pose_.add((sent - report.estimated).to_seconds() * 1e3);
   if (!tie) return;
   age_.add((tie->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
   constexpr std::uint64_t kBetween = 64;  // lines: a percentile walks through thousands of bins
@@ -138,7 +132,7 @@ void LinePublisher::send_status(HostStamp now) {
   StreamStatus status;
   status.session = start_.name;
   status.frame = newest_;
-  if (newest_) status.silent_s = (now - newest_->out).to_seconds();
+  if (newest_) status.silent_s = (now - newest_->estimated).to_seconds();
   status.calibrated = !calibration_line_.empty();
   status.verified = verified_.load(std::memory_order_relaxed);
   status.aligned = alignment_.has_value();

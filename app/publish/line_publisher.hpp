@@ -10,13 +10,11 @@
 
 #include "app/publish/frame_images.hpp"
 #include "app/publish/line_socket.hpp"
-#include "app/publish/live_frame.hpp"
 #include "app/publish/pose_stream.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
 #include "core/calibration/options.hpp"
 #include "core/memory/ring.hpp"
-#include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
 
 namespace vergence::app {
@@ -42,8 +40,10 @@ class LinePublisher final : public SessionObserver {
   LinePublisher& operator=(const LinePublisher&) = delete;
 
   void on_start(const SessionStart& start) noexcept override;
-  void on_frame(const RigFrame& frame) noexcept override;
-  void on_pose(const PoseSample& sample) noexcept override;
+  void on_frame(const RigFrame& frame) noexcept override {
+    if (images_.copy(frame)) images_.finish();
+  }
+  void on_pose(const FrameReport& report) noexcept override;
   void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override;
   void on_reading(const InsRecord& reading) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
@@ -58,7 +58,7 @@ class LinePublisher final : public SessionObserver {
  private:
   void work() noexcept;
   void drain();
-  void send(const LiveFrame& frame);
+  void send(const FrameReport& report);
   void send_status(HostStamp now);
   void send_images();
   [[nodiscard]] LineResponse answer(std::string_view request);
@@ -72,10 +72,8 @@ class LinePublisher final : public SessionObserver {
   SessionStart start_{};  // published by started_
   std::atomic<bool> started_{false}, stop_{false};
 
-  // Used by the estimator's thread only.
-  LiveFrameBuilder builder_;
-  // From it to the publisher's.
-  Ring<LiveFrame, 64> frames_;
+  // From the estimator's thread to the publisher's.
+  Ring<FrameReport, 64> reports_;
   Ring<PublishedEnuAlignment, 8> alignments_;
   Ring<CalibrationRecord, 4> calibrations_;
   FrameImages images_;
@@ -88,7 +86,7 @@ class LinePublisher final : public SessionObserver {
 
   // Used by the publisher's thread only.
   std::optional<PublishedEnuAlignment> alignment_{};
-  std::optional<LiveFrame> newest_{};
+  std::optional<FrameReport> newest_{};
   std::string calibration_line_{}, alignment_line_{};
   HostStamp status_due_{};
   std::string line_, image_bytes_;

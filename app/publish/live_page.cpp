@@ -5,13 +5,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <string_view>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "app/datasets/jpeg_writer.hpp"
 #include "app/publish/page_parts.hpp"  // made by CMake from app/publish/page/
@@ -57,9 +57,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kBetweenUpdates{100};  // 10 a second: what an eye follows
-constexpr milliseconds kFarewell{200};        // for the end of the drive to reach its viewers
-constexpr int kNiceness = 5;                  // beside the estimator's threads
+constexpr milliseconds kBetweenImages{100};
+constexpr milliseconds kFarewell{500};  // for viewers to learn of the session's end
+constexpr int kNiceness = 5;            // beside the estimator's threads
 
 }  // namespace
 
@@ -67,13 +67,14 @@ LivePage::LivePage(const Options& options, SessionRequests* requests,
                    std::function<double()> line_age_ms)
     : requests_(requests),
       line_age_ms_(std::move(line_age_ms)),
-      server_(options.address, options.policy, page_html(), options.viewers,
-              [this](HttpRoute route) { act(route); }),
+      epoch_(std::to_string(monotonic_now().ns())),
+      server_(
+          options.address, options.policy, page_html(),
+          [this](HttpRoute route, const HttpRequest& request) { return handle(route, request); }),
       thread_([this] {
         try {
           work();
-        } catch (
-            const std::exception& e) {  // no memory: whoever looks loses the page, not the drive
+        } catch (const std::exception& e) {  // no memory: viewers lose the page, not the session
           fmt::print(stderr, "vergence: the live page has ended ({}); the run continues\n",
                      e.what());
         }
@@ -87,18 +88,8 @@ LivePage::~LivePage() {
 // ---- the session's threads
 
 void LivePage::on_start(const SessionStart& start) noexcept {
-  builder_.begin(start.tie);
   start_ = start;
   started_.store(true, std::memory_order_release);
-}
-
-void LivePage::on_frame(const RigFrame& frame) noexcept {
-  builder_.add(frame);
-  (void)images_.copy(frame);
-}
-
-void LivePage::on_pose(const PoseSample& sample) noexcept {
-  push(&frames_, builder_.add(sample, monotonic_now()));
 }
 
 void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
@@ -137,16 +128,12 @@ void LivePage::work() {
   // On Linux a thread has a niceness of its own.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   while (!stop_.load(std::memory_order_acquire)) {
-    const auto wait = std::chrono::ceil<milliseconds>(shown_ + kBetweenUpdates - Clock::now());
-    // The end of the drive is looked for as often.
-    server_.step(server_.viewers() > 0 ? std::clamp(wait, milliseconds(0), kBetweenUpdates)
-                                       : kBetweenUpdates);
+    server_.step(milliseconds(100));
     drain();
-    if (server_.viewers() > 0 && Clock::now() >= shown_ + kBetweenUpdates) show();
   }
-  drain();
-  if (server_.viewers() > 0) show();
-  server_.flush(kFarewell);
+  const Clock::time_point end = Clock::now() + kFarewell;
+  if (asked_ + kFarewell > Clock::now())
+    while (Clock::now() < end) server_.step(milliseconds(20));
 }
 
 void LivePage::drain() {
@@ -158,29 +145,47 @@ void LivePage::drain() {
   const bool ended = ended_.load(std::memory_order_acquire);
   for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
   for (PublishedEnuAlignment alignment; alignments_.pop(&alignment);) state_.add(alignment);
-  for (LiveFrame frame; frames_.pop(&frame);) state_.add(frame);
   for (FrameReport report; reports_.pop(&report);) state_.add(report);
   for (EventRecord event; events_.pop(&event);) state_.add(event);
   if (ended) state_.end();
 }
 
-void LivePage::show() {
-  // Ten a second, not a little fewer; what was late is not made up for.
-  shown_ = std::max(shown_ + kBetweenUpdates, Clock::now() - kBetweenUpdates / 2);
-  if (!begun_) return;  // the mock's world takes its time; viewers wait for the session
-  counts_.updates.fetch_add(1, std::memory_order_relaxed);
-  const HostStamp now = monotonic_now();
-  server_.broadcast("update", state_.update(now, line_age_ms_()), HttpServer::Skipped::greet_again);
-  // After the update: what a greeting has is not told again.
-  server_.greet("hello", [this, now] { return state_.hello(now); });
-  if (images_.ready()) {
-    show_images();
-    images_.done();
-  }
-  images_.want(start_.image_bytes);
+std::string LivePage::handle(HttpRoute route, const HttpRequest& request) {
+  constexpr auto kOrder = std::memory_order_relaxed;
+  if (route == HttpRoute::state) return state_since(request);
+  if (route == HttpRoute::recalibrate) requests_->recalibrate.store(true, kOrder);
+  if (route == HttpRoute::mark) requests_->mark.store(true, kOrder);
+  if (route == HttpRoute::stop_recording) requests_->stop_recording.store(true, kOrder);
+  return "";
 }
 
-void LivePage::show_images() {
+std::string LivePage::state_since(const HttpRequest& request) {
+  asked_ = Clock::now();
+  drain();
+  if (!begun_) return "";  // the simulated world takes its time; viewers wait for the session
+  counts_.updates.fetch_add(1, std::memory_order_relaxed);
+  const bool known = request.epoch == epoch_;
+  std::uint64_t version = 0;
+  if (known)
+    (void)std::from_chars(request.after.data(), request.after.data() + request.after.size(),
+                          version);
+  nlohmann::json out = state_.since(version, monotonic_now(), line_age_ms_());
+  out["epoch"] = epoch_;
+  if (images_.ready()) {
+    newest_images_ = images_json();
+    newest_image_ = std::to_string(images_.frame());
+    images_.done();
+  }
+  if (!newest_image_.empty() && !(known && request.image == newest_image_))
+    out["images"] = newest_images_;
+  if (asked_ >= wanted_ + kBetweenImages) {
+    wanted_ = asked_;
+    images_.want(start_.image_bytes);
+  }
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+nlohmann::json LivePage::images_json() const {
   nlohmann::json out{{"frame", images_.frame()}, {"images", nlohmann::json::array()}};
   for (std::size_t k = 0; k < FrameImages::kImages; ++k) {
     const ImageView image = images_.image(k);
@@ -198,14 +203,7 @@ void LivePage::show_images() {
     }
     points.push_back(std::move(point));
   }
-  server_.broadcast("images", out.dump(), HttpServer::Skipped::harmless);
-}
-
-void LivePage::act(HttpRoute route) noexcept {
-  constexpr auto kOrder = std::memory_order_relaxed;
-  if (route == HttpRoute::recalibrate) requests_->recalibrate.store(true, kOrder);
-  if (route == HttpRoute::mark) requests_->mark.store(true, kOrder);
-  if (route == HttpRoute::stop_recording) requests_->stop_recording.store(true, kOrder);
+  return out;
 }
 
 std::string_view page_html() {

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "app/publish/frame_images.hpp"
 #include "app/publish/http_server.hpp"
 #include "app/publish/live_state.hpp"
@@ -51,7 +53,6 @@ class LivePage final : public SessionObserver {
   struct Options {
     HostPort address{};
     HttpPolicy policy{};
-    std::size_t viewers = 4;
   };
 
   /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
@@ -61,14 +62,12 @@ class LivePage final : public SessionObserver {
   LivePage& operator=(const LivePage&) = delete;
 
   void on_start(const SessionStart& start) noexcept override;
-  void on_frame(const RigFrame& frame) noexcept override;
-  void on_pose(const PoseSample& sample) noexcept override;
+  void on_frame(const RigFrame& frame) noexcept override { (void)images_.copy(frame); }
   void on_tracks(const calibration::TrackLog& tracks) noexcept override;
   void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override;
   void on_report(const FrameReport& report) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
-  /// Shows the end of the drive first.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
 
  private:
@@ -80,17 +79,14 @@ class LivePage final : public SessionObserver {
   }
   void work();
   void drain();
-  void show();
-  void show_images();
-  void act(HttpRoute route) noexcept;
+  [[nodiscard]] std::string handle(HttpRoute route, const HttpRequest& request);
+  [[nodiscard]] std::string state_since(const HttpRequest& request);
+  [[nodiscard]] nlohmann::json images_json() const;
 
   SessionRequests* requests_;
   std::function<double()> line_age_ms_;
 
-  LiveFrameBuilder builder_;  // of the estimator's thread
-
-  // From it to the page's.
-  Ring<LiveFrame, 256> frames_;
+  // From the estimator's thread to the page's.
   Ring<FrameReport, 256> reports_;
   Ring<EventRecord, 64> events_;
   Ring<CalibrationRecord, 8> calibrations_;
@@ -107,8 +103,11 @@ class LivePage final : public SessionObserver {
   // Used by the page's thread only.
   LiveState state_;
   bool begun_ = false;
+  const std::string epoch_;  // tells a viewer that the program was started again
+  nlohmann::json newest_images_{};
+  std::string newest_image_{};            // number of their frame
+  Clock::time_point asked_{}, wanted_{};  // for the state, for images
   HttpServer server_;
-  Clock::time_point shown_{};
   std::thread thread_;
 };
 

@@ -22,10 +22,6 @@ json rounded(double value, double digits) {
   return std::round(value * scale) / scale;
 }
 
-std::string text_of(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
 json event_json(const EventRecord& event, Stamp first) {
   return {{"s", rounded((event.stamp - first).to_seconds(), 1)},
           {"kind", event.kind},
@@ -46,27 +42,23 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
   return {{"figures", statistics}};
 }
 
-constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
-constexpr double kMaxIntervals = 3;    // … unless frames are that rare
-constexpr double kSmoothing = 8;       // frames
+// A status is old after this time without a frame, or after this many intervals between frames.
+constexpr double kSilenceSeconds = 1, kMaxIntervals = 3;
+constexpr double kSmoothing = 8;  // frames
 
 }  // namespace
 
-void LiveState::add(const LiveFrame& frame) {
-  if (newest_) add_interval(frame.out);
-  newest_ = frame;
-  estimate_.add(static_cast<double>(frame.pose.estimate_ms));
-}
-
 /// A gap counts as twice the interval at most: an outage does not make the next one unseen.
-void LiveState::add_interval(HostStamp out) noexcept {
-  const double gap = (out - newest_->out).to_seconds();
+void LiveState::add_interval(HostStamp estimated) noexcept {
+  const double gap = (estimated - newest_->estimated).to_seconds();
   if (interval_s_ <= 0) interval_s_ = gap;
   interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
 }
 
 void LiveState::add(const FrameReport& report) {
-  report_ = report;
+  if (newest_) add_interval(report.estimated);
+  newest_ = report;
+  estimate_.add(static_cast<double>(report.pose.estimate_ms));
   const PoseStatus status = report.pose.status;
   if (status == PoseStatus::lost && !report.ins_valid) return;
   LiveTrail::Place place;
@@ -78,25 +70,25 @@ void LiveState::add(const FrameReport& report) {
     place.world = trail_.places().back().world;
   const Vec3& ins = report.reference.T_enu_left.t;
   if (report.ins_valid) place.ins = {number(ins.x()), number(ins.y())};
+  place.version = ++version_;
   trail_.add(place);
 }
 
 void LiveState::add(const EventRecord& event) {
   if (events_.size() == kEvents) events_.pop_front();
-  events_.push_back(event);
+  events_.emplace_back(++version_, event);
   const std::string_view kind = event.kind;
   const bool confirmed = kind == "calibration_verified";
   if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed") {
     confirmed_ = confirmed;
-    calibration_new_ = true;
+    calibration_version_ = version_;
   }
-  ++events_seen_;
 }
 
 void LiveState::add(const CalibrationRecord& calibration) {
   if (calibrations_.size() == kCalibrations) calibrations_.pop_front();
   calibrations_.push_back(calibration);
-  calibration_new_ = true;
+  calibration_version_ = ++version_;
   if (calibration.is_refinement) measured_ = calibration;
   if (!calibration.accepted) return;
   measured_.reset();
@@ -106,48 +98,52 @@ void LiveState::add(const CalibrationRecord& calibration) {
 
 void LiveState::add(const PublishedEnuAlignment& alignment) {
   alignment_ = alignment;
-  alignment_new_ = true;
+  alignment_version_ = ++version_;
 }
 
 json LiveState::frame_json(HostStamp now) const {
-  const LiveFrame& f = *newest_;
-  const double silence = (now - f.out).to_seconds();
+  const FrameReport& f = *newest_;
+  const FrameCounts& n = f.counts;
+  const double silence = (now - f.estimated).to_seconds();
   const PoseSample& p = f.pose;
   const std::string_view reason = to_string(p.reason);
-  json out{{"frame", p.frame},
-           {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
-           {"since_s", rounded(silence, 1)},  // when it came
-           {"silent", silence > std::max(kSilenceSeconds, kMaxIntervals * interval_s_)},
-           {"state", to_string(p.state)},
-           {"status", to_string(p.status)},
-           {"reason", reason},
-           {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(reason)},
-           {"inliers", p.inliers},
-           {"stereo_inliers", p.stereo_inliers},
-           {"reprojection_px", rounded(p.reprojection_px, 3)},
-           {"estimate_ms", rounded(p.estimate_ms, 2)},
-           {"estimate_p50_ms", rounded(estimate_.percentile(0.5), 2)},
-           {"estimate_p99_ms", rounded(estimate_.percentile(0.99), 2)},
-           {"read", f.read},
-           {"ok", f.ok},
-           {"degraded", f.degraded},
-           {"lost", f.lost},
-           {"missing", f.missing},
-           {"path_m", rounded(f.path_m, 2)},
-           {"stamp_error_us", rounded(static_cast<double>(f.stamp_error.ns()) * 1e-3, 1)},
-           {"spread_us", rounded(static_cast<double>(f.spread.ns()) * 1e-3, 1)},
-           {"pairing", to_text(f.pairing)},
-           {"age_ms", f.age_ms < 0 ? json(nullptr) : rounded(f.age_ms, 2)}};
+  json out{
+      {"frame", p.frame},
+      {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
+      {"since_s", rounded(silence, 1)},  // when it came
+      {"silent", silence > std::max(kSilenceSeconds, kMaxIntervals * interval_s_)},
+      {"state", to_string(p.state)},
+      {"status", to_string(p.status)},
+      {"reason", reason},
+      {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(reason)},
+      {"inliers", p.inliers},
+      {"stereo_inliers", p.stereo_inliers},
+      {"reprojection_px", rounded(p.reprojection_px, 3)},
+      {"estimate_ms", rounded(p.estimate_ms, 2)},
+      {"estimate_p50_ms", rounded(estimate_.percentile(0.5), 2)},
+      {"estimate_p99_ms", rounded(estimate_.percentile(0.99), 2)},
+      {"read", n.read},
+      {"ok", n.ok},
+      {"degraded", n.degraded},
+      {"lost", n.lost},
+      {"missing", n.missing},
+      {"path_m", rounded(n.path_m, 2)},
+      {"stamp_error_us", rounded(static_cast<double>(f.stamp_error.ns()) * 1e-3, 1)},
+      {"spread_us", rounded(static_cast<double>(f.spread.ns()) * 1e-3, 1)},
+      {"pairing", to_word(f.pairing)},
+      {"age_ms", start_.tie
+                     ? rounded((start_.tie->stamp_at(f.estimated) - p.stamp).to_seconds() * 1e3, 2)
+                     : json(nullptr)}};
   if (p.status != PoseStatus::lost)
     for (const double v : p.T_world_left.t) out["position_m"].push_back(rounded(v, 3));
-  if (report_ && report_->compared) {
-    const auto e = report_->error();
+  if (f.compared) {
+    const auto e = f.error();
     out["ins"] = {{"across_m", rounded(std::hypot(e[0], e[1]), 2)},
                   {"up_m", rounded(e[2], 2)},
                   {"heading_deg", rounded(e[3], 2)}};
   }
-  if (report_ && report_->placed) {
-    const EnuPose& ours = report_->ours;
+  if (f.placed) {
+    const EnuPose& ours = f.ours;
     out["enu"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
                   {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
                   {"height_m", rounded(ours.position.height_m, 2)},
@@ -202,40 +198,25 @@ json LiveState::place_json(const LiveTrail::Place& p) {
   return out;
 }
 
-std::string LiveState::hello(HostStamp now) const {
-  json out{{"session", start_.name},
-           {"frames", start_.frames},
-           {"can_recalibrate", start_.can_recalibrate},
-           {"recording", start_.recording},
-           {"ended", ended_}};
-  json& trail = out["trail"] = json::array();
-  for (const LiveTrail::Place& p : trail_.places()) trail.push_back(place_json(p));
-  json& events = out["events"] = json::array();
-  for (const EventRecord& event : events_) events.push_back(event_json(event, start_.first));
-  out["calibration"] = calibration_json();
-  if (alignment_) out["enu_alignment"] = enu_alignment_json(*alignment_);
-  if (newest_) out["now"] = frame_json(now);
-  return text_of(out);
-}
-
-std::string LiveState::update(HostStamp now, double line_age_ms) {
-  json out{{"ended", ended_}};
-  if (newest_) out["now"] = frame_json(now);
-  if (newest_)
+json LiveState::since(std::uint64_t version, HostStamp now, double line_age_ms) const {
+  json out{{"version", version_},           {"session", start_.name},
+           {"frames", start_.frames},       {"can_recalibrate", start_.can_recalibrate},
+           {"recording", start_.recording}, {"ended", ended_}};
+  if (newest_) {
+    out["now"] = frame_json(now);
     out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
-  const std::size_t first = trail_.pop_new();
+  }
+  const std::size_t first = trail_.first_after(version);
   out["trail_from"] = first;
   json& trail = out["trail"] = json::array();
   const std::vector<LiveTrail::Place>& places = trail_.places();
   for (std::size_t i = first; i < places.size(); ++i) trail.push_back(place_json(places[i]));
   json& events = out["events"] = json::array();
-  const auto fresh = std::min<std::uint64_t>(events_seen_ - events_shown_, events_.size());
-  for (auto i = events_.size() - static_cast<std::size_t>(fresh); i < events_.size(); ++i)
-    events.push_back(event_json(events_[i], start_.first));
-  events_shown_ = events_seen_;
-  if (std::exchange(calibration_new_, false)) out["calibration"] = calibration_json();
-  if (std::exchange(alignment_new_, false)) out["enu_alignment"] = enu_alignment_json(*alignment_);
-  return text_of(out);
+  for (const auto& [event_version, event] : events_)
+    if (event_version > version) events.push_back(event_json(event, start_.first));
+  if (calibration_version_ > version) out["calibration"] = calibration_json();
+  if (alignment_version_ > version) out["enu_alignment"] = enu_alignment_json(*alignment_);
+  return out;
 }
 
 namespace {
@@ -249,28 +230,34 @@ float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
 }  // namespace
 
 void LiveTrail::add(const Place& place) {
-  if (places_.size() == kMax) thin();
+  if (places_.size() == kMax) thin(place.version);
   if (places_.empty() || distance(place.world, places_.back().world) >= min_step_m_)
     return places_.push_back(place);
   // A rig that stands for weeks uses up no places, whatever its status does.
   Place& last = places_.back();
   if (place.status <= last.status) return;
   last.status = place.status;
-  shown_ = std::min(shown_, places_.size() - 1);
+  last.version = place.version;
 }
 
-void LiveTrail::thin() {
-  shown_ = 0;
+std::size_t LiveTrail::first_after(std::uint64_t version) const noexcept {
+  const auto first = std::partition_point(
+      places_.begin(), places_.end(), [version](const Place& p) { return p.version <= version; });
+  return static_cast<std::size_t>(first - places_.begin());
+}
+
+void LiveTrail::thin(std::uint64_t version) {
   if (min_step_m_ >= kMaxStep) {
     places_.erase(places_.begin(), places_.begin() + kMax / 2);
-    return;
+  } else {
+    min_step_m_ *= 2;
+    for (std::size_t i = 0; i < places_.size(); i += 2) {
+      places_[i].status = std::max(places_[i].status, places_[i + 1].status);
+      places_[i / 2] = places_[i];
+    }
+    places_.resize(kMax / 2);
   }
-  min_step_m_ *= 2;
-  for (std::size_t i = 0; i < places_.size(); i += 2) {
-    places_[i].status = std::max(places_[i].status, places_[i + 1].status);
-    places_[i / 2] = places_[i];
-  }
-  places_.resize(kMax / 2);
+  for (Place& p : places_) p.version = version;
 }
 
 }  // namespace vergence::app

@@ -13,6 +13,18 @@
 
 namespace vergence::app {
 
+EnuPose PublishedEnuAlignment::of(const Transform& T_world_left) const {
+  const Transform T_enu_left = alignment.T_enu_world * T_world_left;
+  const Vec3 view = T_enu_left.R.col(2);
+  return {T_enu_left, LocalTangentPlane(origin).to_geodetic(T_enu_left.t),
+          std::atan2(view.y(), view.x())};
+}
+
+const char* to_word(Pairing pairing) noexcept {
+  constexpr std::array kWords{"assumed", "verified", "contradicted"};
+  return kWords[static_cast<std::size_t>(pairing)];
+}
+
 namespace {
 
 /// JSON knows no infinity.
@@ -157,15 +169,16 @@ std::string status_line(const StreamStatus& s) {
               {"frames", nullptr},          {"pairing", nullptr},     {"cameras", json::array()},
               {"calibrated", s.calibrated}, {"verified", s.verified}, {"ins", nullptr}};
   if (s.frame) {
-    const LiveFrame& f = *s.frame;
+    const FrameReport& f = *s.frame;
+    const FrameCounts& n = f.counts;
     fields["stamp_ns"] = f.pose.stamp.ns();
     fields["state"] = to_string(f.pose.state);
     fields["status"] = to_string(f.pose.status);
     fields["reason"] = to_string(f.pose.reason);
     fields["silent_s"] = s.silent_s;
-    fields["frames"] = {{"read", f.read}, {"ok", f.ok},           {"degraded", f.degraded},
-                        {"lost", f.lost}, {"missing", f.missing}, {"dropped", s.dropped}};
-    fields["pairing"] = to_text(f.pairing);
+    fields["frames"] = {{"read", n.read}, {"ok", n.ok},           {"degraded", n.degraded},
+                        {"lost", n.lost}, {"missing", n.missing}, {"dropped", s.dropped}};
+    fields["pairing"] = to_word(f.pairing);
     for (int k = 0; k < f.cameras; ++k)
       fields["cameras"].push_back((f.images_present >> k & 1U) != 0);
   }

@@ -5,9 +5,10 @@
 #include <string>
 #include <string_view>
 
-#include "app/publish/live_frame.hpp"
 #include "app/session/records.hpp"
 #include "core/calibration/options.hpp"
+#include "core/comparison/comparison.hpp"
+#include "core/comparison/enu_alignment.hpp"
 #include "drivers/ins.hpp"
 
 /// Lines of the pose stream: JSON objects, each with a `type` and followed by a line feed.
@@ -15,6 +16,17 @@
 namespace vergence::app {
 
 inline constexpr int kPoseStreamVersion = 2;
+
+/// Where the odometry's world lies on the earth.
+struct PublishedEnuAlignment {
+  EnuAlignment alignment{};
+  Geodetic origin{};  // of enu
+
+  [[nodiscard]] EnuPose of(const Transform& T_world_left) const;
+};
+
+/// `assumed`, `verified`, `contradicted`.
+[[nodiscard]] const char* to_word(Pairing pairing) noexcept;
 
 /// `type: pose`. `age_ms`: from mid-exposure to now, where stamps are tied to this machine's clock.
 /// `dropped`: frames without a line since the start. Replaces *line, whose memory is used again.
@@ -37,7 +49,7 @@ struct StreamStatus {
   };
 
   std::string session{};  // name of the session folder
-  std::optional<LiveFrame> frame{};
+  std::optional<FrameReport> frame{};
   double silent_s = 0;  // since the last frame
   bool calibrated = false, verified = false, aligned = false;
   std::uint64_t dropped = 0;  // as in a pose line

@@ -76,7 +76,6 @@ void Publishing::open_page(const Configuration& configuration) {
   options.policy.token = settings.token_file.empty()
                              ? new_token()
                              : read_token(configuration.folder / settings.token_file);
-  options.viewers = static_cast<std::size_t>(settings.viewers);
   try {
     page_ = std::make_unique<LivePage>(
         options, &requests_, [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });

@@ -9,34 +9,15 @@
 #include <cstring>
 
 #include "app/runtime/errors.hpp"
+#include "app/runtime/file_descriptor.hpp"
 
 namespace vergence::app {
 namespace {
 
-/// A descriptor that closes itself; close() tells what the system says.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) (void)::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-  [[nodiscard]] int close() {
-    const int fd = fd_;
-    fd_ = -1;
-    return ::close(fd);
-  }
-
- private:
-  int fd_;
-};
-
 /// errno, 0 when all of it is on the disk.
 int write_whole(const std::filesystem::path& file, std::string_view text) {
-  Descriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-  if (out.get() < 0) return errno;
+  FileDescriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (!out) return errno;
   while (!text.empty()) {
     const ssize_t n = ::write(out.get(), text.data(), text.size());
     if (n > 0)
@@ -45,15 +26,17 @@ int write_whole(const std::filesystem::path& file, std::string_view text) {
       return n == 0 ? ENOSPC : errno;
   }
   if (::fsync(out.get()) != 0) return errno;
-  return out.close() == 0 ? 0 : errno;
+  const int fd = out.get();
+  out.release();
+  return ::close(fd) == 0 ? 0 : errno;
 }
 
 /// The new name is on the disk only with the folder. File systems that cannot do that say EINVAL;
 /// that is no loss.
 int synchronise_folder(const std::filesystem::path& folder) {
-  const Descriptor at(
+  const FileDescriptor at(
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (at.get() < 0) return errno;
+  if (!at) return errno;
   return ::fsync(at.get()) == 0 || errno == EINVAL ? 0 : errno;
 }
 

@@ -39,19 +39,16 @@ namespace vergence::app {
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        const std::vector<std::string>& known);
 
-/// Something of an earlier version that a user may still write, and what to do now.
-struct Withdrawn {
-  enum class Kind { key, value, camera_option, record_topic, option, command } kind;
-  std::string_view
-      name;  // record.roll_s, sync.mode ieee1394_cycle_time, replay --through-devices, completion
-  std::string_view instead;  // the end of an error message: what replaced it
-  bool renamed = false;      // `instead` is the new name
+/// A name of an earlier version that a user may still write.
+struct Renamed {
+  enum class Kind { key, value, option } kind;
+  std::string_view name;  // record.roll_mb, sync.mode bus, run --page
+  std::string_view now;   // the new name
 };
 
-[[nodiscard]] std::span<const Withdrawn> withdrawn();
+[[nodiscard]] std::span<const Renamed> renamed();
 
-/// `; it was removed: …` or `; it is now …` for an error message about an unknown name; empty where
-/// no earlier version had it.
-[[nodiscard]] std::string why_withdrawn(Withdrawn::Kind kind, std::string_view name);
+/// `; it is now …` for an error message about an unknown name; empty where it was not renamed.
+[[nodiscard]] std::string new_name(Renamed::Kind kind, std::string_view name);
 
 }  // namespace vergence::app

@@ -68,11 +68,7 @@ Progress::~Progress() { finish(); }
 void Progress::update(const ProgressState& state) {
   if (mode_ == Mode::quiet) return;
   const HostStamp now = clock_();
-  state_text_ = state.state;
   last_ = state;
-  last_.state = state_text_;
-  activity_ = state.activity;
-  last_.activity = activity_;
   drawn_ = false;
   if (!started_) {
     started_ = true;
@@ -108,13 +104,13 @@ std::string Progress::line(HostStamp now) const {
   const ProgressState& s = last_;
   std::string text;
   const auto part = [&text](const std::string& p) { text += (text.empty() ? "" : " · ") + p; };
-  if (!s.state.empty()) part(std::string(s.state));
+  if (!s.state.empty()) part(s.state);
   part(s.frames > 0 ? fmt::format("frame {}/{}", s.frame, s.frames)
                     : fmt::format("frame {}", s.frame));
   if (s.activity.empty())
     part(fmt::format("{:.2f} km", s.path_m / 1000.0));
   else
-    part(std::string(s.activity));
+    part(s.activity);
   if (s.inliers) part(fmt::format("{} inliers", *s.inliers));
   if (s.estimate_ms) part(fmt::format("{:.1f} ms", *s.estimate_ms));
   if (s.from_ins_m) part(fmt::format("{:.2f} m from INS", *s.from_ins_m));

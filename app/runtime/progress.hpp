@@ -13,15 +13,15 @@ namespace vergence::app {
 
 /// Content of the progress line; unset fields are omitted.
 struct ProgressState {
-  std::string_view state{};             // `stereo`
+  std::string state{};                  // `stereo`
   std::uint64_t frame = 0;              // done so far
   std::uint64_t frames = 0;             // in all; 0: nobody knows (no time left is told)
   double path_m = 0;                    // travelled
   std::optional<int> inliers{};         // of the last pose
   std::optional<double> estimate_ms{};  // of the last frame
   std::optional<double> from_ins_m{};   // distance to the INS
-  std::string_view activity{};  // instead of way and figures, where there are none: `calibrate ·
-                                // frame 7/26 · 5 with the board`
+  std::string activity{};  // instead of path and figures, where there are none: `calibrate · frame
+                           // 7/26 · 5 with the board`
 };
 
 /// `stereo · frame 1204/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 03:12 left`
@@ -64,7 +64,6 @@ class Progress {
   std::function<HostStamp()> clock_;
   std::function<int()> width_;
   ProgressState last_{};
-  std::string state_text_{}, activity_{};  // last_ points here
   bool started_ = false;  // an update has come since the start or the last finish()
   bool drawn_ = false;    // the last update is on the screen
   HostStamp first_time_{}, drawn_time_{};

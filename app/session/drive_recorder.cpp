@@ -212,7 +212,8 @@ bool DriveRecorder::rig_is_due() const noexcept {
   return calibrated_ && rig_in_file_ != recording_.counters().files;
 }
 
-void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
+void DriveRecorder::on_pose(const FrameReport& report) noexcept {
+  const PoseSample& sample = report.pose;
   frame_.sample = sample;
   frame_.solver_done = watch_.found_idle();
   post(frame_topic, sample.stamp, [&](CdrWriter* out) { write_frame(out, frame_); });

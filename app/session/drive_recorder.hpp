@@ -36,7 +36,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
                 const SourceFacts& facts, const ReplayableSolverRunner& watch);
 
   void on_frame(const RigFrame& frame) noexcept override;
-  void on_pose(const PoseSample& sample) noexcept override;
+  void on_pose(const FrameReport& report) noexcept override;
   void on_reading(const InsRecord& reading) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;

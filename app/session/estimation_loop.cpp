@@ -12,6 +12,7 @@
 #include "app/session/session_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "core/memory/thread_allocations.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 
@@ -119,7 +120,7 @@ void EstimationLoop::run() noexcept {
 
 void EstimationLoop::handle(const SourceEvent& event) noexcept {
   if (event.recalibrate) estimator_->request_recalibration();
-  if (event.skipped) log_.record_skipped();
+  if (event.skipped) ++counts_.skipped;
   if (event.listed) log_.log(event.record, event.to_user);
 }
 
@@ -154,18 +155,44 @@ void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   output_.post(frame.rig);
   const PoseSample sample = estimator_->process(frame.rig);
   source_.done(sample);
-  output_.post(sample);
+  const FrameReport posed = report(frame, sample);
+  output_.post_pose(posed);
   output_.post(estimator_->tracks());
   log_.collect(*estimator_);
-  log_.collect(sample);
-  compare(sample, frame.decode_ms);
+  log_.record_effort(sample);
+  if (comparison_) return comparison_->add(posed);
+  output_.post(posed);
+  log_.collect(posed);
 }
 
-void EstimationLoop::compare(const PoseSample& sample, float decode_ms) noexcept {
-  if (comparison_)
-    comparison_->add(sample, decode_ms);
-  else
-    output_.post(FrameReport::of(sample, decode_ms, reference_.at(sample.stamp)));
+FrameReport EstimationLoop::report(const SourceFrame& frame, const PoseSample& sample) noexcept {
+  const RigFrame& rig = frame.rig;
+  if (newest_number_ && rig.number > *newest_number_ + 1)
+    counts_.missing += rig.number - *newest_number_ - 1;
+  newest_number_ = rig.number;
+  ++counts_.read;
+  ++(sample.status == PoseStatus::ok         ? counts_.ok
+     : sample.status == PoseStatus::degraded ? counts_.degraded
+                                             : counts_.lost);
+  if (sample.status != PoseStatus::lost) {
+    const Vec3& position = sample.T_world_left.t;
+    if (newest_position_) counts_.path_m += (position - *newest_position_).norm();
+    newest_position_ = position;
+  }
+  FrameReport r;
+  r.pose = sample;
+  r.counts = counts_;
+  r.stamp_error = rig.stamp_error;
+  r.spread = rig.spread;
+  r.pairing = rig.pairing;
+  r.cameras = rig.cameras;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    if (!rig.images[k].empty())
+      r.images_present = static_cast<std::uint8_t>(r.images_present | 1U << k);
+  r.estimated = monotonic_now();
+  r.decode_ms = frame.decode_ms;
+  if (!comparison_) r.T_reference_left = reference_.at(sample.stamp);
+  return r;
 }
 
 }  // namespace vergence::app

@@ -2,6 +2,7 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -87,7 +88,7 @@ class EstimationLoop {
   void handle(const SourceFrame& frame) noexcept;
   void handle(const InsRecord& reading) noexcept { comparison_->add(reading); }
   void handle(const SourceEvent& event) noexcept;
-  void compare(const PoseSample& sample, float decode_ms) noexcept;
+  [[nodiscard]] FrameReport report(const SourceFrame& frame, const PoseSample& sample) noexcept;
   void request_recalibration(Stamp stamp, const char* message) noexcept;
   void poll_requests(Stamp stamp) noexcept;
 
@@ -107,6 +108,9 @@ class EstimationLoop {
   SessionOutput output_;
   EventLog log_;
   std::unique_ptr<InsComparison> comparison_;
+  FrameCounts counts_{};
+  std::optional<std::uint64_t> newest_number_{};
+  std::optional<Vec3> newest_position_{};
   std::atomic<bool> calibration_asked_{false}, drained_{false};
   Beat beat_;
   bool delivering_ = false;  // a frame has come

@@ -74,26 +74,6 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
   log(event, true);
 }
 
-void EventLog::collect(const PoseSample& sample) noexcept {
-  record_effort(sample);
-  ++now_.done;
-  now_.state = sample.state;
-  now_.reason = sample.reason;
-  now_.inliers = sample.inliers;
-  now_.estimate_ms = sample.estimate_ms;
-  if (sample.status != PoseStatus::lost) {
-    if (posed_) now_.path_m += (sample.T_world_left.t - last_position_).norm();
-    last_position_ = sample.T_world_left.t;
-    posed_ = true;
-  }
-  (void)progress_snapshots_.push(now_);
-}
-
-void EventLog::record_skipped() noexcept {
-  ++now_.done;
-  (void)progress_snapshots_.push(now_);
-}
-
 void EventLog::log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept {
   EventRecord event;
   event.stamp = stamp;
@@ -111,19 +91,18 @@ void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
     progress->print(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
                                 notice.message.data()));
-  ProgressSnapshot newest;
+  FrameReport newest;
   bool any = false;
-  while (progress_snapshots_.pop(&newest)) any = true;
+  while (reports_.pop(&newest)) any = true;
   if (!any) return;
-  const std::string state_text = describe_state(newest.state, newest.reason);
   ProgressState state;
-  state.state = state_text;
-  state.frame = newest.done;
+  state.state = describe_state(newest.pose.state, newest.pose.reason);
+  state.frame = newest.counts.read + newest.counts.skipped;
   state.frames = frames;
-  state.path_m = newest.path_m;
-  state.inliers = newest.inliers;
-  state.estimate_ms = static_cast<double>(newest.estimate_ms);
-  if (newest.from_ins_m >= 0) state.from_ins_m = newest.from_ins_m;
+  state.path_m = newest.counts.path_m;
+  state.inliers = newest.pose.inliers;
+  state.estimate_ms = static_cast<double>(newest.pose.estimate_ms);
+  if (newest.compared) state.from_ins_m = newest.error_enu.norm();
   progress->update(state);
 }
 

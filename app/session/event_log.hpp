@@ -11,11 +11,11 @@
 namespace vergence::app {
 
 /// Collects by-products of each frame: events and calibrations for the session's output, progress
-/// snapshots and messages for the terminal.
+/// and messages for the terminal.
 ///
-/// Threads  collect(), record_…(), log(): the estimator's, sealed. show(): the caller's. No
+/// Threads  note(), record_…(), log(): the estimator's, sealed. show(): the caller's. No
 /// synchronisation is needed after the estimator's thread has been joined. Memory   Fixed. If a
-/// ring is full, the newest snapshot or message is dropped; every message also is in events.jsonl.
+/// ring is full, the newest report or message is dropped; every message also is in events.jsonl.
 class EventLog {
  public:
   /// The output outlives the last note.
@@ -23,11 +23,10 @@ class EventLog {
 
   /// Call after process() or finish(): forwards its events and calibrations.
   void collect(const Estimator& estimator) noexcept;
-  /// Call with the result of process(): updates the progress.
-  void collect(const PoseSample& sample) noexcept;
-  /// Counts a frame that was not read.
-  void record_skipped() noexcept;
-  void record_distance_from_ins(double metres) noexcept { now_.from_ins_m = metres; }
+  /// Call with the result of process(): logs when work other than the pose is omitted.
+  void record_effort(const PoseSample& sample) noexcept;
+  /// Call with each complete report: updates the progress.
+  void collect(const FrameReport& report) noexcept { (void)reports_.push(report); }
   /// An event of the session's own. `kind` points to a constant. `to_user`: on stderr, too.
   void log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept;
   void log(const EventRecord& event, bool to_user) noexcept;
@@ -40,26 +39,11 @@ class EventLog {
   void show(Progress* progress, std::uint64_t frames);
 
  private:
-  struct ProgressSnapshot {
-    std::uint64_t done = 0;  // frames, skipped ones included
-    State state = State::initialising;
-    Reason reason = Reason::none;
-    double path_m = 0;
-    int inliers = 0;
-    float estimate_ms = 0;
-    double from_ins_m = -1;  // negative: not compared
-  };
-
-  void record_effort(const PoseSample& sample) noexcept;
-
   SessionOutput* output_ = nullptr;
   Stamp first_{};
-  ProgressSnapshot now_{};
   std::uint64_t dropped_ = 0;
-  Vec3 last_position_ = Vec3::Zero();
-  bool posed_ = false;
   int whole_frames_ = std::numeric_limits<int>::max() / 2;  // since one had no time for its work
-  Ring<ProgressSnapshot, 64> progress_snapshots_;
+  Ring<FrameReport, 64> reports_;
   Ring<EventRecord, 32> notices_;
 };
 

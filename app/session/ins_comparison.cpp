@@ -173,20 +173,21 @@ void InsComparison::add(const InsRecord& reading) noexcept {
                  comparison_.counters().ins_contradicted > 0);
 }
 
-void InsComparison::add(const PoseSample& pose, float decode_ms) noexcept {
-  newest_stamp_ = pose.stamp;
-  decode_ms_[static_cast<std::size_t>(added_++ % decode_ms_.size())] = decode_ms;
-  comparison_.add(pose);
+void InsComparison::add(const FrameReport& report) noexcept {
+  newest_stamp_ = report.pose.stamp;
+  pending_[static_cast<std::size_t>(added_++ % pending_.size())] = report;
+  comparison_.add(report.pose);
 }
 
 void InsComparison::drain() noexcept {
   for (ComparedPose pose; comparison_.next(&pose);) {
-    output_->post(FrameReport::of(
-        pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
+    FrameReport& report = pending_[static_cast<std::size_t>(drained_++ % pending_.size())];
+    report.set_comparison(pose);
+    output_->post(report);
+    event_log_.collect(report);
     if (pose.ins_valid) ++matches_;
     measure_way(pose);
     measure_errors(pose);
-    event_log_.record_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
     apply_enu_alignment(pose.pose.stamp);
     if (pose.ins_valid && pose.scale_disagrees) ++scale_disagreements_;
     events_.update(pose, matches_);

@@ -96,8 +96,7 @@ class InsComparison {
   /// readings (Recorder::Options::ins).
   void open(SessionOutput* output) noexcept { output_ = output; }
   void add(const InsRecord& reading) noexcept;
-  /// `decode_ms` of its images goes with the pose.
-  void add(const PoseSample& pose, float decode_ms) noexcept;
+  void add(const FrameReport& report) noexcept;
   /// Hands on every pose that has met its readings.
   void drain() noexcept;
   /// No more readings and poses will come.
@@ -118,7 +117,7 @@ class InsComparison {
   EventLog& event_log_;
   InsEvents events_;
   SessionOutput* output_ = nullptr;
-  std::array<float, Comparison::kPending> decode_ms_{};  // of the poses that wait, by their count
+  std::array<FrameReport, Comparison::kPending> pending_{};  // by the count of their poses
   std::uint64_t added_ = 0, drained_ = 0;
   std::uint64_t matches_ = 0, scale_disagreements_ = 0;
   std::uint32_t alignment_revision_ = 0;

@@ -29,7 +29,7 @@ class LineFile;
 ///
 ///     make_session_folder("sessions/monday");
 ///     Recorder recorder("sessions/monday", {});
-///     recorder.on_report(FrameReport::of(sample, 0, std::nullopt));  // of each frame
+///     recorder.on_report(report);  // of each frame
 ///     const std::unique_ptr<SessionTotals> totals = recorder.close();
 ///
 /// Posted records reach the files at the latest after a

@@ -112,18 +112,9 @@ void copy_text(std::string_view text, std::array<char, N>* out) noexcept {
 
 }  // namespace
 
-FrameReport FrameReport::of(const PoseSample& sample, float decode_ms,
-                            const std::optional<Transform>& T_reference_left) noexcept {
-  FrameReport r;
-  r.pose = sample;
-  r.decode_ms = decode_ms;
-  r.T_reference_left = T_reference_left;
-  return r;
-}
-
-FrameReport FrameReport::of(const ComparedPose& pose, float decode_ms) noexcept {
-  return {pose, decode_ms,
-          pose.ins_valid ? std::optional(pose.reference.T_enu_left) : std::nullopt};
+void FrameReport::set_comparison(const ComparedPose& with_ins) noexcept {
+  ComparedPose::operator=(with_ins);
+  if (ins_valid) T_reference_left = reference.T_enu_left;
 }
 
 std::array<double, 4> FrameReport::error() const noexcept {

@@ -13,6 +13,7 @@
 #include "core/types/calibration.hpp"
 #include "core/types/calibration_decision.hpp"
 #include "core/types/pose_sample.hpp"
+#include "core/types/rig_frame.hpp"
 #include "core/types/stamped_pose.hpp"
 
 /// Input of a session's observers: plain values of fixed size, made on the estimator's thread
@@ -67,19 +68,30 @@ class LineFile {
   std::string waiting_;
 };
 
-/// Report of one frame: its pose, also in ENU beside the INS where there is one, and its times.
-/// format_frame() makes the line of poses.csv of it; unless lost, it is a line of trajectory.tum,
-/// too.
+/// Counts up to a frame, so that they stay true for a reader that misses frames.
+struct FrameCounts {
+  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
+  std::uint64_t skipped = 0;  // not read, for instance because the image file is broken
+  std::uint64_t missing = 0;  // numbers of frames that never came
+  double path_m = 0;          // sum of the steps between successive poses
+};
+
+/// Report of one frame: its input but for the images, its pose, also in ENU beside the INS where
+/// there is one, and its times. format_frame() makes the line of poses.csv of it; unless lost, it
+/// is a line of trajectory.tum, too.
 struct FrameReport : ComparedPose {
+  FrameCounts counts{};
+  Duration stamp_error{}, spread{};  // as in RigFrame
+  Pairing pairing = Pairing::assumed;
+  int cameras = 0;
+  std::uint8_t images_present = 0;  // mask by camera
+  HostStamp estimated{};            // when the estimator was done
   float decode_ms = 0;
   /// The reference's pose of the left camera, in the reference's own frame.
   std::optional<Transform> T_reference_left{};
 
-  /// Makes the report of a frame without an INS.
-  [[nodiscard]] static FrameReport of(const PoseSample& sample, float decode_ms,
-                                      const std::optional<Transform>& T_reference_left) noexcept;
-  /// With the INS as the reference.
-  [[nodiscard]] static FrameReport of(const ComparedPose& pose, float decode_ms) noexcept;
+  /// Adds the comparison with the INS, which becomes the reference.
+  void set_comparison(const ComparedPose& with_ins) noexcept;
   /// ours − INS: east, north, up, m; heading, deg clockwise. Meaningful where `compared`.
   [[nodiscard]] std::array<double, 4> error() const noexcept;
 };

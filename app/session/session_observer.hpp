@@ -70,8 +70,8 @@ class SessionObserver {
 
   /// Called with the estimator's next input: images, stamp, how sure the pairing is.
   virtual void on_frame(const RigFrame& /*frame*/) noexcept {}
-  /// Called with the pose of that frame immediately.
-  virtual void on_pose(const PoseSample& /*sample*/) noexcept {}
+  /// Called with the pose of that frame immediately; the report lacks the comparison with the INS.
+  virtual void on_pose(const FrameReport& /*report*/) noexcept {}
   /// The newest moving frames with their tracks, after on_pose(); valid until it returns. Empty
   /// where nothing watches the calibration.
   virtual void on_tracks(const calibration::TrackLog& /*tracks*/) noexcept {}
@@ -104,7 +104,7 @@ class SessionOutput {
       : observers_(observers) {}
 
   void post(const RigFrame& frame) noexcept { tell(&SessionObserver::on_frame, frame); }
-  void post(const PoseSample& sample) noexcept { tell(&SessionObserver::on_pose, sample); }
+  void post_pose(const FrameReport& report) noexcept { tell(&SessionObserver::on_pose, report); }
   void post(const calibration::TrackLog& tracks) noexcept {
     tell(&SessionObserver::on_tracks, tracks);
   }

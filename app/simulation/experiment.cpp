@@ -5,13 +5,11 @@
 #include <cmath>
 #include <fstream>
 #include <iostream>
-#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/datasets/text_file.hpp"
 #include "app/runtime/progress.hpp"
 
 namespace vergence::app {
@@ -48,35 +46,6 @@ struct Level {
   int runs = 0, failed = 0;
   Statistic reprojection_px, pose_m, rotation_rad, translation_m, ms, steps;
 };
-
-std::vector<double> parse_noise(const std::string& text) {
-  constexpr std::size_t kMax = 100;
-  constexpr double kLargest = 100;  // px
-  std::vector<std::string_view> fields(kMax);
-  const std::size_t count = split(text, ',', fields);
-  if (count > kMax) throw InputError("--noise has more than " + std::to_string(kMax) + " levels");
-  std::vector<double> levels(count);
-  for (std::size_t i = 0; i < count; ++i)
-    if (!parse_number(fields[i], &levels[i]) || !(levels[i] >= 0) || levels[i] > kLargest)
-      throw InputError("--noise: `" + std::string(fields[i]) +
-                       "` is not a noise between 0 and 100 pixels; give them like 0,0.1,0.2");
-  return levels;
-}
-
-void check(const Experiment& a) {
-  const SimulationOptions& s = a.simulation;
-  const auto within = [](const char* option, double value, double least, double most) {
-    if (!(value >= least && value <= most))
-      throw InputError(fmt::format("{} needs a number between {} and {}", option, least, most));
-  };
-  within("--points", s.points, 5, 100000);
-  within("--cameras", s.cameras, 2, kMaxCameras);
-  within("--runs", a.runs, 1, 1000000);
-  within("--radius", s.radius, 1e-3, 1e4);
-  within("--start-position", s.start_position, 0, 1e3);
-  within("--start-rotation", s.start_rotation, 0, M_PI);
-  within("--start-translation", s.start_translation, 0, 1e3);
-}
 
 /// Solves one problem and books what came out.
 void run_once(BundleAdjuster& adjuster, const Experiment& a, const SimulationOptions& s,
@@ -171,9 +140,7 @@ void print_table(const Experiment& a, const std::vector<Level>& levels) {
 }  // namespace
 
 ExitCode run_experiment(const Experiment& given) {
-  check(given);
   Experiment a = given;
-  const std::vector<double> noise = parse_noise(a.noise);
   a.simulation.shape = a.shape == "shell" ? SimulationShape::shell : SimulationShape::ball;
   a.simulation.generator =
       a.generator == "tight" ? SimulationGenerator::tight : SimulationGenerator::ring;
@@ -190,8 +157,8 @@ ExitCode run_experiment(const Experiment& given) {
   std::vector<Level> levels;
   ProgressState state;
   state.state = "simulate";
-  state.frames = noise.size() * static_cast<std::uint64_t>(a.runs);
-  for (const double n : noise) {
+  state.frames = a.noise.size() * static_cast<std::uint64_t>(a.runs);
+  for (const double n : a.noise) {
     SimulationOptions s = a.simulation;
     s.noise = n;
     Level level;

@@ -1,16 +1,18 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "app/runtime/errors.hpp"
 #include "app/simulation/rig_simulation.hpp"
 
 namespace vergence::app {
 
-/// `vergence simulate`: the words as given; checked by run_experiment().
+/// Options of `vergence simulate`.
 struct Experiment {
   SimulationOptions simulation{};
-  std::string shape = "ball", generator = "ring", length = "exact", noise = "0,0.1,0.2,0.3", json;
+  std::string shape = "ball", generator = "ring", length = "exact", json;
+  std::vector<double> noise{0, 0.1, 0.2, 0.3};  // px
   int runs = 100;
   std::uint64_t seed = 1;
   bool quiet = false;
@@ -18,7 +20,7 @@ struct Experiment {
 
 /// Repeats the calibration experiment on simulated point clouds, every noise level with the same
 /// geometry; a table on standard output, and JSON if asked for.
-/// Errors  InputError: an option out of its range, a file that cannot be written.
+/// Errors  InputError: a cloud that no view shows whole, a file that cannot be written.
 [[nodiscard]] ExitCode run_experiment(const Experiment& given);
 
 }  // namespace vergence::app

@@ -28,9 +28,8 @@ struct LagChange {
 };
 
 struct FeatureDriveOptions {
-  int width = 1024, height = 768;  // px
-  Pinhole left{1247, 1247, 511.5,
-               383.5};  // true; a test of wrong intrinsics computes with others
+  int width = 1024, height = 768;          // px
+  Pinhole left{1247, 1247, 511.5, 383.5};  // true; a test of wrong intrinsics computes with others
   Pinhole right{1247, 1247, 511.5, 383.5};
   Transform T_right_left{exp_so3({5e-3, -8e-3, 3e-3}), {-0.75, 0, 0}};  // true, before any change
   double rate = 30;                                                     // Hz

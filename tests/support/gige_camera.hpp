@@ -59,16 +59,16 @@ class GigeCamera {
   /// An address of the loopback that no other program's tests use at the same time; `k` below 250.
   [[nodiscard]] static std::string address(int k);
 
-  void
-  unplug();  // Answers and sends nothing until replug(), after which no program has control.
+  void unplug();  // Answers and sends nothing until replug(), after which no program has control.
   void replug();
   void silence(bool silent);        // answers, exposes nothing
   void lose_frames(int exposures);  // the next ones are not sent at all
   void tear_frames(
       int exposures);  // of the next ones one packet of data is not sent and not sent again
   void set_loss(double share);  // of the packets, those sent again too
-  void lie_about_size(int width,
-                      int height);  // Sends images of this size instead of the registers'; 0: theirs again.
+  void lie_about_size(
+      int width,
+      int height);  // Sends images of this size instead of the registers'; 0: theirs again.
   /// A pulse at Line1: one exposure of image `number` where the camera waits for one. `when`: its
   /// time; 0: now.
   void pulse(std::uint64_t number, HostStamp when = {});

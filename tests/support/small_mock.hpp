@@ -36,8 +36,9 @@ namespace vergence::test {
   for (const std::string& f : faults) parsed.push_back(mock::parse_fault(f));
   mock::DriveOptions drive;
   drive.kind = kind;
-  return std::make_shared<const mock::RigTruth>(
-      empty_town(), drive, calibration, mock::default_T_body_left(), Transform{}, std::move(parsed));
+  return std::make_shared<const mock::RigTruth>(empty_town(), drive, calibration,
+                                                mock::default_T_body_left(), Transform{},
+                                                std::move(parsed));
 }
 
 /// Configuration of its cameras: triggered, 8 ms.

@@ -90,9 +90,8 @@ function item(text) {
 
 const EVENTS = 10, HISTORY = 4;  // that a page has room for; files have all of them
 
-function showEvents(list, anew) {
+function showEvents(list) {
   const ul = $("events");
-  if (anew) ul.replaceChildren();
   for (const e of list) ul.prepend(item(`${number(e.s, 1)} s · ${e.kind.replaceAll("_", " ")} · ${e.message}`));
   while (ul.childElementCount > EVENTS) ul.lastChild.remove();
 }
@@ -242,90 +241,69 @@ function blank() {
 }
 
 function begin(message) {
-  greeted = true;
   if (!message.now || message.session !== drive.session) blank();
   Object.assign(drive, {session: message.session, frames: message.frames, trail: [], enu_alignment: null});
   document.title = "vergence · " + message.session;
   for (const button of document.querySelectorAll("button")) button.disabled = !token()
     || (button.dataset.action === "recalibrate" && !message.can_recalibrate) || (button.dataset.action === "stop-recording" && !message.recording);
   show("action_words", token() ? "" : "actions need the token: open the link printed at the start");
-  showEvents(message.events, true);
-  take(message);
+  $("events").replaceChildren();
 }
 
+// What is new since `have`; all of it from a program that has been started again.
 function take(message) {
+  if (message.epoch !== have.epoch) begin(message);
+  have = {epoch: message.epoch, after: message.version, image: message.images ? message.images.frame : message.epoch === have.epoch ? have.image : ""};
+  showEvents(message.events);
+  if (message.images) showImages(message.images).catch(console.error);
   if (message.enu_alignment) drive.enu_alignment = message.enu_alignment;
   if (message.calibration) showCalibration(message.calibration);
-  drive.trail.splice(message.trail_from || 0, Infinity, ...message.trail);
+  drive.trail.splice(message.trail_from, Infinity, ...message.trail);
   drive.ended = message.ended;
   if (message.now) showNow(message.now);
   const silent = drive.now && drive.now.silent;
   const words = drive.ended ? "the session has ended" : !drive.now ? "waiting for the first frame" : silent ? "no frames" : "live";
   link(words + " · " + drive.session, !drive.ended && silent, drive.ended || !drive.now || silent);
+  ++window.updates;
   redraw();
 }
 
-const TAKERS = {
-  hello: begin,
-  update: message => { showEvents(message.events, false); take(message); ++window.updates; },
-  images: showImages,
-};
+const POLL_MS = 100, AGAIN_MS = 1000, REFUSED_MS = 2000;  // until the next request
+const QUIET_MS = 3000, GIVEN_UP_MS = 15000;
+let have = {epoch: "", after: 0, image: ""}, connected = false, heard = 0;
 
-const AGAIN_MS = 1000, REFUSED_MS = 2000;    // until the next attempt
-const QUIET_MS = 3000, GIVEN_UP_MS = 15000;  // news come ten times a second
-let stream = null, greeted = false, heard = 0;
-
-// Events of a stream, each a name and JSON; what is cut waits for its rest.
-async function read(body) {
-  const reader = body.getReader(), decoder = new TextDecoder();
-  for (let rest = "";;) {
-    const {value, done} = await reader.read();
-    if (done) return;
-    heard = performance.now();
-    const events = (rest + decoder.decode(value, {stream: true})).split("\n\n");
-    rest = events.pop();
-    for (const event of events) {
-      const [, name, data] = /^event: (.*)\ndata: (.*)$/.exec(event) || [];
-      if (name in TAKERS) handle(name, data);
-    }
+// Returns the time until the next request, ms.
+async function ask() {
+  const answer = await fetch("/state?" + new URLSearchParams(have), {headers: token() ? {"X-Vergence-Token": token()} : {}, signal: AbortSignal.timeout(GIVEN_UP_MS)});
+  const text = await answer.text();
+  heard = performance.now();
+  connected = answer.status === 200;
+  if (answer.status === 204) link("connected, waiting for the session to start", false, true);
+  if (!answer.ok) {
+    link(`refused (${answer.status}): ${text.trim()}${answer.status === 403 ? "; open the link printed at the start" : ""}`, true, true);
+    return REFUSED_MS;
   }
-}
-
-function handle(name, data) {
   try {
-    TAKERS[name](JSON.parse(data));
+    if (connected) take(JSON.parse(text));
   } catch (error) {
     console.error(error);  // a mistake of the page's is not to look like a lost connection
   }
+  return POLL_MS;
 }
 
-// By fetch and not an EventSource, which has no header for the token and does not tell why it was refused.
-async function look() {
-  stream = new AbortController();
-  greeted = false;
-  heard = performance.now();
-  const answer = await fetch("/events", {headers: token() ? {"X-Vergence-Token": token()} : {}, signal: stream.signal});
-  if (answer.ok) {
-    link("connected, waiting for the session to start", false, true);
-    return read(answer.body);
-  }
-  const message = (await answer.text()).trim();
-  link(`refused (${answer.status}): ${message}${answer.status === 403 ? "; open the link printed at the start" : ""}`, true, true);
-  return REFUSED_MS;
+async function poll() {
+  const wait = await ask().catch(() => {
+    connected = false;
+    link(drive.ended ? "the session has ended; waiting for the next one" : "no connection: retrying", !drive.ended, true);
+    return AGAIN_MS;
+  });
+  setTimeout(poll, wait);
 }
 
-async function connect() {
-  const wait = await look().catch(() => 0);
-  stream = null;
-  if (!wait) link(drive.ended ? "the session has ended; waiting for the next one" : "no connection: retrying", !drive.ended, true);
-  setTimeout(connect, wait || AGAIN_MS);
-}
-
-// A network that has gone, or a program that hangs, ends no stream.
+// A network that has gone, or a program that hangs, gives no answer.
 setInterval(() => {
   const quiet = performance.now() - heard;
-  if (stream && greeted && quiet > QUIET_MS) link(`no data for ${lasting(quiet / 1000)}: check the network`, true, true);
-  if (stream && quiet > GIVEN_UP_MS) stream.abort();
+  if (connected && quiet > QUIET_MS) link(`no data for ${lasting(quiet / 1000)}: check the network`, true, true);
 }, 500);
 
 for (const button of document.querySelectorAll("button")) button.addEventListener("click", async () => {
@@ -333,5 +311,5 @@ for (const button of document.querySelectorAll("button")) button.addEventListene
   show("action_words", answer && answer.ok ? button.textContent + ": requested" : answer && answer.status === 403 ? "refused: the token belongs to another session" : "no response from the program");
 });
 window.updates = 0;
-connect();
+poll();
 })();

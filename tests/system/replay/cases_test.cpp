@@ -125,8 +125,7 @@ std::vector<Case> trajectories() {
       {"all stamps equal", "1403636584.0 {p}", kTum, "the same stamp in all", 2},
       {"repeated", "{s} {p}\n{s} {p}|{s} {p}", kTum,
        "3 rows that repeat a stamp are dropped|60 poses matched"},
-      {"out of order", "{s} {p}\n1403636584.1 {p}|{s} {p}", kTum,
-       "order of the times is restored"},
+      {"out of order", "{s} {p}\n1403636584.1 {p}|{s} {p}", kTum, "order of the times is restored"},
       {"KITTI without times", "{m}", "{m}", "row belongs to row|60 poses matched"},
       {"KITTI of other lengths", "{m}", "{m}\n{m}|{m}", "has 60 poses|has 63", 2},
       {"numbers before matrices", "{i} {m}", "{m}", "row belongs to row|60 poses matched"},
@@ -301,22 +300,19 @@ std::vector<Case> calibrations() {
       calibration("T_imu_cam of both", {{"c.yaml", "%YAML:1.0\n" + kalibr(raw, raw1)}}),
       calibration("T_cam_imu of both", {{"c.yaml", kalibr(cam0, cam1)}}),
       calibration("T_cam_imu of one", {{"c.yaml", kalibr(cam0)}}, "T_cn_cnm1", 2),
-      calibration("radial-tangential",
-                  {{"c.yaml", kalibr("", kStepBetween, "radial-tangential")}}),
+      calibration("radial-tangential", {{"c.yaml", kalibr("", kStepBetween, "radial-tangential")}}),
       calibration("plumb_bob", {{"c.yaml", kalibr("", kStepBetween, "plumb_bob")}}),
       calibration("equi", {{"c.yaml", kalibr("", kStepBetween, "equi")}}),
       calibration("double sphere", {{"c.yaml", kalibr("", kStepBetween, "ds")}}, "\"ds\"", 2),
       calibration("rostopic echo", pair(echo(0, false), echo(-8.8, false))),
       calibration("ros2 topic echo", pair(echo(0, true) + "---\n", echo(-8.8, true) + "---\n")),
       calibration("two documents", {{"b.yaml", echo(0, true) + "---\n" + echo(-8.8, true)}}),
-      calibration("binned by REP 104",
-                  pair(echo(0, true, 2, binned), echo(-8.8, true, 2, binned))),
+      calibration("binned by REP 104", pair(echo(0, true, 2, binned), echo(-8.8, true, 2, binned))),
       calibration("ost.txt", {{"ost.txt", ost}}),
       calibration("P in centimetres", pair(camera_info(0), camera_info(-880)),
                   "11 m|unusually long"),
       calibration("sign of P", pair(camera_info(0), camera_info(8.8)), "right.yaml|swapped", 2),
-      calibration("P of one in both", pair(camera_info(-8.8), camera_info(-8.8)), "both have",
-                  2),
+      calibration("P of one in both", pair(camera_info(-8.8), camera_info(-8.8)), "both have", 2),
       calibration("size of the sensor",
                   pair(camera_info(0, "image_width: 192\nimage_height: 144\n"),
                        camera_info(-8.8, "image_width: 192\nimage_height: 144\n")),
@@ -350,8 +346,8 @@ std::vector<Case> calibrations() {
           "VINS of another lens",
           {{"cfg.yaml", kVins}, {"+c0.yaml", vins_camera("MEI")}, {"+c1.yaml", vins_camera("MEI")}},
           "\"MEI\"", 2),
-      calibration("lenses of VINS alone",
-                  {{"c0.yaml", vins_camera()}, {"c1.yaml", vins_camera()}}, "VINS|body_T_cam0", 2),
+      calibration("lenses of VINS alone", {{"c0.yaml", vins_camera()}, {"c1.yaml", vins_camera()}},
+                  "VINS|body_T_cam0", 2),
       calibration("OKVIS",
                   {{"c.yaml", "%YAML:1.0\ncameras:\n" + okvis_camera(0) + okvis_camera(0.11)}}),
       calibration("EuRoC, Kimera", {{"l.yaml", sensor(0)}, {"r.yaml", sensor(0.11, "radtan")}}),
@@ -364,12 +360,10 @@ std::vector<Case> calibrations() {
           "KITTI calib.txt",
           {{"calib.txt", "P0: 80 0 48 0 0 80 36 0 0 0 1 0\nP1: 80 0 48 -8.8 0 80 36 0 0 0 1 0\n"}},
           "0.11 m", 0, "--size 96x72"),
-      calibration("ZED", {{"SN1.conf", "[LEFT_CAM_HD]\nfx=80\n[RIGHT_CAM_HD]\nfx=80\n"}}, "ZED",
-                  2),
+      calibration("ZED", {{"SN1.conf", "[LEFT_CAM_HD]\nfx=80\n[RIGHT_CAM_HD]\nfx=80\n"}}, "ZED", 2),
       calibration("Basalt", {{"c.json", R"({"value0": {"T_imu_cam": [], "intrinsics": []}})"}},
                   "Basalt", 2),
-      calibration("DepthAI", {{"c.json", R"({"cameraData": [], "boardName": "x"})"}}, "DepthAI",
-                  2),
+      calibration("DepthAI", {{"c.json", R"({"cameraData": [], "boardName": "x"})"}}, "DepthAI", 2),
   };
 }
 
@@ -523,8 +517,7 @@ std::vector<Case> folders() {
       {"no times", image_0, "", "0.1 s apart", kitti("P0:", "P1:")},
       {"no colon", image_0, "{f:.6e}", {}, kitti("P0", "P1")},
       {"names of the raw data", image_0, "{f:.6e}", {}, kitti("P_rect_00 :", "P_rect_01 :")},
-      {"an excerpt", named("image_{c}/{j:06}.png"), "{f:.6e}", "number 100",
-       kitti("P0:", "P1:")},
+      {"an excerpt", named("image_{c}/{j:06}.png"), "{f:.6e}", "number 100", kitti("P0:", "P1:")},
   };
   struct Euroc {
     const char* name;
@@ -727,8 +720,8 @@ std::vector<Case> bags() {
       w->message(6, ns, imu_message(Wire::cdr, ns, {0, 0, 0, 1}, 0));
     }
   };
-  all.push_back(bag("constant attitude and a fix without a height", identity,
-                    "is not used: it differs"));
+  all.push_back(
+      bag("constant attitude and a fix without a height", identity, "is not used: it differs"));
   return all;
 }
 

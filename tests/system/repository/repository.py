@@ -4,6 +4,7 @@
   arrows    every #include goes where the table below allows
   cycles    no two folders include from one another, directly or round about
   words     no file in the tree names a place of one machine or a habit the project does not have
+  safety    every test that docs/safety_tests.csv names exists
   format    every C and C++ file is as clang-format writes it
   self-test the checks above find what they must, and nothing else
 
@@ -206,6 +207,17 @@ def words(root):
     return findings
 
 
+def safety(root):
+    test = re.compile(r"^(?:TEST|TEST_F|TEST_P|TYPED_TEST_P)\(\s*(\w+),\s*(\w+)|^fuzz_target\((\w+)", re.MULTILINE)
+    there = set()
+    for name in tree_files(root):
+        if name.startswith("tests/") and name.endswith((".cpp", ".hpp", "CMakeLists.txt")):
+            there |= {"%s.%s" % (suite or "fuzz", case or target) for suite, case, target in test.findall("\n".join(lines_of(root, name)))}
+    table = "docs/safety_tests.csv"
+    return ["%s:%d: there is no test %s" % (table, number, test)
+            for number, line in enumerate(lines_of(root, table), 1) for test in re.findall(r"\b\w+\.\w+\b", line.rsplit('","', 1)[-1]) if test not in there]
+
+
 def sources(root):
     return [n for n in tree_files(root) if n.endswith(SOURCE_SUFFIXES)]
 
@@ -313,6 +325,12 @@ def self_test():
             expect(cycles(root), expected, "cycle in %s" % (pairs,))
             for path in paths:
                 os.remove(path)
+        path = put("tests/a/a_test.cpp", "TEST(Suite, case) {\n")
+        for text, expected in (("Suite.case", False), ("Suite.other", True)):
+            table = put("docs/safety_tests.csv", '"A statement","%s"\n' % text)
+            expect(safety(root), expected, "table with %s" % text)
+            os.remove(table)
+        os.remove(path)
         for text, expected in (("see /%s/me/x\n" % PLACES[1], True), ("in ../%s/data, app/%s/x\n" % (PLACES[0], PLACES[1]), False),
                                ("$HOME/%s/x\n" % PLACES[0], False), ("-march=" + "native\n", True)):
             path = put("docs/a.md", text)
@@ -330,14 +348,14 @@ def self_test():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("check", choices=("arrows", "cycles", "words", "format", "self-test"))
+    parser.add_argument("check", choices=("arrows", "cycles", "words", "safety", "format", "self-test"))
     parser.add_argument("--root", default=".")
     given = parser.parse_args()
     if given.check == "format" and shutil.which("clang-format") is None:
         print("skipped: clang-format is not installed")
         return SKIPPED
-    findings = {"arrows": lambda: arrows(given.root), "cycles": lambda: cycles(given.root), "words": lambda: words(given.root), "format": lambda: format_files(given.root),
-                "self-test": self_test}[given.check]()
+    checks = {"arrows": arrows, "cycles": cycles, "words": words, "safety": safety, "format": format_files, "self-test": lambda _: self_test()}
+    findings = checks[given.check](given.root)
     print("\n".join(findings) if findings else "%s: nothing found" % given.check)
     return 1 if findings else 0
 

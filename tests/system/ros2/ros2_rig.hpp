@@ -242,7 +242,8 @@ class StreamSession {
     frame.stamp = Stamp(kFirst + static_cast<std::int64_t>(frames_) * kInterval);
     for (std::size_t k = 0; k < 2; ++k) frame.images[k] = image(frames_, k);
     publisher_.on_frame(frame);
-    PoseSample sample;
+    app::FrameReport report;
+    PoseSample& sample = report.pose;
     sample.frame = frames_;
     sample.stamp = frame.stamp;
     sample.state = State::stereo_odometry;
@@ -250,7 +251,7 @@ class StreamSession {
     sample.T_world_left.t.z() = 0.1 * static_cast<double>(frames_);
     sample.covariance[0] = 0.25F;
     ++frames_;
-    publisher_.on_pose(sample);
+    publisher_.on_pose(report);
   }
   [[nodiscard]] std::map<std::string, std::uint64_t> counters() {
     std::map<std::string, std::uint64_t> out;

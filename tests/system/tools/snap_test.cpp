@@ -126,10 +126,9 @@ TEST_F(SnapGige, silentCameraIsNamedAndExitsThree) {
   cameras[1].silence(true);
   const TemporaryFolder folder;
   const auto begin = std::chrono::steady_clock::now();
-  const Outcome o =
-      snap(folder, "gige.yaml",
-           settings +
-               " --wait 2 --set cameras.0.trigger=software --set cameras.1.trigger=software");
+  const Outcome o = snap(
+      folder, "gige.yaml",
+      settings + " --wait 2 --set cameras.0.trigger=software --set cameras.1.trigger=software");
   EXPECT_EQ(o.code, 3) << o.err;
   EXPECT_TRUE(contains(o.err, "right (gige SNAP-1) sent no image within 2 s")) << o.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "s/left.png"));

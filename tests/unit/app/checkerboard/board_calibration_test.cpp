@@ -50,7 +50,7 @@ struct RigCase {
 class BoardCalibrationOf : public ::testing::TestWithParam<RigCase> {};
 
 // A jackknife over ten groups knows its sigmas to a quarter: four of them are three true ones.
-TEST_P(BoardCalibrationOf, RigIsRecoveredWithinItsSigmas) {
+TEST_P(BoardCalibrationOf, rigIsWithinItsSigmas) {
   const RigCase& p = GetParam();
   const RigCalibration truth = known_rig(p.cameras, p.model);
   BoardScene scene = board_scene(truth, kBoard, 15, kNoise, 3);
@@ -82,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(
                       RigCase{"three", 3, CameraModelKind::pinhole_radtan, true}),
     [](const auto& of_case) { return of_case.param.name; });
 
-TEST(BoardCalibration, SigmasCoverErrorsOverSeeds) {
+TEST(BoardCalibration, sigmasCoverErrorsOverSeeds) {
   constexpr int kSeeds = 6;
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   double squared = 0;
@@ -104,7 +104,7 @@ TEST(BoardCalibration, SigmasCoverErrorsOverSeeds) {
 
 /// Errors common to a view's corners are no noise: here every left image is stretched by
 /// an amount of its own.
-TEST(BoardCalibration, SigmasOfALensContainWhatViewsHaveInCommon) {
+TEST(BoardCalibration, lensSigmaIncludesCorrelatedErrors) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   BoardScene scene = board_scene(truth, kBoard, 15, 0.02, 21);
   const double of_noise =
@@ -120,7 +120,7 @@ TEST(BoardCalibration, SigmasOfALensContainWhatViewsHaveInCommon) {
   EXPECT_EQ(c.rig.intrinsics[0].distortion_sigma[4], 0) << "k3 is not estimated";
 }
 
-TEST(BoardCalibration, ViewsThatDoNotAgreeAreRejectedAndNothingElse) {
+TEST(BoardCalibration, rejectsOnlyInconsistentViews) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   BoardScene scene = board_scene(truth, kBoard, 14, kNoise, 9);
   std::swap(scene.views[4].corners[1], scene.views[5].corners[1]);  // of other pairs
@@ -132,7 +132,7 @@ TEST(BoardCalibration, ViewsThatDoNotAgreeAreRejectedAndNothingElse) {
   EXPECT_GT(c.views[4].rms_px, 5);
 }
 
-TEST(BoardCalibration, ExchangedCamerasAreNoRig) {
+TEST(BoardCalibration, swappedCamerasAreAnError) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   BoardScene scene = board_scene(truth, kBoard, 10, kNoise, 11);
   for (BoardView& v : scene.views) std::swap(v.corners[0], v.corners[1]);
@@ -140,7 +140,7 @@ TEST(BoardCalibration, ExchangedCamerasAreNoRig) {
   EXPECT_TRUE(test::mentions(c.error, "swapped"));
 }
 
-TEST(BoardCalibration, ViewsThatDetermineNothingHaveNoSmallSigmas) {
+TEST(BoardCalibration, identicalViewsHaveLargeSigmas) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   BoardScene scene = board_scene(truth, kBoard, 3, kNoise, 12);
   scene.views.pop_back();
@@ -152,7 +152,7 @@ TEST(BoardCalibration, ViewsThatDetermineNothingHaveNoSmallSigmas) {
   }
 }
 
-TEST(BoardPattern, AcceptsOnlyBoardsThatShowTheirOrientation) {
+TEST(BoardPattern, refusesAmbiguousCheckerboards) {
   EXPECT_EQ(parse_checkerboard("9x6", 0.1).corners(), 54U);
   for (const char* bad :
        {"", "9", "9x", "x6", "9x6x", "9 x 6", "2x6", "-9x6", "1000x6", "6x6", "9X6"})

@@ -14,7 +14,7 @@ namespace {
 
 using Paths = std::vector<std::filesystem::path>;
 
-TEST(BoardImages, patternsNameFilesInOrderAndOnce) {
+TEST(BoardImages, globsGiveSortedFilesOnce) {
   const test::TemporaryFolder folder;
   for (const char* name : {"left2.png", "left1.png", "right1.png"}) (void)folder.write(name, "x");
   const std::string all = (folder / "left*.png").string(), one = (folder / "left1.png").string();
@@ -23,7 +23,7 @@ TEST(BoardImages, patternsNameFilesInOrderAndOnce) {
   EXPECT_THROW((void)matching_files({(folder / "none*.png").string()}, "--left"), InputError);
 }
 
-TEST(BoardImages, viewsArePairedByNumberWhereSomeAreMissingElseByOrder) {
+TEST(BoardImages, viewsArePairedByNumberElseByOrder) {
   std::vector<std::string> remarks;
   auto views = group_views(
       {{"left01.png", "left02.png", "left04.png"}, {"right01.png", "right03.png", "right04.png"}},
@@ -41,7 +41,7 @@ TEST(BoardImages, viewsArePairedByNumberWhereSomeAreMissingElseByOrder) {
   EXPECT_THROW((void)group_views({{"a.png", "b.png"}, {"c.png"}}, &remarks), InputError);
 }
 
-TEST(BoardImages, imagesThatCannotBeReadAreRemarks) {
+TEST(BoardImages, unreadableImagesAreRemarks) {
   const test::TemporaryFolder folder;
   const Paths view{folder.write("left.png", "no image"), folder / "gone.png"};
   const BoardImages images = read_board_images({view}, parse_checkerboard("9x6", 0.1), {});
@@ -51,7 +51,7 @@ TEST(BoardImages, imagesThatCannotBeReadAreRemarks) {
 }
 
 /// OpenCV throws at a view whose corners determine no homography, and at all views together.
-TEST(BoardImages, CornersOnALineDetermineNoHomography) {
+TEST(BoardImages, cornersOnALineHaveNoHomography) {
   const BoardPattern board = parse_charuco("8x7", 0.06, 0.044, "5X5_100");
   const auto determined = [&board](const std::vector<std::size_t>& corners) {
     BoardCorners seen;

@@ -43,7 +43,7 @@ Transform flat(const RigCalibration& rig, double right, double down, double exte
   return {R, centre - R * Vec3(0.5 * width, 0.5 * height, 0)};
 }
 
-TEST(Coverage, saysWhichPartsTiltsAndSizesAreMissing) {
+TEST(Coverage, namesMissingPartsTiltsAndSizes) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   Coverage c = nothing_yet(rig);
   EXPECT_TRUE(contains(all(c.needs()), "left: every part of the image"));
@@ -74,7 +74,7 @@ TEST(Coverage, saysWhichPartsTiltsAndSizesAreMissing) {
       << all(last);
 }
 
-TEST(Coverage, cornersThatDoNotTellHowTheBoardStandsHaveNoTilt) {
+TEST(Coverage, cornersWithoutPoseGiveNoTilt) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   const BoardView whole = seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)));
   for (const std::size_t corners : {3U, 7U}) {  // of the first row: they lie on a line
@@ -88,7 +88,7 @@ TEST(Coverage, cornersThatDoNotTellHowTheBoardStandsHaveNoTilt) {
   }
 }
 
-TEST(ViewCollector, takesAViewOnceHeldStillAndEndsWhenNothingIsMissing) {
+TEST(ViewCollector, takesStillViewsUntilComplete) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   ViewCollector collector(nothing_yet(rig), 640);
   EXPECT_EQ(collector.offer({}), OfferResult::not_seen);
@@ -111,7 +111,7 @@ TEST(ViewCollector, takesAViewOnceHeldStillAndEndsWhenNothingIsMissing) {
   EXPECT_LE(poses, 18U);
 }
 
-TEST(ViewCollector, aBoardThatDriftsIsNotTaken) {
+TEST(ViewCollector, movingBoardIsNotTaken) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   ViewCollector collector(nothing_yet(rig), 640);
   BoardView seen = seen_board(rig, kBoard, shown_around(kBoard, rig)[4]);
@@ -124,7 +124,7 @@ TEST(ViewCollector, aBoardThatDriftsIsNotTaken) {
   EXPECT_EQ(collector.offer(seen), OfferResult::taken);
 }
 
-TEST(ViewCollector, oneCameraAloneDoesNotCountInARig) {
+TEST(ViewCollector, viewOfOneCameraIsNotTaken) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   ViewCollector collector(nothing_yet(rig), 640);
   BoardView seen = seen_board(rig, kBoard, shown_around(kBoard, rig)[4]);
@@ -136,7 +136,7 @@ TEST(ViewCollector, oneCameraAloneDoesNotCountInARig) {
 /// In drawn images, sharper than any lens makes them, cornerSubPix is off by a tenth of a pixel
 /// here and there. Another order would be off by a square, another idea of where a pixel's centre
 /// is by half a pixel all together.
-TEST(BoardPattern, cornersOfADrawnBoardAreFoundInItsOrder) {
+TEST(BoardPattern, findsCornersInOrder) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const test::BoardPainter painter(rig.intrinsics[0]);
   for (const BoardPattern& board :
@@ -163,7 +163,7 @@ TEST(BoardPattern, cornersOfADrawnBoardAreFoundInItsOrder) {
     }
 }
 
-TEST(BoardPattern, whereNoWholeBoardIsNothingIsFound) {
+TEST(BoardPattern, findsNothingWithoutTheBoard) {
   const std::vector<std::uint8_t> grey(640 * 480, 128);
   EXPECT_FALSE(find_checkerboard({grey.data(), 640, 480, 640}, kBoard, BoardSearch::thorough));
   EXPECT_FALSE(find_checkerboard({}, kBoard, BoardSearch::thorough));

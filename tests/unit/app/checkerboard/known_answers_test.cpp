@@ -23,7 +23,7 @@ BoardCalibrationOptions options() {
   return o;
 }
 
-TEST(KnownAnswers, ImagesGiveTheSameCalibration) {
+TEST(KnownAnswers, imagesGiveTheKnownCalibration) {
   const auto folder = test::shared_data(kFolder);
   if (!folder) GTEST_SKIP() << test::shared_data_missing(kFolder);
   std::vector<std::string> remarks;

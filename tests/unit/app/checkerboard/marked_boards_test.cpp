@@ -140,7 +140,7 @@ Transform shown(const BoardPattern& board, const Vec3& turn, const Vec3& centre)
           centre - R * (0.5 * (board.corner(0) + board.corner(board.corners() - (grid ? 2 : 1))))};
 }
 
-TEST(MarkedBoard, cornersAreFoundWhicheverWayItIsPrinted) {
+TEST(MarkedBoard, findsCornersOfEveryLayout) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const BoardPattern even = parse_charuco("9x6", 0.06, 0.044, "6x6_250");
   struct Print {
@@ -163,7 +163,7 @@ TEST(MarkedBoard, cornersAreFoundWhicheverWayItIsPrinted) {
   }
 }
 
-TEST(MarkedBoard, aPartOfItIsEnough) {
+TEST(MarkedBoard, findsCornersOfAPartialBoard) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const PrintedBoard charuco = printed_charuco(kCharuco, true),
                      grid = printed_aprilgrid(kAprilGrid, 2, true);
@@ -187,7 +187,7 @@ TEST(MarkedBoard, aPartOfItIsEnough) {
   }
 }
 
-TEST(MarkedBoard, anotherOneOrNoneIsNothing) {
+TEST(MarkedBoard, findsNothingOnAnotherBoard) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const BoardPattern wide = parse_aprilgrid("8x4", 0.06, 0.3);
   EXPECT_TRUE(find_charuco({}, kCharuco).empty());
@@ -208,7 +208,7 @@ TEST(MarkedBoard, anotherOneOrNoneIsNothing) {
   EXPECT_TRUE(found_in(grid, kAprilGrid).empty()) << "tags that lie as on a board of other columns";
 }
 
-TEST(Charuco, aMarkerThatTheBoardDoesNotHaveIsPassedOver) {
+TEST(Charuco, ignoresForeignMarkers) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const BoardPattern& board = kCharuco;
   const Transform T = shown(board, Vec3(0.3, -0.2, 0.1), Vec3(0.02, -0.01, 0.85));
@@ -230,7 +230,7 @@ TEST(Charuco, aMarkerThatTheBoardDoesNotHaveIsPassedOver) {
   EXPECT_EQ(found_in(pixels, board).size(), alone.size());
 }
 
-TEST(Charuco, onlyBoardsThatCanBePrintedArePermitted) {
+TEST(Charuco, refusesImpossibleBoards) {
   const BoardPattern board = parse_charuco("11x8", 0.03, 0.022, "dict_4x4_250");
   EXPECT_EQ(board.corners(), 70U);
   EXPECT_EQ(kMarkerDictionaries[board.dictionary], "4X4_250");
@@ -243,7 +243,7 @@ TEST(Charuco, onlyBoardsThatCanBePrintedArePermitted) {
     EXPECT_THROW((void)parse_charuco("11x8", 0.03, 0.022, bad), InputError) << bad;
 }
 
-TEST(AprilGrid, onlyGridsThatCanBePrintedArePermitted) {
+TEST(AprilGrid, refusesImpossibleGrids) {
   EXPECT_EQ(parse_aprilgrid("6x6", 0.088, 0.3).corners(), 144U);
   for (const char* bad : {"", "6", "6x", "0x6", "25x2", "24x24x", "-6x6"})
     EXPECT_THROW((void)parse_aprilgrid(bad, 0.088, 0.3), InputError) << bad;

@@ -25,25 +25,21 @@ testing::AssertionResult refused_in_one_message(const Outcome& outcome) {
                                      << "\", stderr \"" << outcome.err << '"';
 }
 
-TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
-  using Kind = Withdrawn::Kind;
+TEST(Program, renamedWordsAreRefusedWithTheirNewName) {
+  using Kind = Renamed::Kind;
   const test::TemporaryFolder folder;
   folder.write("rig.yaml", "threads: 1\n");
   const std::string out = " --out '" + (folder / "out").string() + "'",
                     run = "run '" + (folder / "rig.yaml").string() + "'" + out + " --set ";
-  for (const Withdrawn& row : withdrawn()) {
+  for (const Renamed& row : renamed()) {
     const std::string name(row.name);
-    const std::string words =
-        row.kind == Kind::key     ? run + name + "=1"
-        : row.kind == Kind::value ? run + std::string(name).replace(name.find(' '), 1, "=")
-        : row.kind == Kind::camera_option
-            ? run + "cameras.0.driver=gige --set cameras.0.options." + name + "=1"
-        : row.kind == Kind::record_topic ? run + "'record=[" + name + "]'"
-        : row.kind == Kind::option       ? name + " x" + out
-                                         : name;
+    const std::string words = row.kind == Kind::key ? run + name + "=1"
+                              : row.kind == Kind::value
+                                  ? run + std::string(name).replace(name.find(' '), 1, "=")
+                                  : name + " x" + out;
     const Outcome outcome = run_vergence(words);
     EXPECT_TRUE(refused_in_one_message(outcome)) << name;
-    EXPECT_TRUE(contains(outcome.err, std::string(row.instead))) << name << ": " << outcome.err;
+    EXPECT_TRUE(contains(outcome.err, std::string(row.now))) << name << ": " << outcome.err;
   }
 }
 

@@ -23,7 +23,7 @@ nlohmann::json simulate(const std::string& options) {
   return nlohmann::json::parse(in);
 }
 
-TEST(Simulate, WritesOneObjectANoiseLevelWithTheFiguresOfTheContract) {
+TEST(Simulate, jsonHasOneObjectPerNoiseLevel) {
   const nlohmann::json levels = simulate("--points 60 --runs 20 --noise 0,0.1,0.2");
   ASSERT_EQ(levels.size(), 3U);
   for (const nlohmann::json& level : levels) {
@@ -44,7 +44,7 @@ TEST(Simulate, WritesOneObjectANoiseLevelWithTheFiguresOfTheContract) {
               0.01);  // the mean length of a 2-D Gaussian, less the freedom used
 }
 
-TEST(Simulate, ImpossibleExperimentsAreRefusedInOneSentence) {
+TEST(Simulate, refusesImpossibleOptionsInOneLine) {
   for (const char* options : {"--points 0", "--runs 0", "--noise -1", "--noise x", "--cameras 9",
                               "--radius 1000", "--json /nowhere/file.json", "--shape cube"}) {
     const Outcome outcome = run_vergence(std::string("simulate --quiet ") + options);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -31,9 +32,15 @@ class Http : public testing::Test {
     server_.reset();
     while (!server_) {
       try {
-        server_ =
-            std::make_unique<HttpServer>(HostPort{"127.0.0.1", ++port_}, policy, kPage, 2,
-                                         [this](HttpRoute route) { acted_.push_back(route); });
+        server_ = std::make_unique<HttpServer>(HostPort{"127.0.0.1", ++port_}, policy, kPage,
+                                               [this](HttpRoute route, const HttpRequest& request) {
+                                                 if (route == HttpRoute::state) {
+                                                   ++states_;
+                                                   return state_ + std::string(request.after);
+                                                 }
+                                                 acted_.push_back(route);
+                                                 return std::string();
+                                               });
       } catch (const InputError&) {
         if (port_ > 60000) throw;
       }
@@ -65,10 +72,10 @@ class Http : public testing::Test {
       text.append(bytes.data(), static_cast<std::size_t>(n));
     return text;
   }
-  FileDescriptor viewer() { return ask("GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n"); }
-
   std::uint16_t port_ = 38100;
   std::vector<HttpRoute> acted_;
+  std::string state_ = "state";
+  int states_ = 0;
   std::unique_ptr<HttpServer> server_;
 };
 
@@ -81,11 +88,10 @@ TEST_F(Http, pageHasRestrictiveHeaders) {
 }
 
 TEST_F(Http, portInUseIsInputError) {
-  EXPECT_TRUE(test::contains(
-      test::refusal_of([&] {
-        const HttpServer second(HostPort{"127.0.0.1", port_}, {}, kPage, 1, [](HttpRoute) {});
-      }),
-      "another program has the port"));
+  EXPECT_TRUE(test::contains(test::refusal_of([&] {
+                               const HttpServer second(HostPort{"127.0.0.1", port_}, {}, kPage, {});
+                             }),
+                             "another program has the port"));
 }
 
 /// A request's first line and headers, and what becomes of it.
@@ -126,72 +132,44 @@ TEST_F(HttpPolicies, admitsOnlyRequestsWithToken) {
   expect(actions, "localhost");
   EXPECT_EQ(acted_, (std::vector{HttpRoute::mark, HttpRoute::recalibrate, HttpRoute::mark}));
   for (const char* host : {"localhost", "127.0.0.1:8080", "[::1]:8080"})
-    expect({{"GET /\r\n", 200}, {"GET /events\r\n", 200}}, host), serve_with({kToken, false, "x"});
+    expect({{"GET /\r\n", 200}, {"GET /state\r\n", 200}}, host), serve_with({kToken, false, "x"});
   for (const char* host : {"evil.example:8080", "127.0.0.1.evil.example", "[::2]:1"})
-    expect({{"GET /\r\n", 421}, {"GET /events\r\n", 421}, {"POST /mark\r\n" + kKey, 421}}, host);
+    expect({{"GET /\r\n", 421}, {"GET /state\r\n", 421}, {"POST /mark\r\n" + kKey, 421}}, host);
   // Beyond this machine: by any name, but with the token.
   serve_with({kToken, true, "0.0.0.0"});
   expect(actions, "rig.local");
   expect({{"GET /\r\n", 200},
-          {"GET /events\r\n", 403},
-          {"GET /events?token=" + kToken.substr(1) + "\r\n", 403},
-          {"GET /events\r\nX-Vergence-Token: " + kToken.substr(1) + "\r\n", 403},
-          {"GET /events?a=b&token=" + kToken + "\r\n", 200},
-          {"GET /events\r\n" + kKey, 200}},
+          {"GET /state\r\n", 403},
+          {"GET /state?token=" + kToken.substr(1) + "\r\n", 403},
+          {"GET /state\r\nX-Vergence-Token: " + kToken.substr(1) + "\r\n", 403},
+          {"GET /state?a=b&token=" + kToken + "\r\n", 200},
+          {"GET /state\r\n" + kKey, 200}},
          "rig.local");
   serve_with({"", false, "localhost"});
   expect({{"POST /mark\r\nX-Vergence-Token: \r\n", 403}}, "localhost");
 }
 
-TEST_F(Http, greetsViewersUpToTheLimit) {
-  const FileDescriptor a = viewer();
-  EXPECT_EQ(server_->viewers(), 1U);
-  server_->broadcast("update", "{\"a\":1}", HttpServer::Skipped::greet_again);
-  server_->greet("hello", [] { return std::string("{}"); });
-  serve();
-  server_->broadcast("update", "{\"a\":2}", HttpServer::Skipped::greet_again);
-  serve();
-  const std::string text = received(a);
-  EXPECT_EQ(text.find("{\"a\":1}"), std::string::npos) << "it had not been greeted";
-  const auto hello = text.find("event: hello\ndata: {}\n\n");
-  EXPECT_NE(hello, std::string::npos) << text;
-  EXPECT_NE(text.find("event: update\ndata: {\"a\":2}\n\n", hello), std::string::npos) << text;
-  const FileDescriptor b = viewer(), c = viewer();
-  EXPECT_EQ(server_->viewers(), 2U);
-  EXPECT_TRUE(received(c).starts_with("HTTP/1.1 503"));
-  int asked = 0;
-  server_->greet("hello", [&] { return ++asked, std::string("{}"); });
-  server_->greet("hello", [&] { return ++asked, std::string("{}"); });
-  EXPECT_EQ(asked, 1) << "made once, and only for who waits for it";
+TEST_F(Http, stateIsAnsweredOrNoContent) {
+  const std::string request =
+      "GET /state?epoch=1&after=42&image= HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  EXPECT_TRUE(received(ask(request)).ends_with("\r\n\r\nstate42"));
+  state_.clear();
+  EXPECT_TRUE(
+      received(ask("GET /state HTTP/1.1\r\nHost: localhost\r\n\r\n")).starts_with("HTTP/1.1 204"));
 }
 
-TEST_F(Http, stalledViewerSkipsAndIsGreetedAgain) {
-  const FileDescriptor a = viewer();
-  const std::string big = "\"" + std::string(1'000'000, 'x') + "\"";
-  int greeted = 0;
-  const auto greeting = [&] { return ++greeted, std::string("{\"greeting\":1}"); };
-  constexpr int kEvents = 60;
-  for (int i = 0; i < kEvents; ++i) {
-    server_->greet("hello", greeting);
-    serve();
-    server_->broadcast("update", big, HttpServer::Skipped::greet_again);
-    serve();
-  }
-  EXPECT_EQ(greeted, 1) << "what it was sent is still to be read";
-  std::size_t bytes = 0;
-  for (int i = 0; i < 20'000 && greeted < 2; ++i) {
-    bytes += received(a).size();
-    server_->step(milliseconds(1));
-    server_->greet("hello", greeting);
-  }
-  serve();
-  EXPECT_NE(received(a).find("greeting"), std::string::npos);
-  EXPECT_LT(bytes, kEvents / 2 * big.size());
+/// A viewer that sends requests and reads nothing costs one response.
+TEST_F(Http, stalledViewerHoldsOneResponse) {
+  state_.assign(32'000'000, 'x');  // more than sockets hold
+  const std::string request = "GET /state HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  std::string requests;
+  for (int i = 0; i < 20; ++i) requests += request;
+  const FileDescriptor stalled = ask(requests);
+  EXPECT_TRUE(received(ask("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")).ends_with(kPage));
+  EXPECT_EQ(states_, 1);
 }
 
 TEST_F(Http, garbageAndIdleConnectionsAreDropped) {
-  const FileDescriptor watching = viewer();
-  server_->greet("hello", [] { return std::string("{}"); });
   std::mt19937 random(7);
   for (int i = 0; i < 50; ++i) {
     std::string noise(random() % 9000, '\0');
@@ -214,10 +192,6 @@ TEST_F(Http, garbageAndIdleConnectionsAreDropped) {
     answer += received(other);
   }
   EXPECT_TRUE(answer.ends_with(kPage));
-  EXPECT_EQ(server_->viewers(), 1U) << "whoever looks keeps its place";
-  server_->broadcast("update", "{\"still\":1}", HttpServer::Skipped::greet_again);
-  serve();
-  EXPECT_NE(received(watching).find("still"), std::string::npos);
 }
 
 /// An address of the configuration and what is read of it; port 0: refused.

@@ -40,24 +40,24 @@ CalibrationRecord calibration(bool is_refinement, double x) {
   return c;
 }
 
-TEST(LiveState, updateSendsChangesOnceHelloEverything) {
+TEST(LiveState, sendsChangesSinceAVersion) {
   LiveState state;
   SessionStart start;
   start.name = "a drive";
   start.frames = 100;
   state.begin(start);
-  LiveFrame frame;
-  frame.read = 3, frame.ok = 2, frame.lost = 1;
-  frame.path_m = 12.5;
-  frame.pose.frame = 41;
-  frame.pose.status = PoseStatus::degraded;
-  frame.pose.reason = Reason::few_inliers;
-  state.add(frame);
   state.add(at(0));
   state.add(at(0.1));  // no step
-  state.add(at(1));
+  FrameReport report = at(1, PoseStatus::degraded);
+  report.counts.read = 3, report.counts.ok = 2, report.counts.lost = 1;
+  report.counts.path_m = 12.5;
+  report.pose.frame = 41;
+  report.pose.reason = Reason::few_inliers;
+  state.add(report);
   state.add(event("mark", "a <b>mark</b> \xff"));
-  const json first = json::parse(state.update(kNow, -1));
+  const json first = state.since(0, kNow, -1);
+  EXPECT_EQ(first["session"], "a drive");
+  EXPECT_FALSE(first["ended"].get<bool>());
   EXPECT_EQ(first["now"]["frame"], 41);
   EXPECT_EQ(first["now"]["read"], 3);
   EXPECT_EQ(first["now"]["status"], "degraded");
@@ -65,31 +65,32 @@ TEST(LiveState, updateSendsChangesOnceHelloEverything) {
   EXPECT_TRUE(first["now"]["line_age_p99_ms"].is_null());
   EXPECT_EQ(first["trail"].size(), 2U);
   EXPECT_EQ(first["events"].size(), 1U);
+  EXPECT_TRUE(first.contains("calibration"));
   state.add(at(2));
-  const json second = json::parse(state.update(kNow, 3.25));
+  const json second = state.since(first["version"], kNow, 3.25);
   EXPECT_EQ(second["trail"], json::parse("[[0.0,0.0,2.0,0]]"));
+  EXPECT_EQ(second["trail_from"], 2);
   EXPECT_TRUE(second["events"].empty());
+  EXPECT_FALSE(second.contains("calibration"));
   EXPECT_EQ(second["now"]["line_age_p99_ms"], 3.25);
-  const json hello = json::parse(state.hello(kNow));
-  EXPECT_EQ(hello["session"], "a drive");
-  EXPECT_EQ(hello["trail"].size(), 3U);
-  EXPECT_EQ(hello["events"].size(), 1U);
-  EXPECT_FALSE(hello["ended"].get<bool>());
+  EXPECT_EQ(state.since(0, kNow, -1)["trail"].size(), 3U);
 }
 
 TEST(LiveState, longTrailIsThinnedOverItsWholeLength) {
   LiveState state;
+  std::uint64_t version = 0;
   std::size_t told = 0;
   bool anew = false;
   for (int i = 0; i < 50'000; ++i) {
     state.add(at(i));
     if (i % 100 != 0) continue;
-    const json update = json::parse(state.update(kNow, -1));
+    const json update = state.since(version, kNow, -1);
+    version = update["version"];
     const auto from = update["trail_from"].get<std::size_t>();
     anew = anew || from < told;
     told = from + update["trail"].size();
   }
-  const json trail = json::parse(state.hello(kNow))["trail"];
+  const json trail = state.since(0, kNow, -1)["trail"];
   EXPECT_TRUE(anew);
   EXPECT_LE(trail.size(), LiveTrail::kMax);
   EXPECT_GE(trail.size(), LiveTrail::kMax / 2);
@@ -106,7 +107,7 @@ struct Map {
 
 Map map_of(const LiveState& state) {
   Map out;
-  const json trail = json::parse(state.hello(kNow))["trail"];
+  const json trail = state.since(0, kNow, -1)["trail"];
   out.places = trail.size();
   for (std::size_t i = 0; i < trail.size(); ++i) {
     if (trail[i][3] == 1) ++out.degraded;
@@ -134,24 +135,22 @@ TEST(LiveState, standingRigKeepsTrail) {
   EXPECT_EQ(map.degraded, 1U);
 }
 
-LiveFrame come(double seconds) {
-  LiveFrame frame;
-  frame.out = HostStamp(Duration::seconds(seconds).ns());
-  frame.pose.status = PoseStatus::ok;
-  return frame;
+FrameReport come(double seconds) {
+  FrameReport report = at(0);
+  report.estimated = HostStamp(Duration::seconds(seconds).ns());
+  return report;
 }
 
 TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
   LiveState state;
   for (int i = 0; i < 100; ++i) state.add(come(50 + 0.05 * i));
   const auto now = [&](double seconds) {
-    return json::parse(state.update(HostStamp(Duration::seconds(seconds).ns()), -1))["now"];
+    return state.since(0, HostStamp(Duration::seconds(seconds).ns()), -1)["now"];
   };
   EXPECT_FALSE(now(55.5)["silent"].get<bool>());
   const json silent = now(67.95);
   EXPECT_TRUE(silent["silent"].get<bool>());
   EXPECT_EQ(silent["since_s"], 13.0);
-  EXPECT_TRUE(json::parse(state.hello(kNow))["now"]["silent"].get<bool>()) << "who comes late, too";
   state.add(come(68));
   EXPECT_FALSE(now(68.5)["silent"].get<bool>());
   EXPECT_TRUE(now(69.5)["silent"].get<bool>()) << "an outage is no interval";
@@ -160,30 +159,28 @@ TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
 TEST(LiveState, keepsNewestEventsAndCalibrations) {
   LiveState state;
   for (int i = 0; i < 1000; ++i) state.add(event("mark", std::to_string(i)));
-  const json events = json::parse(state.update(kNow, -1))["events"];
+  const json events = state.since(0, kNow, -1)["events"];
   EXPECT_EQ(events.size(), LiveState::kEvents);
   EXPECT_EQ(events.back()["message"], "999");
   for (int i = 0; i < 100; ++i) state.add(calibration(true, -0.5));
-  EXPECT_EQ(json::parse(state.hello(kNow))["calibration"]["history"].size(),
-            LiveState::kCalibrations);
+  EXPECT_EQ(state.since(0, kNow, -1)["calibration"]["history"].size(), LiveState::kCalibrations);
 }
 
 TEST(LiveState, calibrationHasTwoSigmaAndMeasuredOne) {
   LiveState state;
   state.add(calibration(false, -0.75));
-  json c = json::parse(state.update(kNow, -1))["calibration"];
+  json c = state.since(0, kNow, -1)["calibration"];
   EXPECT_FALSE(c["confirmed"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["figures"][3][0], -750.0);
   EXPECT_TRUE(c["cameras"][1]["figures"][3][1].is_null()) << "given without a sigma";
   EXPECT_FALSE(c.contains("measured"));
   state.add(event("calibration_verified", ""));
   state.add(calibration(true, -0.751));
-  c = json::parse(state.update(kNow, -1))["calibration"];
+  c = state.since(0, kNow, -1)["calibration"];
   EXPECT_TRUE(c["confirmed"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["figures"][3][0], -750.0) << "what is in use stays";
   EXPECT_EQ(c["measured"][1]["figures"][3][0], -751.0);
   EXPECT_EQ(c["measured"][1]["figures"][3][1], 2.0);
-  EXPECT_FALSE(json::parse(state.update(kNow, -1)).contains("calibration")) << "told once";
 }
 
 }  // namespace

@@ -147,7 +147,7 @@ TEST(PoseStream, statusLineBeforeAndAfterFirstFrame) {
   const auto keys = j.size();
   status.frame.emplace();
   status.frame->pose = sample();
-  status.frame->lost = 3;
+  status.frame->counts.lost = 3;
   status.frame->cameras = 2;
   status.frame->images_present = 2;
   status.ins = {FixStatus::fix_2d, 0.5};
@@ -201,12 +201,12 @@ class Kept final : public LineSocket {
   std::atomic<bool>* open_;
 };
 
-PoseSample sample(std::uint64_t frame) {
-  PoseSample s;
-  s.frame = frame;
-  s.stamp = Stamp(static_cast<std::int64_t>(frame) * 50'000'000);
-  s.status = PoseStatus::ok;
-  return s;
+FrameReport report(std::uint64_t frame) {
+  FrameReport r;
+  r.pose.frame = frame;
+  r.pose.stamp = Stamp(static_cast<std::int64_t>(frame) * 50'000'000);
+  r.pose.status = PoseStatus::ok;
+  return r;
 }
 
 TEST(LinePublisher, fullRingDropsAndCountsNewestPoses) {
@@ -216,7 +216,7 @@ TEST(LinePublisher, fullRingDropsAndCountsNewestPoses) {
   LinePublisher publisher(std::make_unique<Kept>(&lines, &open), &requests, {});
   publisher.on_start({});
   constexpr std::uint64_t kPoses = 1000;
-  for (std::uint64_t i = 0; i < kPoses; ++i) publisher.on_pose(sample(i));  // the socket is shut
+  for (std::uint64_t i = 0; i < kPoses; ++i) publisher.on_pose(report(i));  // the socket is shut
   open = true;
   open.notify_all();
   std::map<std::string, std::uint64_t> counters;
@@ -245,7 +245,7 @@ TEST(LinePublisher, estimatorThreadDoesNotAllocate) {
   AllocationGuard::seal_thread();
   const auto before = AllocationGuard::runtime_allocations();
   publisher.on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
-  publisher.on_pose(sample(0));
+  publisher.on_pose(report(0));
   const auto taken = AllocationGuard::runtime_allocations() - before;
   AllocationGuard::unseal_thread();
   EXPECT_EQ(taken, 0U);
@@ -297,7 +297,7 @@ TEST(LinePublisher, imagesFollowARequestForThem) {
     AllocationGuard::seal_thread();
     const auto before = AllocationGuard::runtime_allocations();
     publisher.on_frame(frame);
-    publisher.on_pose(sample(frame.number));
+    publisher.on_pose(report(frame.number));
     EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
     AllocationGuard::unseal_thread();
     std::this_thread::sleep_for(std::chrono::microseconds(500));
@@ -347,7 +347,7 @@ TEST_P(LineRequests, areAcceptedOnlyIfTheSessionCan) {
     socket->request = c.request;
     LinePublisher publisher(std::move(kept), &requests, {});
     publisher.on_start(start);
-    publisher.on_pose(sample(0));
+    publisher.on_pose(report(0));
     while (socket->answered.load() == false) std::this_thread::yield();
     response = socket->response;
   }

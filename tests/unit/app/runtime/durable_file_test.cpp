@@ -21,7 +21,7 @@ std::ptrdiff_t files_in(const std::filesystem::path& folder) {
                        std::filesystem::directory_iterator{});
 }
 
-TEST(DurableFile, isMadeAndReplacedAndLeavesNothingBeside) {
+TEST(DurableFile, replacesWithoutTemporaryFiles) {
   const test::TemporaryFolder folder;
   const std::string large(300'000, 'x');
   replace_durably(folder / "a.yaml", "old");
@@ -31,7 +31,7 @@ TEST(DurableFile, isMadeAndReplacedAndLeavesNothingBeside) {
   EXPECT_EQ(files_in(folder.path()), 1);
 }
 
-TEST(DurableFile, aFailureNamesTheFileAndKeepsTheOldOne) {
+TEST(DurableFile, failureNamesFileAndKeepsOldOne) {
   const test::TemporaryFolder folder;
   replace_durably(folder / "a.yaml", "old");
   std::filesystem::create_directory(folder / "a.yaml.new");  // cannot be opened as a file
@@ -44,7 +44,7 @@ TEST(DurableFile, aFailureNamesTheFileAndKeepsTheOldOne) {
   EXPECT_FALSE(std::filesystem::exists(folder / "c.yaml.new"));
 }
 
-TEST(DurableFile, aFullDiskIsToldAndTheOldFileStays) {
+TEST(DurableFile, fullDiskIsAnErrorAndKeepsOldFile) {
   const test::TemporaryFolder folder;
   replace_durably(folder / "a.yaml", "old");
   std::filesystem::create_symlink("/dev/full", folder / "a.yaml.new");

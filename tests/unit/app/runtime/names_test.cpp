@@ -10,7 +10,7 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-TEST(EditDistance, KnownAnswers) {
+TEST(EditDistance, hasKnownDistances) {
   EXPECT_EQ(edit_distance("", ""), 0U);
   EXPECT_EQ(edit_distance("abc", ""), 3U);
   EXPECT_EQ(edit_distance("kitten", "sitting"), 3U);
@@ -18,7 +18,7 @@ TEST(EditDistance, KnownAnswers) {
   EXPECT_EQ(edit_distance("Features", "features"), 0U) << "upper and lower case alike";
 }
 
-TEST(Nearest, GivesNothingWhenNothingIsNear) {
+TEST(Nearest, isEmptyWithoutASimilarWord) {
   EXPECT_EQ(nearest("xyzzy", {"replay", "evaluate"}), std::nullopt);
   EXPECT_EQ(nearest("replay", {}), std::nullopt);
   EXPECT_EQ(did_you_mean("xyzzy", {"replay"}), "");

@@ -36,7 +36,7 @@ class ProgressTest : public testing::Test {
   int width = 200;
 };
 
-TEST_F(ProgressTest, TheLineHasEveryFigureThatIsKnown) {
+TEST_F(ProgressTest, lineHasEveryKnownField) {
   auto p = progress(Progress::Mode::terminal);
   p.update(at(1, 33000));
   now = now + Duration::seconds(10);
@@ -47,7 +47,7 @@ TEST_F(ProgressTest, TheLineHasEveryFigureThatIsKnown) {
       test::mentions(out.str(), "1001/33000", "0.62 km", "318", "7.9 ms", "0.42 m", "05:20"));
 }
 
-TEST_F(ProgressTest, TheTerminalIsRedrawnAtMostTenTimesASecond) {
+TEST_F(ProgressTest, terminalIsRedrawnAtMostAt10Hz) {
   auto p = progress(Progress::Mode::terminal);
   constexpr int kMilliseconds = 2000;
   for (int ms = 0; ms < kMilliseconds; ++ms) {
@@ -57,7 +57,7 @@ TEST_F(ProgressTest, TheTerminalIsRedrawnAtMostTenTimesASecond) {
   EXPECT_EQ(redraws(), 20U);
 }
 
-TEST_F(ProgressTest, WithoutATerminalALineComesEveryTenSecondsAndOneAtTheEnd) {
+TEST_F(ProgressTest, printsEvery10SWithoutATerminal) {
   auto p = progress(Progress::Mode::lines);
   for (int second = 0; second <= 25; ++second) {
     p.update(at(static_cast<std::uint64_t>(second), 100));

@@ -45,7 +45,7 @@ bool mentions(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST(Realtime, theMoreUrgentRoleHasTheHigherPriority) {
+TEST(Realtime, urgentRolesHaveHigherPriority) {
   FakeSystem system;
   RealtimeRequest request;
   request.priority = 40;
@@ -55,7 +55,7 @@ TEST(Realtime, theMoreUrgentRoleHasTheHigherPriority) {
   EXPECT_EQ(system.priorities, expected) << "solver, mock, caller and libraries stay as they are";
 }
 
-TEST(Realtime, aThreadIsSetOnceAndALaterOneWhenItComes) {
+TEST(Realtime, eachThreadIsSetOnce) {
   FakeSystem system;
   RealtimeRequest request;
   request.priority = 40;
@@ -71,7 +71,7 @@ TEST(Realtime, aThreadIsSetOnceAndALaterOneWhenItComes) {
   EXPECT_EQ(system.priorities[9], 40);
 }
 
-TEST(Realtime, aRefusalIsOneSentenceWithWhatAllowsIt) {
+TEST(Realtime, refusalIsOneMessageWithTheFix) {
   FakeSystem system;
   system.fifo_error = EPERM;
   system.affinity_error = EINVAL;
@@ -93,7 +93,7 @@ TEST(Realtime, aRefusalIsOneSentenceWithWhatAllowsIt) {
 }
 
 /// The kernel itself: a thread of this test is found by its name and gets what was asked for.
-TEST(Realtime, theKernelSchedulesAThreadAsAskedFor) {
+TEST(Realtime, kernelSchedulesAsRequested) {
   std::atomic<pid_t> id{0};
   std::atomic<bool> stop{false};
   std::thread worker([&] {
@@ -132,7 +132,7 @@ TEST(Realtime, theKernelSchedulesAThreadAsAskedFor) {
   EXPECT_EQ(parameter.sched_priority, 9);
 }
 
-TEST(CpuList, isReadAsTasksetReadsIt) {
+TEST(CpuList, readsTasksetLists) {
   const auto count = [](const char* text) {
     const auto set = parse_cpu_list(text);
     return set ? CPU_COUNT(&*set) : -1;

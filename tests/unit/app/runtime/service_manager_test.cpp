@@ -66,7 +66,7 @@ struct ServiceManagerTest : testing::Test {
   std::chrono::steady_clock::time_point begin{};
 };
 
-TEST_F(ServiceManagerTest, saysReadyThenStoppingAndAsksForMoreTimeWhileTheSessionIsClosed) {
+TEST_F(ServiceManagerTest, reportsReadyThenStoppingWithMoreTime) {
   constexpr const char* kMoreTime = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=60000000";
   {
     ServiceManager service = started(30ms);
@@ -82,7 +82,7 @@ TEST_F(ServiceManagerTest, saysReadyThenStoppingAndAsksForMoreTimeWhileTheSessio
   EXPECT_EQ(manager.heard(), "") << "it goes on after the end";
 }
 
-TEST_F(ServiceManagerTest, aSlowLoopIsAliveAndAHungOneIsNot) {
+TEST_F(ServiceManagerTest, slowLoopIsAliveHungLoopIsNot) {
   ServiceManager service = started(9s);
   for (int second = 0; second < 9; ++second)
     service.alive(static_cast<std::uint64_t>(second + 1), false, 0, begin + second * 1s);
@@ -95,7 +95,7 @@ TEST_F(ServiceManagerTest, aSlowLoopIsAliveAndAHungOneIsNot) {
   EXPECT_EQ(manager.heard(), "") << "whatever the devices do";
 }
 
-TEST_F(ServiceManagerTest, aLoopThatWaitsIsAliveWhileTheDevicesThreadGoesRound) {
+TEST_F(ServiceManagerTest, waitingLoopIsAliveWithItsDevices) {
   ServiceManager service = started(3s);
   for (int second = 0; second < 10; ++second)
     service.alive(7, true, static_cast<std::uint64_t>(second), begin + second * 1s);

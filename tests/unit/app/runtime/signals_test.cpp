@@ -7,7 +7,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(SignalGuard, InterruptAndTerminateHaveTheirExitCodes) {
+TEST(SignalGuard, interruptAndTerminateHaveExitCodes) {
   {
     const SignalGuard guard;
     std::raise(SIGINT);
@@ -20,7 +20,7 @@ TEST(SignalGuard, InterruptAndTerminateHaveTheirExitCodes) {
   EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
 }
 
-TEST(SignalGuard, PutsTheFormerHandlerBack) {
+TEST(SignalGuard, restoresThePreviousHandler) {
   static int calls = 0;
   calls = 0;
   auto* const before = std::signal(SIGINT, [](int) { ++calls; });
@@ -30,7 +30,7 @@ TEST(SignalGuard, PutsTheFormerHandlerBack) {
   std::signal(SIGINT, before);
 }
 
-TEST(SignalGuard, SigusrAsksForACalibrationEachTimeAndStopsNothing) {
+TEST(SignalGuard, sigusr1RequestsACalibration) {
   const SignalGuard guard;
   EXPECT_FALSE(guard.take_calibration_request());
   for (int i = 0; i < 3; ++i) {
@@ -41,7 +41,7 @@ TEST(SignalGuard, SigusrAsksForACalibrationEachTimeAndStopsNothing) {
   EXPECT_FALSE(guard.stop_requested());
 }
 
-TEST(SignalGuard, AClosedTerminalEndsTheSessionUnlessItIsToOutliveIt) {
+TEST(SignalGuard, hangupStopsUnlessIgnored) {
   {
     const SignalGuard guard;
     std::raise(SIGHUP);
@@ -56,13 +56,13 @@ TEST(SignalGuard, AClosedTerminalEndsTheSessionUnlessItIsToOutliveIt) {
   std::signal(SIGHUP, before);
 }
 
-TEST(SignalGuard, WhatAReaderOrADiskDoesIsLeftToTheWriteThatFails) {
+TEST(SignalGuard, brokenPipeAndFileLimitAreIgnored) {
   const SignalGuard guard;
   for (const int number : {SIGPIPE, SIGXFSZ, SIGUSR2}) std::raise(number);
   EXPECT_FALSE(guard.stop_requested());
 }
 
-TEST(SignalGuardDeathTest, TheSecondSignalEndsTheProgram) {
+TEST(SignalGuardDeathTest, secondSignalEndsTheProgram) {
   EXPECT_EXIT(
       {
         const SignalGuard guard;

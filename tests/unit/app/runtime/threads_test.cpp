@@ -12,7 +12,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(BackgroundThread, startReturnsWhileTheTaskRunsOnTheOtherThread) {
+TEST(BackgroundThread, startDoesNotWaitForTheTask) {
   BackgroundThread runner;
   std::atomic<bool> go{false};
   std::thread::id where;
@@ -30,7 +30,7 @@ TEST(BackgroundThread, startReturnsWhileTheTaskRunsOnTheOtherThread) {
   EXPECT_NE(where, std::this_thread::get_id());
 }
 
-TEST(BackgroundThread, whatATaskWroteIsThereWhenItIsNoLongerBusy) {
+TEST(BackgroundThread, resultIsVisibleWhenNotBusy) {
   BackgroundThread runner;
   std::array<int, 64> written{};  // plain: seen too early it would be a race
   int expected = 0;
@@ -48,7 +48,7 @@ TEST(BackgroundThread, whatATaskWroteIsThereWhenItIsNoLongerBusy) {
   }
 }
 
-TEST(BackgroundThread, allocatesNothingPerTaskAndSealsItsThread) {
+TEST(BackgroundThread, doesNotAllocateOnItsSealedThread) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   BackgroundThread runner;
@@ -66,7 +66,7 @@ TEST(BackgroundThread, allocatesNothingPerTaskAndSealsItsThread) {
   EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
-TEST(ThreadRunner, runsHereOnTheCallerAndThereOnOneOtherThread) {
+TEST(ThreadRunner, runsOneHalfOnEachThread) {
   ThreadRunner runner;
   std::thread::id here_id, there_id, there_again;
   auto here = [&] { here_id = std::this_thread::get_id(); };
@@ -79,7 +79,7 @@ TEST(ThreadRunner, runsHereOnTheCallerAndThereOnOneOtherThread) {
   EXPECT_EQ(there_id, there_again);
 }
 
-TEST(ThreadRunner, everyRunIsDoneWhenItReturnsHoweverLongAHalfTakes) {
+TEST(ThreadRunner, waitsForTheSlowerHalf) {
   ThreadRunner runner;
   int left = 0, right = 0;  // plain: a run that returned early would be a race
   const auto pause = [](int i) {

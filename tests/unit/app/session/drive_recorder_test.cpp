@@ -36,12 +36,12 @@ class RecordedPoses {
       frame.number = number_;
       frame.stamp = stamp();
       frame.cameras = 2;
-      PoseSample sample;
-      sample.frame = number_++;
-      sample.stamp = frame.stamp;
-      sample.status = PoseStatus::ok;
+      FrameReport report;
+      report.pose.frame = number_++;
+      report.pose.stamp = frame.stamp;
+      report.pose.status = PoseStatus::ok;
       recorder_.on_frame(frame);
-      recorder_.on_pose(sample);
+      recorder_.on_pose(report);
     }
   }
   void close() {

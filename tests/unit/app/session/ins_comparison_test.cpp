@@ -62,12 +62,13 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
   constexpr int kPoses = static_cast<int>(kBetween / kSpeed * 10);  // of a scene, at 10 Hz
   for (int i = 0; i < kPoses * (kRestarts + 1); ++i) {
     const double t = i / 10.0;
-    PoseSample pose;
+    FrameReport report;
+    PoseSample& pose = report.pose;
     pose.stamp = at(t + 0.003);
     pose.status = PoseStatus::ok;
     if (i > 0 && i % kPoses == 0) pose.reason = Reason::map_reset;
     pose.T_world_left.t = {kSpeed * (t + 0.003), 0, 0};
-    comparison.add(pose, 0);
+    comparison.add(report);
     for (int k = 0; k < 10; ++k) {
       const double now = t + k / 100.0;
       comparison.add(reading(plane, now, {kSpeed * now, 0, 0}));
@@ -90,11 +91,12 @@ TEST(InsComparison, countsAScaleThatDisagreesOnlyWhereThereIsAnIns) {
   for (int i = 0; i < 600; ++i) {
     const double t = i / 10.0;
     if (t < kGone) comparison.add(reading(plane, t, {kSpeed * t, 0, 0}));
-    PoseSample pose;
+    FrameReport report;
+    PoseSample& pose = report.pose;
     pose.stamp = at(t);
     pose.status = PoseStatus::ok;
     pose.T_world_left.t = {1.1 * kSpeed * t, 0, 0};
-    comparison.add(pose, 0);
+    comparison.add(report);
     comparison.drain();
   }
   comparison.finish();

@@ -25,7 +25,10 @@ inline FrameReport pose(std::uint64_t frame, PoseStatus status, double x) {
   sample.inliers = 100;
   sample.reprojection_px = 0.25;
   sample.estimate_ms = 7.5F;
-  return FrameReport::of(sample, 2.0F, std::nullopt);
+  FrameReport report;
+  report.pose = sample;
+  report.decode_ms = 2;
+  return report;
 }
 
 inline std::vector<std::string> lines_of(const std::filesystem::path& file) {

@@ -86,8 +86,8 @@ class Notebook final : public SessionObserver {
     (void)lines_.push({'f', frame.stamp});
     images_ += frame.images[0].empty() ? 0 : 1;
   }
-  void on_pose(const PoseSample& sample) noexcept override {
-    (void)lines_.push({'p', sample.stamp});
+  void on_pose(const FrameReport& report) noexcept override {
+    (void)lines_.push({'p', report.pose.stamp});
   }
   void on_report(const FrameReport& report) noexcept override {
     (void)lines_.push({'c', report.pose.stamp});

@@ -29,7 +29,7 @@ AcquiredFrame frame(FrameSlot slot) {
   return f;
 }
 
-TEST(AcquiredQueue, slotsOfARefusedFrameGoBackUnseen) {
+TEST(AcquiredQueue, refusedFramesReturnTheirSlots) {
   Bench b;
   AcquiredQueue queue(b.cameras, true);
   AcquiredQueue::Refused refused;
@@ -42,7 +42,7 @@ TEST(AcquiredQueue, slotsOfARefusedFrameGoBackUnseen) {
   EXPECT_EQ(b.camera.released, std::vector<int>{7});
 }
 
-TEST(AcquiredQueue, aLateConsumerSkipsToTheNewestImagesOnlyLive) {
+TEST(AcquiredQueue, lateConsumerSkipsOldImagesOnlyLive) {
   for (const bool wait : {false, true}) {
     Bench b;
     AcquiredQueue queue(b.cameras, wait);
@@ -56,7 +56,7 @@ TEST(AcquiredQueue, aLateConsumerSkipsToTheNewestImagesOnlyLive) {
   }
 }
 
-TEST(AcquiredQueue, aFullOneDropsReadingsLiveAndNothingElse) {
+TEST(AcquiredQueue, fullQueueDropsOnlyReadingsLive) {
   Bench b;
   AcquiredQueue queue(b.cameras, false);
   for (int i = 0; i < 300; ++i) queue.push(AcquiredReading{});

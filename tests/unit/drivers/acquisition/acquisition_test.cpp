@@ -102,7 +102,7 @@ struct Bench {
   std::unique_ptr<Acquisition> source;
 };
 
-TEST(Acquisition, bringsEveryPulseAndReadingOnceInOrderAndWithinTheStampsOwnError) {
+TEST(Acquisition, everyPulseAndReadingComesOnceInOrder) {
   Bench b({});
   const auto items = b.drive();
   ASSERT_EQ(count<AcquiredFrame>(items), 81);
@@ -167,7 +167,7 @@ class EmptyBoard final : public TriggerDevice {
   DeviceInfo info_;
 };
 
-TEST(Acquisition, aDeviceThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
+TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
   EmptyCamera left, right;
   EmptyBoard board;
   Acquisition::Options options;
@@ -188,7 +188,7 @@ TEST(Acquisition, aDeviceThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
   EXPECT_EQ(count(items, DeviceEvent::Kind::trigger_board_disconnected), 1);
 }
 
-TEST(Acquisition, aCameraThatGivesNothingThoughThereArePulsesIsStartedAgain) {
+TEST(Acquisition, cameraSilentDuringPulsesIsRestarted) {
   BenchOptions o;
   o.mode = SyncMode::board;
   o.seconds = 18;
@@ -236,7 +236,7 @@ void expect_right_pairs(const Bench& b, const std::vector<Acquired>& items, int 
   EXPECT_LE(ambiguous, max_ambiguous);
 }
 
-TEST(Acquisition, byPulsesEveryPairIsProvenWithinASecondAndRight) {
+TEST(Acquisition, pulsesVerifyEveryPairWithinASecond) {
   Bench b({}, kByPulses);
   const auto items = b.drive();
   expect_right_pairs(b, items);
@@ -260,7 +260,7 @@ struct LossCase {
 };
 class AcquisitionByPulses : public ::testing::TestWithParam<LossCase> {};
 
-TEST_P(AcquisitionByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
+TEST_P(AcquisitionByPulses, faultsGiveNoWrongPairAndAreReported) {
   Bench b(GetParam().faults, kByPulses), again(GetParam().faults, kByPulses);
   const auto items = b.drive(), more = again.drive();
   expect_right_pairs(b, items, 2);
@@ -301,7 +301,7 @@ INSTANTIATE_TEST_SUITE_P(
             "doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::pairing_pending, 2}),
     [](const auto& i) { return std::string(i.param.name); });
 
-TEST(Acquisition, theClocksOfADriveAreRecorded) {
+TEST(Acquisition, clockDriftAndErrorAreRecorded) {
   Bench b({}, kByPulses);
   (void)b.drive();
   const AcquisitionCounters& c = b.source->counters();
@@ -316,7 +316,7 @@ TEST(Acquisition, theClocksOfADriveAreRecorded) {
   }
 }
 
-TEST(Acquisition, stopEndsTheStreamAmidTheDrive) {
+TEST(Acquisition, stopEndsTheStream) {
   Bench b({});
   ASSERT_FALSE(b.source->start());
   Acquired item;

@@ -17,7 +17,7 @@ ClockMapperOptions exact() {
   return o;
 }
 
-TEST(PulseMapper, leavesWhatTheDriverHasMapped) {
+TEST(PulseMapper, mappedPulseIsUnchanged) {
   PulseMapper mapper(exact());
   Pulse p;
   p.arrival = kHost;
@@ -29,7 +29,7 @@ TEST(PulseMapper, leavesWhatTheDriverHasMapped) {
   EXPECT_EQ(report.pulse.host_error, Duration::nanoseconds(5));
 }
 
-TEST(CameraClock, anExposureThatGrowsIsNoClockThatDrifts) {
+TEST(CameraClock, growingExposureIsNoDrift) {
   CameraClock clock(exact());
   for (int n = 0; n < 100; ++n) {
     Frame frame;
@@ -46,7 +46,7 @@ TEST(CameraClock, anExposureThatGrowsIsNoClockThatDrifts) {
   EXPECT_EQ(clock.resets(), 0U);
 }
 
-TEST(PairingTracker, tellsNothingOfCamerasThatGaveNoFrame) {
+TEST(PairingTracker, cameraWithoutFramesIsNotReported) {
   PairingTracker watch;
   EXPECT_FALSE(watch.update(0, false, kHost));
   watch.frame(0);

@@ -7,7 +7,7 @@
 namespace vergence {
 namespace {
 
-TEST(Clock, ofAMomentTheTrialCountsThatWasNotHeldUp) {
+TEST(Clock, tightestTrialGivesTheMoment) {
   // The day's clock is 1000 s ahead. Every look takes a microsecond; the first trial is held up for
   // 7 ms after the day's clock was read, the second before.
   HostStamp now(5'000'000'000);

@@ -31,7 +31,7 @@ struct Queue : ::testing::Test {
   Frame out{};
 };
 
-TEST_F(Queue, everySlotThereCanBeHasAPlace) {
+TEST_F(Queue, holdsEveryPossibleSlot) {
   for (FrameSlot s = 0; s < FramePool::kMaxSlots; ++s) ASSERT_TRUE(queue.offer(frame(s)));
   EXPECT_EQ(queue.out(), FramePool::kMaxSlots);
   for (FrameSlot s = 0; s < FramePool::kMaxSlots; ++s) {
@@ -40,7 +40,7 @@ TEST_F(Queue, everySlotThereCanBeHasAPlace) {
   }
 }
 
-TEST_F(Queue, aDeviceThatIsBackIsGoneUntilItIsBegunAgain) {
+TEST_F(Queue, reconnectedDeviceStaysGoneUntilBegin) {
   queue.ready_again();
   EXPECT_EQ(queue.state(), FrameQueue::State::streaming) << "it was never gone";
   queue.lose(HostStamp(42));
@@ -59,7 +59,7 @@ TEST_F(Queue, aDeviceThatIsBackIsGoneUntilItIsBegunAgain) {
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout);
 }
 
-TEST_F(Queue, aStopHandsOutNothingAndWhatNobodyTookIsDrained) {
+TEST_F(Queue, stopDeliversNothingAndDrainsTheRest) {
   ASSERT_TRUE(queue.offer(frame(1)));
   ASSERT_TRUE(queue.offer(frame(3)));
   ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
@@ -93,7 +93,7 @@ DeviceStatus ask(FrameQueue* queue, Duration most, Frame* out) {
 constexpr Duration kSilence = Duration::milliseconds(100);
 constexpr Duration kAnswer = Duration::seconds(10);  // of a busy machine
 
-TEST_F(Queue, ASilentDeviceIsGoneAndStreamsAgainAfterAStart) {
+TEST_F(Queue, silentDeviceIsGoneUntilRestarted) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence);
   queue.count_underrun();  // one image
@@ -106,7 +106,7 @@ TEST_F(Queue, ASilentDeviceIsGoneAndStreamsAgainAfterAStart) {
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::ok);
 }
 
-TEST_F(Queue, ImagesThatFoundNoSlotAreNoSilence) {
+TEST_F(Queue, underrunsAreNoSilence) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence * 20);
   while (monotonic_now() - begun < kSilence * 22) {
@@ -115,14 +115,14 @@ TEST_F(Queue, ImagesThatFoundNoSlotAreNoSilence) {
   }
 }
 
-TEST_F(Queue, TheFirstImageMayTakeLonger) {
+TEST_F(Queue, firstImageMayTakeLonger) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence);
   EXPECT_EQ(ask(&queue, kAnswer * 3, &out), DeviceStatus::disconnected);
   EXPECT_GT(out.arrival - begun, Duration::seconds(10));
 }
 
-TEST_F(Queue, WhoDidNotAskCannotTellSilence) {
+TEST_F(Queue, silenceNeedsContinuousWaiting) {
   queue.begin(&ready, kSilence);
   queue.count_underrun();
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));
@@ -130,7 +130,7 @@ TEST_F(Queue, WhoDidNotAskCannotTellSilence) {
   EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::disconnected);
 }
 
-TEST(LongestSilence, IsTenIntervalsOfAFreeRunningCameraAndTwoSecondsAtLeast) {
+TEST(LongestSilence, isTenIntervalsAndAtLeastTwoSeconds) {
   EXPECT_EQ(longest_silence(CameraTrigger::free, 20), Duration::seconds(2));
   EXPECT_EQ(longest_silence(CameraTrigger::free, 0.5), Duration::seconds(20));
   EXPECT_EQ(longest_silence(CameraTrigger::free, 0), Duration{}) << "nobody knows its rate";

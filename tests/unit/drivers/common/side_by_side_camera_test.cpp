@@ -75,7 +75,7 @@ class SideBySide : public ::testing::Test {
   CameraConfiguration asked_{kWidth, kHeight, 30};
 };
 
-TEST_F(SideBySide, seeTheTwoSidesOfOneExposure) {
+TEST_F(SideBySide, bothSidesComeFromOneExposure) {
   stream();
   script_.answers = {DeviceStatus::ok, DeviceStatus::ok};
   std::array<Frame, 2> left{}, right{};
@@ -96,7 +96,7 @@ TEST_F(SideBySide, seeTheTwoSidesOfOneExposure) {
   EXPECT_EQ(*b.row(1), 3 * kWidth) << "the picture's second row, its right half";
 }
 
-TEST_F(SideBySide, giveASlotBackWhenBothHaveReleasedIt) {
+TEST_F(SideBySide, slotIsReleasedWhenBothHaveReleasedIt) {
   stream();
   script_.answers = {DeviceStatus::ok};
   Frame left, right;
@@ -109,7 +109,7 @@ TEST_F(SideBySide, giveASlotBackWhenBothHaveReleasedIt) {
   EXPECT_TRUE(script_.held.empty());
 }
 
-TEST_F(SideBySide, giveBackOnStopWhatOneOfThemHasNotTaken) {
+TEST_F(SideBySide, stopReleasesUntakenFrames) {
   stream();
   script_.answers = {DeviceStatus::ok, DeviceStatus::ok};
   Frame frame;
@@ -122,7 +122,7 @@ TEST_F(SideBySide, giveBackOnStopWhatOneOfThemHasNotTaken) {
   EXPECT_TRUE(script_.held.empty());
 }
 
-TEST_F(SideBySide, areBothGoneBeforeEitherComesBack) {
+TEST_F(SideBySide, bothAreGoneBeforeEitherReturns) {
   stream();
   script_.answers = {DeviceStatus::ok, DeviceStatus::disconnected};
   Frame frame;
@@ -146,7 +146,7 @@ TEST_F(SideBySide, areBothGoneBeforeEitherComesBack) {
   EXPECT_EQ(right_->wait({}, &frame), DeviceStatus::ok);
 }
 
-TEST_F(SideBySide, oneThatGoesAgainBeforeBothAreBackComesBackToo) {
+TEST_F(SideBySide, secondDisconnectDuringReturnRecovers) {
   stream();
   script_.answers = {DeviceStatus::disconnected};
   Frame frame;
@@ -161,7 +161,7 @@ TEST_F(SideBySide, oneThatGoesAgainBeforeBothAreBackComesBackToo) {
   EXPECT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
 }
 
-TEST_F(SideBySide, countTheirOwnFramesAndTheCamerasLosses) {
+TEST_F(SideBySide, countOwnFramesAndSharedLosses) {
   stream();
   script_.answers = {DeviceStatus::ok};
   Frame frame;

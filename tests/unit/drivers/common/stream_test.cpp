@@ -17,7 +17,7 @@ void fill(Numbers* numbers) {
   EXPECT_FALSE(numbers->push(item(0)));
 }
 
-TEST(Stream, takingMakesRoomForAProducerThatWaits) {
+TEST(Stream, takeWakesTheWaitingProducer) {
   Numbers numbers;
   ASSERT_EQ(numbers.start(nullptr), DeviceStatus::ok);
   fill(&numbers);
@@ -28,7 +28,7 @@ TEST(Stream, takingMakesRoomForAProducerThatWaits) {
   EXPECT_FALSE(numbers.full());
 }
 
-TEST(Stream, stopWakesAProducerThatWaitsForRoom) {
+TEST(Stream, stopWakesTheWaitingProducer) {
   Numbers numbers;
   ASSERT_EQ(numbers.start(nullptr), DeviceStatus::ok);
   fill(&numbers);

@@ -47,7 +47,7 @@ class CameraConformance : public ::testing::Test {
   std::string why_;
 };
 
-TEST_F(CameraConformance, randomRulesKeepTheContract) {
+TEST_F(CameraConformance, randomCallsKeepTheContract) {
   const int seeds = asked_for("VERGENCE_CONFORMANCE_SEEDS", 3),
             steps = asked_for("VERGENCE_CONFORMANCE_STEPS", 60);
   for (int seed = 1; seed <= seeds && !HasFailure(); ++seed) {
@@ -91,7 +91,7 @@ TEST_F(CameraConformance, randomRulesKeepTheContract) {
   }
 }
 
-TEST_F(CameraConformance, nonsenseIsRefusedAndChangesNothing) {
+TEST_F(CameraConformance, invalidConfigurationChangesNothing) {
   if (make(11) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   const auto possible = rig_->possible();
@@ -107,7 +107,7 @@ TEST_F(CameraConformance, nonsenseIsRefusedAndChangesNothing) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, withoutAFreeSlotTheNewestIsDroppedAndCounted) {
+TEST_F(CameraConformance, newestIsDroppedAndCountedWithoutFreeSlot) {
   if (make(14) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -157,7 +157,7 @@ bool reaches(ConformanceRig& rig, const CameraConfiguration& c, const ExposureSe
   return false;
 }
 
-TEST_F(CameraConformance, anExposureSetWhileStreamingIsToldByFramesAndKeptOverAStop) {
+TEST_F(CameraConformance, exposureSetWhileStreamingPersists) {
   if (make(18) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto c = rig_->possible().front();
@@ -192,7 +192,7 @@ TEST_F(CameraConformance, anExposureSetWhileStreamingIsToldByFramesAndKeptOverAS
   camera.stop();
 }
 
-TEST_F(CameraConformance, anUnpluggedCameraIsGoneAndComesBack) {
+TEST_F(CameraConformance, unpluggedCameraIsGoneAndReturns) {
   if (make(16) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -204,7 +204,7 @@ TEST_F(CameraConformance, anUnpluggedCameraIsGoneAndComesBack) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, ownerConsumerAndReleaserMayBeThreeThreads) {
+TEST_F(CameraConformance, threeThreadsMayShareACamera) {
   if (make(17) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto configuration = rig_->possible().front();

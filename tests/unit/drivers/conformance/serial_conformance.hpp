@@ -138,7 +138,7 @@ TYPED_TEST_P(SerialConformance, stopsAndStartsAgain) {
   EXPECT_EQ(this->disconnects, 0);
 }
 
-TYPED_TEST_P(SerialConformance, comesBackAfterItWasUnpluggedWithOrWithoutItsSupply) {
+TYPED_TEST_P(SerialConformance, reconnectsAfterUnplugPoweredOrNot) {
   SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(13), true}, {at_s(18), at_s(20), false}};
   this->begin(line);
@@ -147,7 +147,7 @@ TYPED_TEST_P(SerialConformance, comesBackAfterItWasUnpluggedWithOrWithoutItsSupp
   EXPECT_GT(static_cast<double>(all.size()), 15 * TypeParam::kRate);
 }
 
-TYPED_TEST_P(SerialConformance, startsAnewAfterAStopWhileItWasGone) {
+TYPED_TEST_P(SerialConformance, startsAfterAStopDuringAnOutage) {
   SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(13), true}};
   this->begin(line, {}, 120);
@@ -159,7 +159,7 @@ TYPED_TEST_P(SerialConformance, startsAnewAfterAStopWhileItWasGone) {
   EXPECT_GT(this->take_to_the_end().front().arrival, at_s(13)) << "nothing of the first start";
 }
 
-TYPED_TEST_P(SerialConformance, noiseIsSilenceAndSilenceIsGone) {
+TYPED_TEST_P(SerialConformance, noiseOrSilenceIsADisconnect) {
   this->begin({}, [](HostStamp at, std::vector<std::uint8_t>* bytes) {
     if (at > at_s(12) && at < at_s(18)) std::fill(bytes->begin(), bytes->end(), std::uint8_t{0x55});
   });
@@ -167,7 +167,7 @@ TYPED_TEST_P(SerialConformance, noiseIsSilenceAndSilenceIsGone) {
   EXPECT_EQ(this->disconnects, 1);
 }
 
-TYPED_TEST_P(SerialConformance, bitsThatFlipCostMessagesAndNothingElse) {
+TYPED_TEST_P(SerialConformance, flippedBitsLoseOnlyTheirMessages) {
   SimulatedLineOptions line;
   line.corrupt = 2e-4;
   this->begin(line);
@@ -187,8 +187,7 @@ TYPED_TEST_P(SerialConformance, bitsThatFlipCostMessagesAndNothingElse) {
 }
 
 REGISTER_TYPED_TEST_SUITE_P(SerialConformance, stopsAndStartsAgain,
-                            comesBackAfterItWasUnpluggedWithOrWithoutItsSupply,
-                            startsAnewAfterAStopWhileItWasGone, noiseIsSilenceAndSilenceIsGone,
-                            bitsThatFlipCostMessagesAndNothingElse);
+                            reconnectsAfterUnplugPoweredOrNot, startsAfterAStopDuringAnOutage,
+                            noiseOrSilenceIsADisconnect, flippedBitsLoseOnlyTheirMessages);
 
 }  // namespace vergence::test

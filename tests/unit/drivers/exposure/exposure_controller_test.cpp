@@ -83,7 +83,7 @@ Stretch drive(Street& street, ExposureController& controller, const ExposureOpti
 /// Latency in frames, and the sensor's response: its exponent.
 class ExposureControl : public ::testing::TestWithParam<std::tuple<int, double>> {};
 
-TEST_P(ExposureControl, settlesAfterEveryChangeOfLightAndThenRests) {
+TEST_P(ExposureControl, settlesAfterEveryChangeOfLight) {
   const auto [latency, gamma] = GetParam();
   const ExposureOptions o;
   const ExposureSetting start{Duration::microseconds(4000), 0};
@@ -109,7 +109,7 @@ TEST_P(ExposureControl, settlesAfterEveryChangeOfLightAndThenRests) {
   }
 }
 
-TEST_P(ExposureControl, aCoverTakenAwayIsGotOverInASecond) {
+TEST_P(ExposureControl, removedCoverIsRecoveredInASecond) {
   const auto [latency, gamma] = GetParam();
   const ExposureOptions o;
   ExposureController controller(o, {o.most, 0});
@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(WhateverTheCamera, ExposureControl,
                          ::testing::Combine(::testing::Values(1, 2, 3, 4),
                                             ::testing::Values(1.0, 0.5)));
 
-TEST(ExposureController, inTheDeadBandAndWithoutSamplesNothingChanges) {
+TEST(ExposureController, deadBandOrNoSamplesChangeNothing) {
   const ExposureOptions o;
   ExposureController controller(o, {Duration::microseconds(2000), 0});
   for (int i = 0; i < 50; ++i) {
@@ -137,7 +137,7 @@ TEST(ExposureController, inTheDeadBandAndWithoutSamplesNothingChanges) {
   }
 }
 
-TEST(ExposureController, anImageSaturatedHereAndThereIsNotMadeBrighter) {
+TEST(ExposureController, partlySaturatedImageIsNotBrightened) {
   const ExposureOptions o;
   ExposureController controller(o, {Duration::microseconds(2000), 0});
   // Dark on the whole, but a tenth of it is sky at the end of the scale.
@@ -146,7 +146,7 @@ TEST(ExposureController, anImageSaturatedHereAndThereIsNotMadeBrighter) {
   EXPECT_LT(next->exposure, Duration::microseconds(2000));
 }
 
-TEST(BrightnessMeter, measuresWhatTheMaskShows) {
+TEST(BrightnessMeter, onlyUnmaskedPixelsAreMeasured) {
   constexpr int kWidth = 640, kHeight = 480;
   std::vector<std::uint8_t> image(kWidth * kHeight, 40), mask(kWidth * kHeight, 255);
   std::fill(image.begin() + kWidth * kHeight / 2, image.end(), std::uint8_t{255});
@@ -169,7 +169,7 @@ TEST(BrightnessMeter, measuresWhatTheMaskShows) {
   EXPECT_EQ(BrightnessMeter(3, 2, {}).places(), 6U);
 }
 
-TEST(AppliedExposure, isTheOneWrittenBeforeTheFrameBegan) {
+TEST(AppliedExposure, isTheOneWrittenBeforeTheFrame) {
   AppliedExposure a;
   const auto us = [](int n) { return ExposureSetting{Duration::microseconds(n), 0}; };
   a.reset(us(1));

@@ -14,7 +14,7 @@ namespace reg = gige_register;
 
 float real(std::uint32_t word) { return std::bit_cast<float>(word); }
 
-TEST(GigeCamera, isConfiguredByTheNamesOfEitherGeneration) {
+TEST(GigeCamera, isConfiguredByOldAndNewFeatureNames) {
   for (const bool old_names : {false, true}) {
     GigeCameraOptions o;
     o.old_names = old_names;
@@ -44,7 +44,7 @@ TEST(GigeCamera, isConfiguredByTheNamesOfEitherGeneration) {
   }
 }
 
-TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
+TEST(GigeCamera, refusalNamesWhatTheCameraOffers) {
   GigeBench b;
   b.configure(b.wish());
   const auto refused = [&](auto&& change, const std::string& word) {
@@ -83,7 +83,7 @@ TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
   EXPECT_EQ(b.reg(reg::width), 320U);
 }
 
-TEST(GigeCamera, hardwareTriggerSetsLineEdgeAndTheFeaturesThatAreNamed) {
+TEST(GigeCamera, hardwareTriggerSetsLineEdgeAndOptions) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.trigger = CameraTrigger::hardware;
@@ -121,7 +121,7 @@ TEST(GigeCamera, everyPulseIsOneFrameAndRestIsNoError) {
   EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::unsupported);
 }
 
-TEST(GigeCamera, stampsAreTheCamerasClockInNanosecondsAndThoseOfTheEndGoBackByTheExposure) {
+TEST(GigeCamera, stampsAreExposureStartsInNanoseconds) {
   for (const bool end : {false, true}) {
     GigeCameraOptions o;
     o.tick_frequency = end ? 125'000'000 : 62'500'000;
@@ -146,14 +146,14 @@ TEST(GigeCamera, stampsAreTheCamerasClockInNanosecondsAndThoseOfTheEndGoBackByTh
   }
 }
 
-TEST(GigeCamera, chunkDataThatAnotherProgramLeftOnAreSwitchedOff) {
+TEST(GigeCamera, chunkModeIsSwitchedOff) {
   GigeBench b;
   b.simulator->write(reg::chunk_mode, 1);
   b.configure(b.wish());
   EXPECT_EQ(b.reg(reg::chunk_mode), 0U);
 }
 
-TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
+TEST(GigeCamera, cameraWithoutClockIsStampedByArrival) {
   GigeCameraOptions o;
   o.tick_frequency = 0;
   GigeBench b(o);
@@ -164,7 +164,7 @@ TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
     EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().min_delay);
 }
 
-TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
+TEST(GigeCamera, ptpIsEnabledAndItsStateReported) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   test::give<gige::Options>(&c, "ptp", "on");
@@ -180,7 +180,7 @@ TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
   EXPECT_NE(without.camera->last_error().find("PTP"), std::string::npos);
 }
 
-TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
+TEST(GigeCamera, packetSizeAndDelayFitTheLink) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.sharing = 2;
@@ -203,7 +203,7 @@ TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
       << b.camera->remark();
 }
 
-TEST(GigeCamera, theReceiveBufferIsThereBeforeTheFirstPacket) {
+TEST(GigeCamera, receiveBufferPrecedesTheFirstPacket) {
   GigeBench b;
   for (const int kib : {64, 150}) {  // below what any system allows
     CameraConfiguration c = b.wish();

@@ -15,7 +15,7 @@ namespace {
 TEST(GigeFakeCamera, isConfiguredAndStreams) {
   const gige::Object<ArvGvFakeCamera> fake(arv_gv_fake_camera_new("127.0.0.1", "FAKE-1"));
   if (fake == nullptr || arv_gv_fake_camera_is_running(fake.get()) == FALSE)
-    GTEST_SKIP() << "127.0.0.1 port 3956 is in use";
+    GTEST_SKIP() << "needs UDP port 3956 of 127.0.0.1: stop the program that uses it";
   DeviceStatus status = DeviceStatus::ok;
   const auto driver = gige::make_driver();
   const auto camera = driver->open("127.0.0.1", &status);

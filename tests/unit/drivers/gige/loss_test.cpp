@@ -27,7 +27,7 @@ CameraConfiguration many_packets(const GigeBench& b, const char* resend) {
   return c;
 }
 
-TEST(GigeLoss, brokenFramesAreTornAndTheNextOnesWhole) {
+TEST(GigeLoss, damagedFramesAreIncompleteOthersWhole) {
   for (const char* resend : {"off", "on"}) {
     GigeBench b;
     b.configure(many_packets(b, resend));
@@ -44,7 +44,7 @@ TEST(GigeLoss, brokenFramesAreTornAndTheNextOnesWhole) {
   }
 }
 
-TEST(GigeLoss, everyPacketLostAtRandomIsInTheAccounts) {
+TEST(GigeLoss, everyRandomPacketLossIsCounted) {
   for (const std::uint64_t seed : {1, 2}) {
     GigeCameraOptions o;
     o.seed = seed;
@@ -62,7 +62,7 @@ TEST(GigeLoss, everyPacketLostAtRandomIsInTheAccounts) {
   }
 }
 
-TEST(GigeLoss, withResendNoFrameIsLostAtHalfAPercent) {
+TEST(GigeLoss, resendRecoversHalfAPercentLoss) {
   GigeBench b;
   b.configure(many_packets(b, "auto"));
   b.start();

@@ -14,7 +14,7 @@
 namespace vergence::gige {
 namespace {
 
-TEST(GigeBlocks, sixteenBitIdsSkipZeroWhenTheyWrap) {
+TEST(GigeBlocks, sixteenBitIdsSkipZeroAtTheWrap) {
   BlockCounter blocks;
   std::uint64_t id = 65'533, expected = 0;
   for (int i = 0; i < 200'000; ++i, ++expected, id = id == 65'535 ? 1 : id + 1) {
@@ -25,7 +25,7 @@ TEST(GigeBlocks, sixteenBitIdsSkipZeroWhenTheyWrap) {
   }
 }
 
-TEST(GigeBlocks, wideIdsDoNotWrap) {
+TEST(GigeBlocks, extendedIdsDoNotWrap) {
   BlockCounter blocks;
   EXPECT_EQ(blocks.next(65'534)->counter, 0U);
   EXPECT_EQ(blocks.next(65'535)->counter, 1U);
@@ -34,7 +34,7 @@ TEST(GigeBlocks, wideIdsDoNotWrap) {
   EXPECT_EQ(blocks.next(0x1'0000'0000U)->counter, 0x1'0000'0000U - 65'534);
 }
 
-TEST(GigeBlocks, lateAndRepeatedAndZeroAreNoFrames) {
+TEST(GigeBlocks, lateRepeatedAndZeroIdsAreRefused) {
   BlockCounter blocks;
   EXPECT_FALSE(blocks.next(0));
   EXPECT_TRUE(blocks.next(10));
@@ -49,7 +49,7 @@ TEST(GigeBlocks, lateAndRepeatedAndZeroAreNoFrames) {
 constexpr std::int64_t kGigabit = 1'000'000'000;
 constexpr Duration kComputed = Duration::nanoseconds(-1);
 
-TEST(GigeLink, theDelayLeavesRoomForTheOtherCameras) {
+TEST(GigeLink, delayLeavesRoomForTheOtherCameras) {
   const LinkLoad two{1280 * 960, 30, 2, false};
   // (2 − 1) · (1500 + 38) · 8 / 10⁹ = 12.304 µs, and 10 % more.
   EXPECT_NEAR(plan_link(two, 1500, kGigabit, kComputed).delay.to_seconds(), 13.53e-6, 1e-8);
@@ -71,7 +71,7 @@ TEST(GigeLink, packetsFitInterfaceCameraAndStep) {
   EXPECT_EQ(choose_packet_size(9000, 1500, 576, 16'000, 4), 1500) << "never fragmented";
 }
 
-TEST(GigeGrey, theCheapestFormatIsTaken) {
+TEST(GigeGrey, cheapestFormatIsChosen) {
   EXPECT_STREQ(choose_format({"Mono16", "BayerRG8", "Mono8"}, "")->name, "Mono8");
   EXPECT_STREQ(choose_format({"RGB8", "Mono16", "BayerRG8"}, "")->name, "BayerRG8");
   EXPECT_STREQ(choose_format({"Mono16", "Mono8"}, "Mono16")->name, "Mono16");

@@ -32,7 +32,7 @@ DeviceStatus start_again(GigeBench* b, double limit_s) {
   return status;
 }
 
-TEST(GigeTrouble, camerasAreFoundByBroadcastAndOpenedBySerial) {
+TEST(GigeTrouble, camerasAreDiscoveredAndOpenedBySerial) {
   GigeCameraOptions o;
   o.address = GigeCamera::address(200);
   o.serial = "FIND-" + std::to_string(::getpid() % 100'000);
@@ -47,13 +47,13 @@ TEST(GigeTrouble, camerasAreFoundByBroadcastAndOpenedBySerial) {
     EXPECT_EQ(d.model, "Vergence Simulator");
   }
   if (!found)
-    GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
+    GTEST_SKIP() << "needs broadcasts on the loopback interface: run it outside of this container";
   DeviceStatus status = DeviceStatus::failed;
   EXPECT_NE(driver->open(o.serial, &status), nullptr) << to_string(status);
   EXPECT_EQ(status, DeviceStatus::ok);
 }
 
-TEST(GigeTrouble, aCameraOfAnotherProgramIsBusy) {
+TEST(GigeTrouble, cameraOfAnotherProgramIsBusy) {
   GigeCameraOptions o;
   o.address = GigeCamera::address(201);
   GigeCamera simulator(o);
@@ -68,7 +68,7 @@ TEST(GigeTrouble, aCameraOfAnotherProgramIsBusy) {
   EXPECT_NE(driver->open(o.address, &status), nullptr) << "and free again";
 }
 
-TEST(GigeTrouble, aCameraThatSendsNothingIsGoneWithASentenceAndComesBack) {
+TEST(GigeTrouble, silentCameraIsReportedAndComesBack) {
   GigeBench b;
   b.configure(b.wish());
   b.start();
@@ -85,7 +85,7 @@ TEST(GigeTrouble, aCameraThatSendsNothingIsGoneWithASentenceAndComesBack) {
   EXPECT_EQ(b.camera->statistics().starts, 2U);
 }
 
-TEST(GigeTrouble, anotherSizeThanConfiguredIsToldAndNeverComplete) {
+TEST(GigeTrouble, otherImageSizeIsReportedAndIncomplete) {
   for (const auto& [width, height] : {std::pair{160, 120}, {640, 480}}) {
     GigeBench b;
     b.configure(b.wish());
@@ -102,7 +102,7 @@ TEST(GigeTrouble, anotherSizeThanConfiguredIsToldAndNeverComplete) {
   }
 }
 
-TEST(GigeTrouble, anUnpluggedCameraThatRestsIsNoticed) {
+TEST(GigeTrouble, unpluggedIdleCameraIsNoticed) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.trigger = CameraTrigger::hardware;
@@ -122,10 +122,10 @@ GigeCameraOptions at_address_of(const GigeBench& b, const std::string& serial) {
   return o;
 }
 
-TEST(GigeTrouble, isFoundElsewhereThoughAnotherCameraHasItsAddress) {
+TEST(GigeTrouble, cameraIsFoundAtItsNewAddress) {
   GigeBench b({}, 202);
   if (gige::make_driver()->enumerate().empty())
-    GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
+    GTEST_SKIP() << "needs broadcasts on the loopback interface: run it outside of this container";
   b.configure(b.wish());
   b.start();
   EXPECT_EQ(b.take(3).size(), 3U);
@@ -141,7 +141,7 @@ TEST(GigeTrouble, isFoundElsewhereThoughAnotherCameraHasItsAddress) {
   EXPECT_EQ(stranger.report().starts, 0U);
 }
 
-TEST(GigeTrouble, losingControlToSomebodyElseIsGone) {
+TEST(GigeTrouble, lostControlIsADisconnect) {
   GigeBench b;
   b.configure(b.wish());
   b.start();

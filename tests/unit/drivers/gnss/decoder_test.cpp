@@ -49,7 +49,7 @@ TEST(GnssDecoder, sentencesOfOneTimeAreOneReading) {
   EXPECT_EQ(all[0].quality.utc_ns, 1709169825'000'000'000);
 }
 
-TEST(GnssDecoder, qualityAndHeightMakeTheFixAndADamagedSentenceNone) {
+TEST(GnssDecoder, qualityAndHeightGiveTheFixStatus) {
   struct Case {
     const char *quality, *height;
     FixStatus fix;
@@ -77,7 +77,7 @@ TEST(GnssDecoder, qualityAndHeightMakeTheFixAndADamagedSentenceNone) {
   EXPECT_NE(all[0].sample.fix, FixStatus::fix_3d);
 }
 
-TEST(GnssDecoder, courseCountsOnlyWhileMovingAndHdtBeforeIt) {
+TEST(GnssDecoder, headingIsHdtElseCourseWhileMoving) {
   Decoder d({Protocol::nmea, 0, {}});
   EXPECT_EQ(read(&d, epoch("012345.00", "90.0", "0.5"), HostStamp(1'000'000'000))
                 .at(0)
@@ -95,13 +95,13 @@ TEST(GnssDecoder, courseCountsOnlyWhileMovingAndHdtBeforeIt) {
 }
 
 // Known epochs are finished by their last sentence: nothing waits for the line to go quiet.
-TEST(GnssDecoder, laterEpochsDoNotWait) {
+TEST(GnssDecoder, laterEpochsAreDeliveredAtOnce) {
   Decoder d({Protocol::nmea, 0, {}});
   ASSERT_EQ(read(&d, epoch("012345.00"), HostStamp(1'000'000'000)).size(), 1U);
   EXPECT_EQ(read(&d, epoch("012346.00"), HostStamp(2'000'000'000), false).size(), 1U);
 }
 
-TEST(GnssDecoder, midnightGoesOn) {
+TEST(GnssDecoder, timeContinuesAcrossMidnight) {
   Decoder d({Protocol::nmea, 0, {}});
   const auto gga = [](const std::string& time) {
     return nmea_sentence("GPGGA," + time + ",2729.85,S,15300.822,E,1,9,0.9,20.5,M,39.5,M,,");
@@ -115,7 +115,7 @@ TEST(GnssDecoder, midnightGoesOn) {
 
 // Arrivals 30 to 90 ms late at 10 Hz: the stamps settle at the least delay, which `processing`
 // states.
-TEST(GnssDecoder, stampsAreThoseOfTheFixNotOfTheArrival) {
+TEST(GnssDecoder, stampsAreThoseOfTheFix) {
   Decoder d({Protocol::ubx, 0, Duration::milliseconds(30)});
   const std::int64_t utc0 = 1709169825'000'000'000;
   double worst = 0;
@@ -138,7 +138,7 @@ TEST(GnssDecoder, stampsAreThoseOfTheFixNotOfTheArrival) {
 }
 
 // A receiver's own clock is tenths of a second off after a night; its first fix sets it.
-TEST(GnssDecoder, theTimeBeforeTheFirstFixIsNoWitness) {
+TEST(GnssDecoder, timeBeforeTheFirstFixIsIgnored) {
   for (const int ahead_ms : {150, 400}) {
     Decoder d({Protocol::ubx, 0, Duration::milliseconds(30)});
     int fixed = 0;
@@ -187,7 +187,7 @@ void read_fixes(Decoder* decoder, const std::vector<int>& milliseconds) {
   }
 }
 
-TEST(GnssDecoder, aReceiverThatIsBackAtALowerRateLosesNothing) {
+TEST(GnssDecoder, lowerRateAfterReconnectLosesNothing) {
   Decoder d({Protocol::ubx, 0, {}});
   read_fixes(&d, {0, 100, 200, 300, 400, 500});
   EXPECT_EQ(d.period(), Duration::milliseconds(100));
@@ -198,7 +198,7 @@ TEST(GnssDecoder, aReceiverThatIsBackAtALowerRateLosesNothing) {
   EXPECT_EQ(d.period(), Duration::seconds(1));
 }
 
-TEST(GnssDecoder, aSingleShortStepIsNoInterval) {
+TEST(GnssDecoder, singleShortStepIsNoInterval) {
   Decoder d({Protocol::ubx, 0, {}});
   // A fix is acquired again 40 ms before the grid of the others goes on.
   read_fixes(&d, {0, 100, 200, 300, 960, 1000, 1100, 1200, 1300, 1400});
@@ -206,7 +206,7 @@ TEST(GnssDecoder, aSingleShortStepIsNoInterval) {
   EXPECT_EQ(d.counters().lost, 6U) << "between 300 and 960 ms";
 }
 
-TEST(GnssDecoder, theFirstStepIsTheIntervalUntilOneIsBelieved) {
+TEST(GnssDecoder, firstStepIsTheIntervalUntilConfirmed) {
   for (const int first : {40, 700}) {
     Decoder d({Protocol::ubx, 0, {}});
     read_fixes(&d, {0, first});
@@ -216,7 +216,7 @@ TEST(GnssDecoder, theFirstStepIsTheIntervalUntilOneIsBelieved) {
   }
 }
 
-TEST(GnssDecoder, oldAndUntimedFixesAreNotHandedOut) {
+TEST(GnssDecoder, oldOrUntimedFixesAreNotDelivered) {
   Decoder d({Protocol::ubx, 0, {}});
   test::PvtBytes pvt;
   ASSERT_EQ(read(&d, pvt.frame(), HostStamp(1'000'000'000)).size(), 1U);

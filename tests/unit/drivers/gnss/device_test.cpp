@@ -65,7 +65,7 @@ test::DeviceOnTerminal on_terminal(Model::Epoch epoch) {
       std::make_unique<Model>(epoch, monotonic_now(), Duration::seconds(600)));
 }
 
-TEST(GnssDevice, theOtherProtocolIsNamed) {
+TEST(GnssDevice, otherProtocolIsNamed) {
   const auto receiver = on_terminal(nmea_epoch);
   const auto driver = make_driver({Protocol::ubx, 38400, {}});
   DeviceStatus status = DeviceStatus::ok;
@@ -75,7 +75,7 @@ TEST(GnssDevice, theOtherProtocolIsNamed) {
       << driver->last_error();
 }
 
-TEST(GnssDevice, anotherRateIsRefusedWithTheReceiversOwn) {
+TEST(GnssDevice, otherRateIsRefusedNamingTheReceivers) {
   const auto receiver = on_terminal(ubx_epoch);
   const auto driver = make_driver({Protocol::ubx, 9600, {}});
   DeviceStatus status = DeviceStatus::failed;
@@ -112,7 +112,7 @@ struct JoinedReceiver {
   Device receiver;
 };
 
-TEST(GnssDevice, oneThatComesBackAtAnotherBaudRateIsFoundUnlessOneIsAskedFor) {
+TEST(GnssDevice, changedBaudRateIsFoundUnlessConfigured) {
   for (const std::uint32_t asked : {0U, 38400U}) {
     JoinedReceiver<Protocol::ubx> joined({}, Duration::seconds(600), {}, asked);
     ASSERT_EQ(joined.configure(), DeviceStatus::ok) << joined.receiver.last_error();

@@ -11,7 +11,7 @@ namespace {
 
 using IidcCamera = WithCamera;
 
-TEST_F(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
+TEST_F(IidcCamera, framesCarryCounterStampAndPixels) {
   c.configure();
   CountingNotifier notifier;
   ASSERT_EQ(c.camera->start(&notifier), DeviceStatus::ok);
@@ -43,7 +43,7 @@ TEST_F(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
   EXPECT_EQ(s.lost + s.torn + s.underruns, 0U);
 }
 
-TEST_F(IidcCamera, StampsGoOnThroughTheWrapOfTheBusClock) {
+TEST_F(IidcCamera, stampsContinueAcrossTheBusClockWrap) {
   c.start();
   DeviceStamp last{};
   for (int i = 0; i < 60; ++i) {  // 100 s … 160 s of the camera's clock
@@ -56,7 +56,7 @@ TEST_F(IidcCamera, StampsGoOnThroughTheWrapOfTheBusClock) {
   }
 }
 
-TEST_F(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
+TEST_F(IidcCamera, shortFrameIsIncompleteAndKeepsItsNumber) {
   c.start();
   c.bus->expose(1);
   c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes -= 512; });
@@ -75,7 +75,7 @@ TEST_F(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
   EXPECT_EQ(s.lost, 2U);
 }
 
-TEST_F(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
+TEST_F(IidcCamera, lostPacketIsFoundByTheNextEmbeddedStamp) {
   for (const std::size_t lost : {1U, 3U, 100U}) {
     CameraUnderTest own(true);
     own.start(CameraUnderTest::usual_with("packet_bytes", "1024"));
@@ -109,7 +109,7 @@ TEST_F(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
   }
 }
 
-TEST_F(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
+TEST_F(IidcCamera, stampAtOptionSelectsTheStampedInstant) {
   std::vector<std::int64_t> starts;
   for (const char* at : {"start", "middle", "end"}) {
     CameraUnderTest own;
@@ -121,7 +121,7 @@ TEST_F(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
   EXPECT_NEAR(static_cast<double>(starts[0] - starts[2]), 5e6, 2);
 }
 
-TEST_F(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
+TEST_F(IidcCamera, sixteenBitPixelsBecomeGreyInOwnSlots) {
   requested.pixel_format = "Mono16";
   test::give<iidc::Options>(&requested, "buffers", "5");
   c.start(requested);
@@ -136,7 +136,7 @@ TEST_F(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
   }
 }
 
-TEST_F(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
+TEST_F(IidcCamera, softwareTriggerFiresOncePerCall) {
   requested.trigger = CameraTrigger::software;
   c.configure(requested);
   EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::stopped);
@@ -150,7 +150,7 @@ TEST_F(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
   EXPECT_EQ(free.camera->trigger_once(), DeviceStatus::unsupported);
 }
 
-TEST_F(IidcCamera, AnExposureSetWhileStreamingReachesTheRegistersOrTheNearestThatThereIs) {
+TEST_F(IidcCamera, exposureSetWhileStreamingIsWrittenOrClamped) {
   ExposureSetting actual;
   c.configure();
   EXPECT_EQ(c.camera->set_exposure({Duration::milliseconds(2), 6}, &actual), DeviceStatus::stopped);
@@ -163,7 +163,7 @@ TEST_F(IidcCamera, AnExposureSetWhileStreamingReachesTheRegistersOrTheNearestTha
             DeviceStatus::bad_configuration);
 }
 
-TEST_F(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
+TEST_F(IidcCamera, framesAreCountedWithoutEmbeddedCounter) {
   c.start(CameraUnderTest::usual_with("embedded", "no"));
   c.bus->expose(3, Duration::milliseconds(100), {1});
   EXPECT_EQ(c.take_and_release().counter, 0U);
@@ -172,7 +172,7 @@ TEST_F(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
   EXPECT_EQ(f.exposure_start.ns(), f.arrival.ns() - f.exposure.ns());
 }
 
-TEST_F(IidcCamera, TimingIsExposureAndTheWay) {
+TEST_F(IidcCamera, timingIsExposureAndTransfer) {
   CameraUnderTest usb, bus(true);
   usb.configure();
   bus.configure();

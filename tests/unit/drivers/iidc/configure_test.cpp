@@ -15,7 +15,7 @@ void expect_mentions(const std::string& message, std::initializer_list<const cha
 
 using IidcConfigure = WithCamera;
 
-TEST_F(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
+TEST_F(IidcConfigure, fixedModeServesItsOwnSizeAndRate) {
   requested.rate_hz = 30;
   c.configure(requested);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U << 29U);
@@ -27,7 +27,7 @@ TEST_F(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
   EXPECT_EQ(c.bus->shape().frame_bytes, 640U * 480U);
 }
 
-TEST_F(IidcConfigure, AHigherFixedRateServesTriggers) {
+TEST_F(IidcConfigure, triggersUseTheNextHigherFixedRate) {
   requested.rate_hz = 20;
   requested.trigger = CameraTrigger::hardware;
   c.configure(requested);
@@ -38,7 +38,7 @@ TEST_F(IidcConfigure, AHigherFixedRateServesTriggers) {
   EXPECT_FALSE(FeatureValue::of(c.bus->command(reg::feature_value(Feature::frame_rate))).on);
 }
 
-TEST_F(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
+TEST_F(IidcConfigure, otherRateOrRegionUsesFormat7) {
   requested.width = 320;
   requested.height = 240;
   requested.offset_x = 64;
@@ -54,7 +54,7 @@ TEST_F(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
   EXPECT_EQ(c.bus->command(reg::kTriggerMode) & bit(25), 0U) << "off";
 }
 
-TEST_F(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
+TEST_F(IidcConfigure, packetIsTheCamerasShareOfTheBus) {
   CameraUnderTest bus(true), usb;
   for (const int cameras : {1, 2, 3}) {
     CameraConfiguration asked = CameraUnderTest::usual();
@@ -75,7 +75,7 @@ TEST_F(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
   EXPECT_EQ(bus.bus->model().f7_packet, 1024U);
 }
 
-TEST_F(IidcConfigure, WherePacketsSetTheRateTheyAreTheSmallestThatReachIt) {
+TEST_F(IidcConfigure, rateByPacketsUsesTheSmallestPacket) {
   CameraUnderTest own(true);
   own.bus->masked[kRegisterSpace + 0xF00000 + reg::feature_inquiry(Feature::frame_rate)] = 0;
   own.configure();
@@ -83,7 +83,7 @@ TEST_F(IidcConfigure, WherePacketsSetTheRateTheyAreTheSmallestThatReachIt) {
   EXPECT_NEAR(own.actual.rate_hz, 10, 0.1);
 }
 
-TEST_F(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
+TEST_F(IidcConfigure, regionChangeStaysOnTheSensor) {
   requested.width = 320;
   requested.height = 240;
   requested.offset_x = 960;
@@ -102,7 +102,7 @@ TEST_F(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
   }
 }
 
-TEST_F(IidcConfigure, ExposureAndGainAreAbsoluteAndReadBack) {
+TEST_F(IidcConfigure, exposureAndGainAreAbsoluteAndReadBack) {
   requested.exposure = Duration::microseconds(1234);
   requested.gain_db = 6.5;
   c.configure(requested);
@@ -114,7 +114,7 @@ TEST_F(IidcConfigure, ExposureAndGainAreAbsoluteAndReadBack) {
   EXPECT_FALSE(v.automatic);
 }
 
-TEST_F(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
+TEST_F(IidcConfigure, embeddedStampAndCounterAreEnabled) {
   c.configure();
   EXPECT_EQ(c.bus->model().frame_info, 0x41U);
   EXPECT_EQ(c.camera->plan().info.size(), 8U);
@@ -124,7 +124,7 @@ TEST_F(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   expect_mentions(c.camera->remark(), {"embeds no counter"});
 }
 
-TEST_F(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
+TEST_F(IidcConfigure, strobeAndTriggerOptionsAreWritten) {
   requested.trigger = CameraTrigger::hardware;
   requested.options = Options{.trigger_mode = 0,
                               .trigger_source = 1,
@@ -140,7 +140,7 @@ TEST_F(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
             (TriggerMode{.on = true, .rising = false, .source = 1, .mode = 0}.quadlet()));
 }
 
-TEST_F(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
+TEST_F(IidcConfigure, busSpeedIsTheCamerasHighest) {
   CameraUnderTest legacy(true, false), beta(true, true);
   legacy.configure();
   EXPECT_EQ(legacy.bus->model().iso_speed, 2U);
@@ -155,7 +155,7 @@ TEST_F(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
   EXPECT_EQ(beta.bus->model().iso_speed, 2U);
 }
 
-TEST_F(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNoSmallerOne) {
+TEST_F(IidcConfigure, largePacketIsUsedOnlyWithoutSmallerOne) {
   requested.width = 1280;
   requested.height = 960;
   requested.rate_hz = 30;
@@ -172,7 +172,7 @@ TEST_F(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIs
   EXPECT_EQ(own.bus->shape().packet_bytes, 5120U);
 }
 
-TEST_F(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
+TEST_F(IidcConfigure, refusalNamesWhatTheCameraOffers) {
   using C = CameraConfiguration;
   struct Refusal {
     void (*change)(C*);

@@ -12,7 +12,7 @@ constexpr Duration kSlack = Duration::milliseconds(300);  // of a busy machine
 
 using IidcFaults = WithCamera;
 
-TEST_F(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
+TEST_F(IidcFaults, registerNeverReadyTimesOut) {
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kValueApply;
   const HostStamp begun = monotonic_now();
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::timeout);
@@ -24,7 +24,7 @@ TEST_F(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
   c.start();
 }
 
-TEST_F(IidcFaults, ASoftwareTriggerThatStaysBusyEndsInTime) {
+TEST_F(IidcFaults, busySoftwareTriggerTimesOut) {
   requested.trigger = CameraTrigger::software;
   c.start(requested);
   c.bus->stuck[kCommand + reg::kSoftwareTrigger] = bit(31);
@@ -34,7 +34,7 @@ TEST_F(IidcFaults, ASoftwareTriggerThatStaysBusyEndsInTime) {
   EXPECT_FALSE(c.camera->last_error().empty());
 }
 
-TEST_F(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
+TEST_F(IidcFaults, refusedRegionOrPacketIsNamed) {
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorRegion;
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
   EXPECT_NE(c.camera->last_error().find("refuses the region 640 x 480"), std::string::npos)
@@ -45,7 +45,7 @@ TEST_F(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
       << c.camera->last_error();
 }
 
-TEST_F(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
+TEST_F(IidcFaults, anyRefusedRegisterGivesAStatus) {
   CameraUnderTest probe;
   probe.start();
   probe.camera->stop();
@@ -63,7 +63,7 @@ TEST_F(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
   }
 }
 
-TEST_F(IidcFaults, RegistersFullOfNonsenseGiveAStatus) {
+TEST_F(IidcFaults, invalidRegisterContentsGiveAStatus) {
   for (const std::uint32_t pattern : {0xFFFF'FFFFU, 0x7F80'0001U, 0xAAAA'AAAAU, 0x8000'0000U})
     for (std::uint32_t first = 0x100; first < 0x900; first += 0x40) {
       CameraUnderTest own;
@@ -76,7 +76,7 @@ TEST_F(IidcFaults, RegistersFullOfNonsenseGiveAStatus) {
     }
 }
 
-TEST_F(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfigured) {
+TEST_F(IidcFaults, unpluggedCameraReturnsAsConfigured) {
   c.start();
   c.bus->expose(2);
   c.bus->unplug();
@@ -100,7 +100,7 @@ TEST_F(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConf
   c.camera->release(held.slot);
 }
 
-TEST_F(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
+TEST_F(IidcFaults, unresponsiveCameraIsDisconnectedAtOnce) {
   c.configure();
   c.bus->all_accesses = DeviceStatus::timeout;
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::disconnected);
@@ -109,7 +109,7 @@ TEST_F(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
 }
 
-TEST_F(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
+TEST_F(IidcFaults, replugWithoutBandwidthIsRetried) {
   c.start();
   c.bus->unplug();
   Frame f;
@@ -129,7 +129,7 @@ TEST_F(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
   EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
 }
 
-TEST_F(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
+TEST_F(IidcFaults, silentCameraRestartsWhileAnImageIsHeld) {
   c.start();
   c.bus->expose(2);
   (void)c.take_and_release();
@@ -150,7 +150,7 @@ TEST_F(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
   }
 }
 
-TEST_F(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
+TEST_F(IidcFaults, streamOutOfStepRestarts) {
   c.start();
   c.bus->expose(1);
   (void)c.take_and_release();
@@ -165,7 +165,7 @@ TEST_F(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
   EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
 }
 
-TEST_F(IidcFaults, ACounterThatBeginsAnewIsFollowedAfterTwoFrames) {
+TEST_F(IidcFaults, restartedCounterIsFollowedAfterTwoFrames) {
   c.start();
   c.bus->expose(5);
   for (int i = 0; i < 5; ++i) (void)c.take_and_release();

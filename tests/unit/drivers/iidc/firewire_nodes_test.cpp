@@ -29,7 +29,7 @@ std::vector<std::uint32_t> model_rom(unsigned index) {
   return {c.rom, c.rom + c.rom_length};
 }
 
-TEST(FirewireNodes, CamerasAreTheNodesWhoseRomSaysSo) {
+TEST(FirewireNodes, camerasAreRecognisedByTheirRom) {
   const test::TemporaryFolder folder;
   EXPECT_FALSE(has_firewire(folder.path()));
   EXPECT_TRUE(list_firewire_cameras(folder.path()).empty());

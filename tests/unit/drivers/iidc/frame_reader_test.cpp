@@ -31,7 +31,7 @@ std::vector<std::uint8_t> image(std::uint32_t counter, std::int64_t camera_ns, R
   return out;
 }
 
-TEST(FrameReader, NoiseIsNeverTakenForTheNextFramesBeginning) {
+TEST(FrameReader, noiseIsNotTakenForTheNextFrame) {
   Random random(9);
   FrameReader reader;
   SharedClock clock;
@@ -49,7 +49,7 @@ TEST(FrameReader, NoiseIsNeverTakenForTheNextFramesBeginning) {
   }
 }
 
-TEST(FrameReader, AnyBytesGiveAnAnswer) {
+TEST(FrameReader, anyBytesGiveAResult) {
   Random random(10);
   SharedClock clock;
   for (const std::uint32_t items : {0U, 0x8000'0001U, 0x8000'0040U, 0x8000'0041U, 0x8000'03FFU}) {
@@ -76,7 +76,7 @@ TEST(FrameReader, AnyBytesGiveAnAnswer) {
   }
 }
 
-TEST(FrameReader, BusStampsTellGapsWhereNothingIsEmbedded) {
+TEST(FrameReader, busStampsShowGapsWithoutEmbeddedData) {
   FrameReader reader;
   CameraPlan p = plan();
   p.info = {};

@@ -5,7 +5,7 @@
 namespace vergence::iidc {
 namespace {
 
-TEST(Identity, AGuidIsNamedInHexOrByTheLabelsNumber) {
+TEST(Identity, guidIsGivenInHexOrAsSerialNumber) {
   constexpr std::uint64_t kGuid = 0x00B0'9D01'00A1'2345;
   EXPECT_EQ(guid_text(kGuid), "00b09d0100a12345");
   EXPECT_TRUE(names_camera("", kGuid));

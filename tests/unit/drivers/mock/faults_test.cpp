@@ -20,7 +20,7 @@ std::string refusal(const std::string& text) {
   return "";
 }
 
-TEST(Faults, aFaultIsReadFromOneLine) {
+TEST(Faults, lineIsParsed) {
   const Fault f = parse_fault("knock@42 camera=1 pitch_deg=0.2");
   EXPECT_EQ(f.kind, FaultKind::knock);
   EXPECT_EQ(f.at, Duration::seconds(42));
@@ -30,7 +30,7 @@ TEST(Faults, aFaultIsReadFromOneLine) {
   EXPECT_EQ(f.shift, Vec3::Zero());
 }
 
-TEST(Faults, everyKindStandsInTheTableAtItsPlaceAndTakesItsOwnParametersAtBothEnds) {
+TEST(Faults, everyKindTakesItsParameterRanges) {
   for (std::size_t i = 0; i < fault_rows().size(); ++i) {
     const FaultRow& row = fault_rows()[i];
     EXPECT_EQ(static_cast<std::size_t>(row.kind), i) << row.name;
@@ -47,7 +47,7 @@ TEST(Faults, everyKindStandsInTheTableAtItsPlaceAndTakesItsOwnParametersAtBothEn
   }
 }
 
-TEST(Faults, thePageHasTheTable) {
+TEST(Faults, documentationHasTheTable) {
   std::ifstream in(std::string(VERGENCE_SOURCE_DIR) + "/docs/simulated_rig.md", std::ios::binary);
   std::ostringstream page;
   page << in.rdbuf();
@@ -56,7 +56,7 @@ TEST(Faults, thePageHasTheTable) {
       << fault_document();
 }
 
-TEST(Faults, nonsenseIsNamed) {
+TEST(Faults, invalidLineIsNamed) {
   EXPECT_NE(refusal("knock").find("KIND@SECONDS"), std::string::npos);
   EXPECT_NE(refusal("knok@3").find("unknown fault \"knok\""), std::string::npos);
   EXPECT_NE(refusal("knock@soon").find("not a number"), std::string::npos);
@@ -70,7 +70,7 @@ TEST(Faults, nonsenseIsNamed) {
   EXPECT_NE(refusal("recalibrate@1 camera=1").find("it has none"), std::string::npos);
 }
 
-TEST(Faults, aFaultActsForItsDurationAndWithoutOneToTheEnd) {
+TEST(Faults, zeroDurationLastsToTheEnd) {
   Fault f = parse_fault("cover@2 duration_s=3");
   EXPECT_FALSE(f.active(Duration::seconds(1.999)));
   EXPECT_TRUE(f.active(Duration::seconds(2)));

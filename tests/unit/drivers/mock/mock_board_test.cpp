@@ -13,7 +13,7 @@ MockRigOptions four_seconds() {
   return o;
 }
 
-TEST(MockBoard, variedIntervalsAreLongerAndShorterAsTheProtocolSays) {
+TEST(MockBoard, variedIntervalsFollowTheProtocol) {
   TriggerConfiguration c{kRate};
   c.vary = Duration::milliseconds(2);
   MockBench b({}, four_seconds(), c);
@@ -32,7 +32,7 @@ TEST(MockBoard, variedIntervalsAreLongerAndShorterAsTheProtocolSays) {
   }
 }
 
-TEST(MockBoard, aPauseLeavesPulsesOutAtTheSamePlaceOnEveryRun) {
+TEST(MockBoard, pauseOmitsTheSamePulsesOnEveryRun) {
   for (int run = 0; run < 3; ++run) {
     MockBench b({}, four_seconds());
     b.drive(20);
@@ -50,7 +50,7 @@ TEST(MockBoard, aPauseLeavesPulsesOutAtTheSamePlaceOnEveryRun) {
   }
 }
 
-TEST(MockBoard, feedbackTellsEveryExposureAndThatOneNeverCame) {
+TEST(MockBoard, feedbackReportsExposuresAndMissedTriggers) {
   TriggerConfiguration c{kRate};
   c.feedback = 0b11;
   MockRigOptions o = four_seconds();
@@ -79,7 +79,7 @@ TEST(MockBoard, feedbackTellsEveryExposureAndThatOneNeverCame) {
   }
 }
 
-TEST(MockBoard, aRebootedBoardCountsAndTicksFromZeroWithAnotherBoot) {
+TEST(MockBoard, rebootRestartsNumbersAndTicksWithNewBoot) {
   MockBench b({"board_reboot@2 duration_s=0.5"}, four_seconds());
   b.drive();
   ASSERT_EQ(b.pulses.size(), 40U + 31U);
@@ -95,7 +95,7 @@ TEST(MockBoard, aRebootedBoardCountsAndTicksFromZeroWithAnotherBoot) {
   EXPECT_EQ(b.rig->trigger().statistics().reboots, 1U);
 }
 
-TEST(MockBoard, anUnpluggedBoardStopsWithItsLineUnlessItHasASupplyOfItsOwn) {
+TEST(MockBoard, unpluggedBoardStopsUnlessPowered) {
   MockBench bare({"board_gone@2 duration_s=0.5"}, four_seconds());
   bare.drive();
   EXPECT_EQ(bare.board_gone, 1);

@@ -17,7 +17,7 @@ MockBench drive_with(const std::vector<std::string>& faults, double seconds = 3,
   return b;
 }
 
-TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
+TEST(MockRig, arrivalsKeepDelaysAndStampsTheirClock) {
   const MockBench h = drive_with({});
   const DeviceTiming timing = h.rig->camera(1).timing();
   ClockMapper mapper({timing.min_delay, timing.delay_spread, timing.resolution});
@@ -32,7 +32,7 @@ TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
   }
 }
 
-TEST(MockRig, aCoveredLensIsBlackForItsTimeAndOnlyThere) {
+TEST(MockRig, coveredLensIsBlackForItsDuration) {
   const MockBench h = drive_with({"cover@1 camera=1 duration_s=1"});
   for (const Seen& s : h.frames[1]) {
     const bool covered = s.frame.counter >= 20 && s.frame.counter < 40;
@@ -43,7 +43,7 @@ TEST(MockRig, aCoveredLensIsBlackForItsTimeAndOnlyThere) {
 
 // Frames of 0.8 s on would arrive after the camera is gone: none of them does, and no event of its
 // return is taken for a frame.
-TEST(MockRig, framesThatAreOnTheWayAsACameraGoesAreLostWithIt) {
+TEST(MockRig, framesInTransitAreLostWithTheCamera) {
   const MockBench h = drive_with(
       {"late_frames@0.5 camera=1 duration_s=0.5 share=1", "camera_gone@1 camera=1 duration_s=0.5"});
   EXPECT_EQ(h.gone[1], 1);
@@ -57,7 +57,7 @@ TEST(MockRig, framesThatAreOnTheWayAsACameraGoesAreLostWithIt) {
   EXPECT_EQ(starts, 2U);
 }
 
-TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
+TEST(MockRig, lostLateAndDuplicateFramesAreCounted) {
   const MockBench lost = drive_with({"lose_frames@0 camera=0 share=0.3 duration_s=0"});
   EXPECT_GT(lost.statistics[0].lost, 5U);
   EXPECT_EQ(lost.frames[0].size() + lost.statistics[0].lost, 61U);
@@ -73,7 +73,7 @@ TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
   EXPECT_FALSE(std::is_sorted(order.begin(), order.end()));
 }
 
-TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {
+TEST(MockRig, brokenPairLosesOneRandomImage) {
   const MockBench h = drive_with({"break_pairs@0 duration_s=0"});
   EXPECT_EQ(h.frames[0].size() + h.frames[1].size(), 61U);
   EXPECT_GT(h.frames[0].size(), 15U);
@@ -82,7 +82,7 @@ TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {
     for (const Seen& right : h.frames[1]) EXPECT_NE(left.frame.counter, right.frame.counter);
 }
 
-TEST(MockRig, aPulseThatACameraDoesNotSeeIsNeitherExposedNorCounted) {
+TEST(MockRig, missedTriggerIsNotExposedOrCounted) {
   const MockBench good = drive_with({}), h = drive_with({"missed_trigger@0.98 camera=1 pulses=2"});
   EXPECT_EQ(h.frames[0].size(), 61U);
   ASSERT_EQ(h.frames[1].size(), 59U);
@@ -95,7 +95,7 @@ TEST(MockRig, aPulseThatACameraDoesNotSeeIsNeitherExposedNorCounted) {
   }
 }
 
-TEST(MockRig, aLaggingCameraSendsTheImageBeforeWithTheCounterAndStampOfThisOne) {
+TEST(MockRig, laggingCameraSendsThePreviousImage) {
   const MockBench good = drive_with({}, 6),
                   lagging = drive_with({"lag@4 camera=1 duration_s=1"}, 6);
   ASSERT_EQ(lagging.frames[1].size(), good.frames[1].size());
@@ -109,7 +109,7 @@ TEST(MockRig, aLaggingCameraSendsTheImageBeforeWithTheCounterAndStampOfThisOne) 
   EXPECT_NE(good.frames[1][90].mean, good.frames[1][89].mean) << "the vehicle moves by then";
 }
 
-TEST(MockRig, swappedCablesExchangeTheImagesAndNothingElse) {
+TEST(MockRig, swappedCablesExchangeTheImagesOnly) {
   const MockBench good = drive_with({}),
                   swapped = drive_with({"swap_cables@1", "cover@2 camera=0 duration_s=0.5"});
   for (std::size_t i = 0; i < 61; ++i) {
@@ -123,13 +123,13 @@ TEST(MockRig, swappedCablesExchangeTheImagesAndNothingElse) {
   }
 }
 
-TEST(MockRig, aBusIsInTheWayForItsTimeOnly) {
+TEST(MockRig, occluderChangesImagesForItsDurationOnly) {
   const MockBench good = drive_with({}), h = drive_with({"occluder@1 duration_s=1"});
   for (std::size_t i = 0; i < 61; ++i)
     EXPECT_EQ(h.frames[0][i].mean != good.frames[0][i].mean, i >= 20 && i < 40) << i;
 }
 
-TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
+TEST(MockRig, knockMovesTheTrueRigByItsParameters) {
   const auto truth = test::small_truth({"knock@1 camera=1 pitch_deg=0.2 x_m=0.003"});
   const RigCalibration before = truth->calibration(Duration::seconds(0.9)),
                        after = truth->calibration(Duration::seconds(1.1));
@@ -153,7 +153,7 @@ Vec3 position_error(const RigTruth& truth, const InsSample& s, Duration t) {
   return p - truth.ins_in_enu(t).t;
 }
 
-TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
+TEST(MockRig, idealInsIsTheTruthToAMicrometre) {
   const auto truth = test::small_truth({});
   InsModel model({true, 1, 120}, *truth);
   for (std::uint64_t i = 0; i < 1200; ++i) {
@@ -167,7 +167,7 @@ TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
   }
 }
 
-TEST(MockRig, insFaultsAct) {
+TEST(MockRig, insFaultsActForTheirDuration) {
   const MockBench gone = drive_with({"ins_gone@1 duration_s=1"});
   EXPECT_EQ(gone.rig->ins().statistics().lost, 120U);
   for (const InsReading& r : gone.readings)

@@ -56,7 +56,7 @@ const std::map<std::string, Texts>& other_values() {
 
 CameraOptions begin_of(const std::string& driver) { return default_options(driver).value(); }
 
-TEST(CameraOptions, everyRowIsReadAndWrittenAgain) {
+TEST(CameraOptions, everyRowRoundTripsAsText) {
   for (const auto& [driver, texts] : other_values()) {
     CameraOptions all = begin_of(driver);
     EXPECT_EQ(texts.size(), option_rows(all).size()) << driver;
@@ -74,7 +74,7 @@ TEST(CameraOptions, everyRowIsReadAndWrittenAgain) {
   }
 }
 
-TEST(CameraOptions, aValueThatCannotBeChangesNothing) {
+TEST(CameraOptions, invalidValueChangesNothing) {
   const std::map<std::string, std::vector<std::pair<std::string, std::string>>> wrong{
       {"gige",
        {{"packet_size", "ten"},
@@ -111,7 +111,7 @@ TEST(CameraOptions, aValueThatCannotBeChangesNothing) {
   EXPECT_FALSE(default_options("mock").has_value());
 }
 
-TEST(CameraOptions, aDriverTakesItsOwnKindAndWhatIsPossible) {
+TEST(CameraOptions, driverTakesOnlyItsKindAndValidValues) {
   gige::Options taken;
   taken.buffers = 7;
   std::string error;
@@ -128,7 +128,7 @@ TEST(CameraOptions, aDriverTakesItsOwnKindAndWhatIsPossible) {
   EXPECT_EQ(taken.buffers, gige::Options{}.buffers);
 }
 
-TEST(CameraOptions, thePagesHaveEveryRowAsItStands) {
+TEST(CameraOptions, documentationHasEveryRow) {
   std::set<std::string> lines;
   for (const char* page : {"gige", "iidc", "v4l2"}) {
     std::ifstream file(std::string(VERGENCE_SOURCE_DIR) + "/drivers/" + page + "/README.md");

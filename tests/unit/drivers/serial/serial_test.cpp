@@ -55,7 +55,7 @@ class SerialLine : public ::testing::Test {
   std::unique_ptr<SerialLink> line_;
 };
 
-TEST_F(SerialLine, carriesEveryByteBothWays) {
+TEST_F(SerialLine, everyByteIsCarriedBothWays) {
   Bytes all(256);
   for (std::size_t i = 0; i < all.size(); ++i)
     all[i] = static_cast<std::uint8_t>(i);  // XON, XOFF, CR, NUL and FF among them
@@ -75,7 +75,7 @@ TEST_F(SerialLine, carriesEveryByteBothWays) {
   EXPECT_EQ(received(all.size()), all);
 }
 
-TEST_F(SerialLine, arrivalIsNeverBeforeTheBytesWereSent) {
+TEST_F(SerialLine, arrivalIsNotBeforeSending) {
   std::array<std::uint8_t, 64> some{};
   HostStamp before = line().now();
   for (int i = 0; i < 50; ++i) {
@@ -90,7 +90,7 @@ TEST_F(SerialLine, arrivalIsNeverBeforeTheBytesWereSent) {
   }
 }
 
-TEST_F(SerialLine, aQuietLineIsATimeoutAfterItsLimit) {
+TEST_F(SerialLine, quietLineTimesOutAtTheLimit) {
   std::array<std::uint8_t, 8> some{};
   const HostStamp before = line().now();
   EXPECT_EQ(line().read(some, kSoon).status, DeviceStatus::timeout);
@@ -98,7 +98,7 @@ TEST_F(SerialLine, aQuietLineIsATimeoutAfterItsLimit) {
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
 }
 
-TEST_F(SerialLine, wakeEndsOneReadAndOnlyOne) {
+TEST_F(SerialLine, wakeEndsExactlyOneRead) {
   std::array<std::uint8_t, 8> some{};
   std::thread waker([this] {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -114,7 +114,7 @@ TEST_F(SerialLine, wakeEndsOneReadAndOnlyOne) {
   EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::ok);
 }
 
-TEST_F(SerialLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
+TEST_F(SerialLine, hangUpDisconnectsAtOnce) {
   hang_up();
   std::array<std::uint8_t, 8> some{};
   const HostStamp before = line().now();
@@ -124,7 +124,7 @@ TEST_F(SerialLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
   EXPECT_LT(line().now() - before, kLong);
 }
 
-TEST_F(SerialLine, discardedInputDoesNotComeAgain) {
+TEST_F(SerialLine, discardedInputIsNotRead) {
   send({1, 2, 3});
   std::array<std::uint8_t, 8> some{};
   ASSERT_EQ(line().read(std::span(some).first(1), kLong).status,
@@ -133,7 +133,7 @@ TEST_F(SerialLine, discardedInputDoesNotComeAgain) {
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
 }
 
-TEST_F(SerialLine, isHeldByOne) {
+TEST_F(SerialLine, secondOpenIsBusy) {
   DeviceStatus status = DeviceStatus::ok;
   EXPECT_EQ(place_->open({}, &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::busy);
@@ -146,7 +146,7 @@ SerialPortInfo usb_port(const std::string& port, const std::string& serial) {
   return info;
 }
 
-TEST(SerialPort, aDeviceThatCameBackElsewhereIsFoundByItsSerialNumber) {
+TEST(SerialPort, movedDeviceIsFoundBySerialNumber) {
   const std::vector<SerialPortInfo> ports{usb_port("/dev/ttyS0", ""), usb_port("/dev/ttyV0", "B"),
                                           usb_port("/dev/ttyV1", "A")};
   EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV0"), "/dev/ttyV1") << "V0 is another now";
@@ -157,7 +157,7 @@ TEST(SerialPort, aDeviceThatCameBackElsewhereIsFoundByItsSerialNumber) {
   EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyS0"), "/dev/ttyS0") << "whose nobody knows";
 }
 
-TEST(SerialPort, ofPortsThatShareASerialNumberTheOneAskedForIsTaken) {
+TEST(SerialPort, sharedSerialNumberKeepsTheConfiguredPort) {
   // An FT4232H has one number for its four ports, a CP2102 often has "0001".
   const std::vector<SerialPortInfo> ports{usb_port("/dev/ttyV0", "A"), usb_port("/dev/ttyV1", "A"),
                                           usb_port("/dev/ttyV2", "A")};
@@ -165,7 +165,7 @@ TEST(SerialPort, ofPortsThatShareASerialNumberTheOneAskedForIsTaken) {
   EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV7"), "/dev/ttyV7") << "which one nobody knows";
 }
 
-TEST(ConverterNumber, thatTwoWereSeenWithTellsNobodyForGood) {
+TEST(ConverterNumber, sharedNumberIsNeverUsedAgain) {
   const auto one = usb_port("/dev/ttyV0", "0001"), other = usb_port("/dev/ttyV1", "0001");
   ConverterNumber shared;
   shared.opened({one, other}, "0001");
@@ -180,7 +180,7 @@ TEST(ConverterNumber, thatTwoWereSeenWithTellsNobodyForGood) {
   EXPECT_EQ(alone.find({usb_port("/dev/ttyV0", "B")}, "/dev/ttyV0"), "") << "that is B's now";
 }
 
-TEST(SerialPort, aLinkIsKeptWhereItLeadsToThePortWithTheSerialNumber) {
+TEST(SerialPort, linkToTheSerialNumbersPortIsKept) {
   const std::filesystem::path link =
       std::filesystem::temp_directory_path() / ("vergence-by-id-" + std::to_string(::getpid()));
   std::filesystem::create_symlink("/dev/null", link);
@@ -189,7 +189,7 @@ TEST(SerialPort, aLinkIsKeptWhereItLeadsToThePortWithTheSerialNumber) {
   std::filesystem::remove(link);
 }
 
-TEST(SerialPort, whatCannotBeOpenedIsNamed) {
+TEST(SerialPort, failedOpenGivesItsReason) {
   DeviceStatus status = DeviceStatus::ok;
   EXPECT_EQ(SerialPort("/dev/ttyThatIsNotThere").open({}, &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::not_found);

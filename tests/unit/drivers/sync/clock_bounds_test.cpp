@@ -61,7 +61,7 @@ ClockMapperOptions options_of(const Line& line, bool two_way) {
   return o;
 }
 
-TEST(ClockBounds, tenSecondsOfPingsOrThirtyOfEventsGiveTwentyMicroseconds) {
+TEST(ClockBounds, settledErrorIsTwentyMicroseconds) {
   for (const bool two_way : {true, false}) {
     const int rate_hz = two_way ? 100 : 30, settled_s = two_way ? 10 : 30;
     Errors errors;
@@ -87,7 +87,7 @@ TEST(ClockBounds, tenSecondsOfPingsOrThirtyOfEventsGiveTwentyMicroseconds) {
   }
 }
 
-TEST(ClockBounds, boundsHoldFromTheFirstStampOnWhateverTheDelaysAre) {
+TEST(ClockBounds, boundsHoldFromTheFirstStampForAnyDelay) {
   Errors one_way, two_way;
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     Line line(seed);
@@ -110,7 +110,7 @@ TEST(ClockBounds, boundsHoldFromTheFirstStampOnWhateverTheDelaysAre) {
       << "of " << one_way.ns.size();
 }
 
-TEST(ClockBounds, aClockThatIsSetIsFoundByTheNextPingsBothWays) {
+TEST(ClockBounds, setClockIsFoundByTheNextPings) {
   for (const double step : {3600.0, 0.5, 0.003, -0.003, -0.5, -3600.0}) {
     Line line(5);
     ClockMapper clock(options_of(line, true));
@@ -129,7 +129,7 @@ TEST(ClockBounds, aClockThatIsSetIsFoundByTheNextPingsBothWays) {
   }
 }
 
-TEST(ClockBounds, driftThatChangesIsFollowed) {
+TEST(ClockBounds, changingDriftIsFollowed) {
   Line line(9);
   ClockMapper clock(options_of(line, true));
   Errors errors;
@@ -149,7 +149,7 @@ TEST(ClockBounds, driftThatChangesIsFollowed) {
   EXPECT_EQ(errors.outside, 0);
 }
 
-TEST(ClockBounds, exactToTheNanosecondOverTenYearsOfOffsetAndOfRunning) {
+TEST(ClockBounds, tenYearsStayExactToTheNanosecond) {
   constexpr std::int64_t kTenYears = 315'576'000'000'000'000;
   for (const std::int64_t offset : {kTenYears, -kTenYears}) {
     ClockMapperOptions o;
@@ -171,7 +171,7 @@ TEST(ClockBounds, exactToTheNanosecondOverTenYearsOfOffsetAndOfRunning) {
 }
 
 // The process slept, and what its driver had queued comes at once: none is within the stall.
-TEST(ClockBounds, aBacklogIsNoClockThatWasSetBackAndStampsNeverGoBack) {
+TEST(ClockBounds, backlogKeepsStampsMonotonic) {
   Line line(7);
   line.drift = 80e-6;
   ClockMapper clock(options_of(line, false));
@@ -189,7 +189,7 @@ TEST(ClockBounds, aBacklogIsNoClockThatWasSetBackAndStampsNeverGoBack) {
   EXPECT_EQ(clock.resets(), 0U);
 }
 
-TEST(ClockBounds, hostileStampsAreCountedAndHarmless) {
+TEST(ClockBounds, randomStampsGiveNonNegativeErrors) {
   ClockMapper clock{ClockMapperOptions{}};
   Random random(4);
   for (int i = 0; i < 20'000; ++i) {

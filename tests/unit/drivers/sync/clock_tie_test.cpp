@@ -15,7 +15,7 @@ DeviceStamp source_of(DeviceStamp stamp, double drift) {
          scaled(stamp - DeviceStamp(0), drift);
 }
 
-TEST(ClockTie, findsTheRateOfTwoCrystals) {
+TEST(ClockTie, rateOfTwoCrystalsIsFound) {
   constexpr double kDrift = 100e-6;
   ClockTie tie(kNoise, kInterval);
   DeviceStamp stamp(0);
@@ -26,7 +26,7 @@ TEST(ClockTie, findsTheRateOfTwoCrystals) {
   EXPECT_LE(magnitude(tie.edge_of(later) - source_of(later, kDrift)).ns(), 10);
 }
 
-TEST(ClockTie, theGateGrowsWithTheTimeSinceTheNewestPairAndNeverReachesAFifthOfTheInterval) {
+TEST(ClockTie, gateGrowsUpToAFifthOfTheInterval) {
   ClockTie tie(kNoise, kInterval);
   tie.add(DeviceStamp(0), DeviceStamp(0));
   EXPECT_EQ(tie.gate(), kNoise * 4 + Duration::microseconds(50));

@@ -19,7 +19,7 @@ using testing::sets_of;
 
 struct CommonClock : ::testing::TestWithParam<SyncMode> {};
 
-TEST_P(CommonClock, pairsByItsOwnStampsWhateverTheHostsAre) {
+TEST_P(CommonClock, pairsAreFormedByItsStampsAlone) {
   RigSynchronizer sync(rig_options(GetParam()));
   RigSets out;
   Random random(3);
@@ -45,7 +45,7 @@ TEST_P(CommonClock, pairsByItsOwnStampsWhateverTheHostsAre) {
 /// By a clock that goes right.
 constexpr std::int64_t clock_ns(int pulse) { return 90'000'000'000 + (kRigInterval * pulse).ns(); }
 
-TEST_P(CommonClock, thatDriftsApartByAnIntervalProvesNothing) {
+TEST_P(CommonClock, driftOfAnIntervalVerifiesNothing) {
   RigSynchronizer sync(rig_options(GetParam()));
   // Camera 1's clock loses its master at n = 500 and gains 2 ms a second from then on: a whole
   // interval after 20 s.
@@ -62,7 +62,7 @@ TEST_P(CommonClock, thatDriftsApartByAnIntervalProvesNothing) {
   EXPECT_EQ(sync.counters().ambiguous, doubted);
 }
 
-TEST(OneClock, whileOneCameraAloneHasAnotherClockNothingIsProven) {
+TEST(OneClock, differentClockOfOneCameraVerifiesNothing) {
   for (const std::int64_t step : {-50'000'000'000, 1'700'000'000'000'000'000}) {
     RigSynchronizer sync(rig_options(SyncMode::ptp));
     RigSets out;

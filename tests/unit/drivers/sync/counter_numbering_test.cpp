@@ -9,7 +9,7 @@ constexpr Duration kInterval = Duration::milliseconds(50);
 
 HostStamp at(std::int64_t pulse) { return HostStamp(1'000'000'000) + kInterval * pulse; }
 
-TEST(CounterNumbering, aFrameFromBeforeTheFirstPulseHasTheFirstNumber) {
+TEST(CounterNumbering, frameBeforeTheFirstPulseGetsItsNumber) {
   CounterNumbering numbering(kInterval, false);
   numbering.record(1, at(10), true);
   numbering.align(1);
@@ -17,14 +17,14 @@ TEST(CounterNumbering, aFrameFromBeforeTheFirstPulseHasTheFirstNumber) {
   EXPECT_FALSE(numbering.number_of_lost(1, 7));
 }
 
-TEST(CounterNumbering, aCounterThatLeapsByHoursIsNotBelieved) {
+TEST(CounterNumbering, counterJumpOfHoursIsIgnored) {
   CounterNumbering numbering(kInterval, false);
   numbering.record(20, at(20), true);
   EXPECT_EQ(numbering.number_of(0, 5'000'000'000, at(21)), 21U);
   EXPECT_EQ(numbering.number_of(0, 5'000'000'001, at(22)), 22U);
 }
 
-TEST(CounterNumbering, timesAreThoseOfTheLeaderOnceItHasAny) {
+TEST(CounterNumbering, leaderTimesTakePrecedence) {
   CounterNumbering numbering(kInterval, false);
   numbering.record(5, at(5), false);
   numbering.record(6, at(6), true);

@@ -18,7 +18,7 @@ SyncFrame frame(std::uint64_t counter, std::int64_t pulse) {
   return f;
 }
 
-TEST(MasterPulses, aFrameLaterThanItsCounterSaysComesAfterAPause) {
+TEST(MasterPulses, lateFrameByCounterFollowsAPause) {
   MasterPulses master(kInterval);
   (void)master.frame(frame(0, 0));
   const MasterPulses::Report report = master.frame(frame(1, 5));
@@ -26,14 +26,14 @@ TEST(MasterPulses, aFrameLaterThanItsCounterSaysComesAfterAPause) {
   EXPECT_EQ(report.lost, 0U);
 }
 
-TEST(MasterPulses, theSameFrameOnceMoreMakesNoPulse) {
+TEST(MasterPulses, repeatedFrameMakesNoPulse) {
   MasterPulses master(kInterval);
   (void)master.frame(frame(4, 4));
   EXPECT_TRUE(master.frame(frame(4, 4)).again);
   EXPECT_EQ(master.frame(frame(5, 5)).lost, 0U);
 }
 
-TEST(MasterPulses, aCounterThatRunsBackIsAnotherBoot) {
+TEST(MasterPulses, backwardCounterIsANewBoot) {
   MasterPulses master(kInterval);
   (void)master.frame(frame(4, 4));
   const MasterPulses::Report report = master.frame(frame(2, 5));

@@ -27,7 +27,7 @@ using testing::RigSets;
 
 /// Cameras triggered by an INS at 100 Hz that sends a pulse every fourth sample. Even intervals:
 /// only a gap proves.
-TEST(RigModes, syncOutIsProvenByAGapBeforeTheDrive) {
+TEST(RigModes, syncOutIsVerifiedByAnInitialPause) {
   SyncOptions o = rig_options(SyncMode::ins_syncout);
   RigSynchronizer sync(o);
   SyncOutPulses pulses(kRigInterval);
@@ -126,7 +126,7 @@ struct MasterRig {
   bool slave_here = true, lose = false, miss = false;
 };
 
-TEST(RigModes, aMasterThatStopsAndStartsProvesItsSlaves) {
+TEST(RigModes, masterRestartVerifiesItsSlaves) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     MasterRig rig(seed);
@@ -186,7 +186,7 @@ Duration varied(std::uint64_t n) {
          Duration::milliseconds(trigger_interval_is_longer(static_cast<std::uint32_t>(n)) ? 1 : -1);
 }
 
-TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) {
+TEST(RigModes, setsShareTheMidExposureStamp) {
   SyncOptions o = rig_options(SyncMode::board);
   o.camera[0].delay = Duration::microseconds(30);
   RigSynchronizer sync(o);
@@ -220,7 +220,7 @@ TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) 
   }
 }
 
-TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
+TEST(RigModes, contradictingReportUnverifiesItsSet) {
   RigSynchronizer sync(rig_options(SyncMode::board));
   RigSets out;
   HostStamp t(80'000'000'000);
@@ -244,8 +244,9 @@ TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
   EXPECT_FALSE(sync.verified(0));
 }
 
-TEST(RigModes, nothingIsTakenFromTheHeap) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own heap";
+TEST(RigModes, synchronisationAllocatesNothing) {
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   RigSynchronizer sync(rig_options(SyncMode::board));
   ClockMapper clock{ClockMapperOptions{}};
   const std::uint64_t before = AllocationGuard::runtime_allocations();

@@ -49,7 +49,7 @@ std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f,
   return drain(sync);
 }
 
-TEST(RigSynchronizer, aLostImageIsKnownWhenTheNextOneOfThatCameraComes) {
+TEST(RigSynchronizer, nextImageShowsTheLostOne) {
   RigSynchronizer sync(options());
   EXPECT_TRUE(offer(&sync, frame(0, 0, 0)).empty());
   EXPECT_TRUE(offer(&sync, frame(0, 1, 1)).empty());
@@ -62,7 +62,7 @@ TEST(RigSynchronizer, aLostImageIsKnownWhenTheNextOneOfThatCameraComes) {
   EXPECT_EQ(sync.counters().missed, 0U);
 }
 
-TEST(RigSynchronizer, aPulseThatNobodySawIsMissedAndNotLost) {
+TEST(RigSynchronizer, pulseUnseenByAllCamerasIsMissedNotLost) {
   RigSynchronizer sync(options());
   (void)offer(&sync, frame(0, 0, 0));
   (void)offer(&sync, frame(1, 0, 0));
@@ -72,7 +72,7 @@ TEST(RigSynchronizer, aPulseThatNobodySawIsMissedAndNotLost) {
   EXPECT_EQ(sync.counters().lost[0] + sync.counters().lost[1], 0U);
 }
 
-TEST(RigSynchronizer, aSilentCameraHoldsASetNoLongerThanTheHold) {
+TEST(RigSynchronizer, silentCameraDelaysASetByAtMostTheHold) {
   RigSynchronizer sync(options());
   EXPECT_TRUE(offer(&sync, frame(0, 0, 0)).empty());
   EXPECT_TRUE(offer(&sync, frame(0, 1, 1)).empty());
@@ -81,7 +81,7 @@ TEST(RigSynchronizer, aSilentCameraHoldsASetNoLongerThanTheHold) {
   EXPECT_EQ(sets[0].number, 0U);
 }
 
-TEST(RigSynchronizer, nobodyWaitsForAnAbsentCameraAndItComesBackByTime) {
+TEST(RigSynchronizer, absentCameraIsNotAwaitedAndReturns) {
   RigSynchronizer sync(options());
   (void)offer(&sync, frame(0, 0, 0));
   (void)offer(&sync, frame(1, 0, 0));
@@ -98,7 +98,7 @@ TEST(RigSynchronizer, nobodyWaitsForAnAbsentCameraAndItComesBackByTime) {
   EXPECT_EQ(offer(&sync, frame(0, 41, 41)).size(), 1U);
 }
 
-TEST(RigSynchronizer, keepsWhatMapsKnowUnderRandomLossRepetitionAndDelay) {
+TEST(RigSynchronizer, matchesAModelUnderRandomLossAndDelay) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const std::size_t cameras = 2 + seed % 3;
@@ -166,7 +166,7 @@ TEST(RigSynchronizer, keepsWhatMapsKnowUnderRandomLossRepetitionAndDelay) {
   }
 }
 
-TEST(RigSynchronizer, nobodyWaitsForAnImageThatIsKnownToBeLost) {
+TEST(RigSynchronizer, knownLostImageIsNotAwaited) {
   RigSynchronizer sync(options());
   (void)offer(&sync, frame(1, 0, 0));
   sync.lost(0, 0);
@@ -181,7 +181,7 @@ TEST(RigSynchronizer, nobodyWaitsForAnImageThatIsKnownToBeLost) {
   EXPECT_EQ(sync.counters().lost[0], 1U);
 }
 
-TEST(RigSynchronizer, stampsThatDisagreeMakeASetUnproven) {
+TEST(RigSynchronizer, disagreeingStampsUnverifyASet) {
   RigSynchronizer sync(options());
   (void)offer(&sync, frame(0, 0, 0));
   auto sets = offer(&sync, frame(1, 0, 0));
@@ -197,7 +197,7 @@ TEST(RigSynchronizer, stampsThatDisagreeMakeASetUnproven) {
       << "the pulses began with the cameras: the counters are right or a trigger was missed";
 }
 
-TEST(RigSynchronizer, aStartThatWasFoundWronglyIsFoundAgain) {
+TEST(RigSynchronizer, wrongStartIsCorrected) {
   SyncOptions o = options();
   o.align_start = true;
   RigSynchronizer sync(o);
@@ -236,7 +236,7 @@ SyncFrame timed(int camera, std::uint64_t counter, double ms) {
   return f;
 }
 
-TEST(RigSynchronizer, withoutATriggerWhatIsNearInTimeIsPairedAndAPauseOrALostImageCostNothingElse) {
+TEST(RigSynchronizer, freeRunningImagesArePairedByTime) {
   RigSynchronizer sync(by_time());
   Random random(5);
   std::uint64_t complete = 0;

@@ -35,7 +35,7 @@ std::optional<Pulse> read(SyncOutPulses* pulses, std::int64_t sample) {
   return pulses->reading(r, {HostStamp(sample + kOffset), Duration::microseconds(9)});
 }
 
-TEST(SyncOutPulses, MarksStayWhereThePulsesAreForHours) {
+TEST(SyncOutPulses, marksMatchThePulsesForHours) {
   constexpr std::int64_t kPulse = 37'500'000;  // 400 Hz / 15: 26.66… Hz
   for (const double rate : {26.6667, 26.6666}) {
     SyncOutPulses pulses(Duration::seconds(1 / rate));
@@ -48,7 +48,7 @@ TEST(SyncOutPulses, MarksStayWhereThePulsesAreForHours) {
   }
 }
 
-TEST(SyncOutPulses, AnIntervalThatIsNoneOfTheDevicesIsTakenAsItIs) {
+TEST(SyncOutPulses, intervalOffTheDeviceGridIsKept) {
   constexpr std::int64_t kPulse = 37'600'000;  // 0.27 % beside 400 Hz / 15
   SyncOutPulses pulses(Duration::nanoseconds(kPulse));
   Account account;

@@ -22,7 +22,7 @@ OpenSet& open(OpenSets* sets, std::uint64_t number, std::int64_t time) {
   return set;
 }
 
-TEST(TimeNumbering, whatIsWithinTheToleranceOfAnOpenSetIsOfIt) {
+TEST(TimeNumbering, timeWithinToleranceJoinsTheOpenSet) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   EXPECT_EQ(numbering.number_of(0, 1000 * kMs, &sets).number, 0U);
@@ -32,7 +32,7 @@ TEST(TimeNumbering, whatIsWithinTheToleranceOfAnOpenSetIsOfIt) {
   EXPECT_EQ(numbering.number_of(0, 1148 * kMs, &sets).number, 3U);
 }
 
-TEST(TimeNumbering, whatFallsBesideSetsThatWentOutIsTooLate) {
+TEST(TimeNumbering, timeOfAClosedSetIsTooLate) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   sets.close(&open(&sets, 4, 1000 * kMs));
@@ -41,7 +41,7 @@ TEST(TimeNumbering, whatFallsBesideSetsThatWentOutIsTooLate) {
   EXPECT_EQ(numbering.number_of(0, 1050 * kMs, &sets).number, 5U);
 }
 
-TEST(TimeNumbering, aFrameOfAMissingSetBeforeTheOpenOneGetsTheNumberBetween) {
+TEST(TimeNumbering, frameOfAMissingSetGetsItsNumber) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   sets.close(&open(&sets, 4, 1000 * kMs));
@@ -49,7 +49,7 @@ TEST(TimeNumbering, aFrameOfAMissingSetBeforeTheOpenOneGetsTheNumberBetween) {
   EXPECT_EQ(numbering.number_of(0, 1100 * kMs, &sets).number, 6U);
 }
 
-TEST(TimeNumbering, theBusClockWrapsAfter128Seconds) {
+TEST(TimeNumbering, busClockWrapIsUnwrapped) {
   const TimeNumbering numbering(options(SyncMode::ieee1394_cycle_time));
   OpenSets sets;
   SyncFrame frame;
@@ -63,7 +63,7 @@ TEST(TimeNumbering, theBusClockWrapsAfter128Seconds) {
   EXPECT_EQ(numbering.time_of(frame, sets), 127'895 * kMs) << "another camera's count of wraps";
 }
 
-TEST(TimeNumbering, whatIsBeforeTheFirstSetOrBetweenOpenOnesIsOfNone) {
+TEST(TimeNumbering, timeOutsideEverySetHasNoNumber) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   open(&sets, 0, 1000 * kMs);

@@ -60,7 +60,7 @@ struct Receiving : ::testing::Test {
   BoardReceiver receiver{pause, [this](const Pulse& p) { pulses.push_back(p); }};
 };
 
-TEST_F(Receiving, nothingIsHandedOutWhileItIsBeingSetUp) {
+TEST_F(Receiving, nothingIsDeliveredDuringSetup) {
   receiver.hold();
   event(0, kPeriod);
   event(0, kPeriod, kBoot + 1);
@@ -68,7 +68,7 @@ TEST_F(Receiving, nothingIsHandedOutWhileItIsBeingSetUp) {
   EXPECT_EQ(receiver.finding(), Finding::none) << "a change of the board is none yet";
 }
 
-TEST_F(Receiving, numbersThatCannotBeEndInInvalidAfterAFewInARow) {
+TEST_F(Receiving, repeatedImpossibleNumbersAreInvalid) {
   event(5, 6 * kPeriod);
   for (int i = 1; i < BoardReceiver::kMaxRefused; ++i) event(5, 6 * kPeriod);
   EXPECT_EQ(receiver.finding(), Finding::none) << "one fewer than it takes";
@@ -77,7 +77,7 @@ TEST_F(Receiving, numbersThatCannotBeEndInInvalidAfterAFewInARow) {
   EXPECT_EQ(pulses.size(), 1U);
 }
 
-TEST_F(Receiving, afterOneWrongTickItGoesOnOnceTheBoardIsSetUpAnew) {
+TEST_F(Receiving, wrongTickRecoversAfterSetup) {
   for (std::uint32_t n = 0; n < 10; ++n) event(n, (n + 1) * kPeriod);
   event(10, 11 * kPeriod + (std::uint64_t{1} << 32U));
   for (std::uint32_t n = 11; receiver.finding() == Finding::none && n < 100; ++n)
@@ -100,7 +100,7 @@ TriggerPong pong(std::uint32_t token, std::uint64_t received, std::uint64_t sent
   return {token, 1, received, sent};
 }
 
-TEST(BoardClock, oneAnswerSaysTheTimeWithinHalfItsRoundTrip) {
+TEST(BoardClock, oneAnswerGivesTimeWithinHalfTheRoundTrip) {
   BoardClock clock;
   clock.restart(Duration::milliseconds(4), false);
   EXPECT_FALSE(clock.known());
@@ -112,7 +112,7 @@ TEST(BoardClock, oneAnswerSaysTheTimeWithinHalfItsRoundTrip) {
   EXPECT_NEAR(m.error.to_seconds(), 300e-6, 30e-6);
 }
 
-TEST(BoardClock, whatBytesTakeOnTheWireIsNoRoundTrip) {
+TEST(BoardClock, wireTimeIsNotCountedAsRoundTrip) {
   BoardClock clock;
   clock.reopen(Duration::microseconds(10));
   // A PING of 13 bytes with nothing else between.
@@ -121,7 +121,7 @@ TEST(BoardClock, whatBytesTakeOnTheWireIsNoRoundTrip) {
   EXPECT_LE(std::abs((clock.map(stamp_of_tick(1130), host(2000)).host - host(1130)).ns()), 1000);
 }
 
-TEST(BoardClock, answersThatCannotBeAreRefused) {
+TEST(BoardClock, impossibleAnswersAreRefused) {
   BoardClock clock;
   EXPECT_EQ(clock.answer(pong(77, 10, 20), host(30)), PongStatus::unasked);
   const std::uint32_t a = clock.ask(host(100));

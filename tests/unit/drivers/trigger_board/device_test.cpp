@@ -23,7 +23,7 @@ void expect_gapless(const std::vector<Pulse>& all) {
   }
 }
 
-TEST(Board, isMetSetAndRead) {
+TEST(Board, isIdentifiedConfiguredAndRead) {
   BoardRig rig(board_for(Duration::seconds(10)));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.device->info().serial, "30002b000b51333634393138");
@@ -49,7 +49,7 @@ TEST(Board, isMetSetAndRead) {
   EXPECT_EQ(s.malformed + s.overruns + s.reboots, 0U);
 }
 
-TEST(Board, isFoundAtWhicheverBaudRateItHas) {
+TEST(Board, isFoundAtAnyBaudRate) {
   for (const auto& [baud, asked] :
        {std::pair{115200U, 0U}, {460800U, 0U}, {921600U, 0U}, {57600U, 57600U}}) {
     test::BoardSimulatorOptions board = board_for(Duration::seconds(20));
@@ -91,7 +91,7 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
   }
 }
 
-TEST(Board, aPauseIsAGapWithoutLoss) {
+TEST(Board, pauseIsAGapWithoutLoss) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line());
   ASSERT_EQ(rig.device->pause(4), DeviceStatus::stopped);
   rig.start();
@@ -113,7 +113,7 @@ TEST(Board, aPauseIsAGapWithoutLoss) {
   EXPECT_EQ(rig.device->statistics().lost, 0U);
 }
 
-TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
+TEST(Board, rebootGivesANewBootAndResumes) {
   test::BoardSimulatorOptions board = board_for(Duration::seconds(40));
   for (int i = 0; i < 20; ++i)
     board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
@@ -136,7 +136,7 @@ TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
   EXPECT_EQ(rig.device->statistics().reboots, 20U);
 }
 
-TEST(Board, overStopsAndStartsNumbersGoOnAndNoReportIsLost) {
+TEST(Board, numbersContinueAcrossStopsWithoutLoss) {
   for (const std::uint8_t feedback : std::array<std::uint8_t, 2>{0, 1}) {
     BoardRig rig(board_for(Duration::seconds(200)), direct_line());
     rig.exposures = [](const test::SimulatedPulse& p) {
@@ -166,7 +166,7 @@ TEST(Board, overStopsAndStartsNumbersGoOnAndNoReportIsLost) {
   }
 }
 
-TEST(Board, oneThatRanBeforeTheProgramIsStoppedFirst) {
+TEST(Board, runningBoardIsStoppedBeforeConfiguration) {
   BoardRig rig(board_for(Duration::seconds(100)), direct_line());
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok);
   // Somebody started it and went away.
@@ -184,7 +184,7 @@ TEST(Board, oneThatRanBeforeTheProgramIsStoppedFirst) {
   EXPECT_EQ(rig.device->statistics().lost, 0U) << "those were not ours";
 }
 
-TEST(Board, oneThatStopsByItselfIsStartedAgain) {
+TEST(Board, stoppedBoardIsStartedAgain) {
   std::shared_ptr<test::BoardSimulator> simulator;
   bool done = false;
   BoardRig rig(board_for(Duration::seconds(20)), direct_line(), {},
@@ -200,7 +200,7 @@ TEST(Board, oneThatStopsByItselfIsStartedAgain) {
   EXPECT_EQ(rig.device->statistics().reboots, 0U);
 }
 
-TEST(Board, anotherOneInItsPlaceIsNotTaken) {
+TEST(Board, otherBoardOnThePortIsRefused) {
   test::SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(11)}, {at_s(20), at_s(21)}};
   BoardRig rig(board_for(Duration::seconds(60)), line, {},
@@ -218,7 +218,7 @@ TEST(Board, anotherOneInItsPlaceIsNotTaken) {
 
 // ---- what is asked
 
-TEST(Configuration, whatCannotBeIsRefusedWithTheKeyToChange) {
+TEST(Configuration, invalidValueIsRefusedWithItsKey) {
   using C = TriggerConfiguration;
   constexpr DeviceStatus kBad = DeviceStatus::bad_configuration,
                          kUnsupported = DeviceStatus::unsupported;

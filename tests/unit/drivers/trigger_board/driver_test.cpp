@@ -43,7 +43,7 @@ struct Machine {
   }
 };
 
-TEST(Driver, listsTheBoardsAndAsksNoIns) {
+TEST(Driver, listsBoardsWithoutAskingAnIns) {
   Machine m;
   m.add("/dev/ttyS0", 0, 0);
   m.add("/dev/ttyUSB0", 0x0403, 0xD388);
@@ -62,7 +62,7 @@ TEST(Driver, listsTheBoardsAndAsksNoIns) {
                                                "/dev/ttyUSB9"}));
 }
 
-TEST(Driver, opensByPortBySerialNumberOrTheOnlyOne) {
+TEST(Driver, opensByPortSerialNumberOrTheOnlyBoard) {
   Machine m;
   m.add_board("/dev/ttyACM0", 0xAA);
   Driver driver = m.driver();

@@ -50,7 +50,7 @@ struct Way {
 
 struct Hostile : ::testing::TestWithParam<Way> {};
 
-TEST_P(Hostile, costsItsFramesAndEveryNumberIsAccountedFor) {
+TEST_P(Hostile, costsItsFramesAndCountsEveryNumber) {
   const Way& way = GetParam();
   Random random(3);
   Outcome o;
@@ -119,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(
             }}),
     [](const auto& one) { return one.param.name; });
 
-TEST(InvalidInputBoard, aClockThatIsSetBackIsFoundOutAndTheDriveGoesOn) {
+TEST(InvalidInputBoard, clockSetBackIsFoundAndPulsesContinue) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line(), {}, [](HostStamp at, Bytes* bytes) {
     if (at > at_s(15)) set_back(bytes, 10'000'000);
   });
@@ -130,7 +130,7 @@ TEST(InvalidInputBoard, aClockThatIsSetBackIsFoundOutAndTheDriveGoesOn) {
   EXPECT_LE(rig.device->statistics().lost, 2U) << "until three pings have told, 30 ms";
 }
 
-TEST(InvalidInputBoard, ofOneThatDoesNotPingTheArrivalsTellTheTime) {
+TEST(InvalidInputBoard, withoutPongsArrivalsGiveTheTime) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line(), {}, [](HostStamp, Bytes* bytes) {
     if (opened(*bytes).type == trigger_pong) bytes->clear();
   });
@@ -138,7 +138,7 @@ TEST(InvalidInputBoard, ofOneThatDoesNotPingTheArrivalsTellTheTime) {
   EXPECT_EQ(rig.disconnects, 0);
 }
 
-TEST(InvalidInputBoard, whatIsAskedAndLostOnTheWayIsAskedAgain) {
+TEST(InvalidInputBoard, lostRequestsAreRepeated) {
   Random random(17);
   BoardRig rig(board_for(Duration::seconds(30)), direct_line());
   int pauses = 0;
@@ -183,7 +183,7 @@ struct Stranger {
 };
 struct Strangers : ::testing::TestWithParam<Stranger> {};
 
-TEST_P(Strangers, areNamed) {
+TEST_P(Strangers, otherDevicesAreNamed) {
   const Stranger& s = GetParam();
   const auto there = std::make_shared<Talker>(
       s.mentions, 921600,
@@ -221,7 +221,7 @@ INSTANTIATE_TEST_SUITE_P(
                  TriggerFrame{trigger_info, 0, 5, {1, 2, 3, 4, 5}}}),
     [](const auto& one) { return one.param.name; });
 
-TEST(AStubbornBoard, thatAnswersAndDoesNothingIsNamed) {
+TEST(AStubbornBoard, boardIgnoringRequestsIsNamed) {
   // STATUS for everything, always stopped and never configured.
   const auto there =
       std::make_shared<Talker>("", 921600, answering([](const TriggerFrame& f) {

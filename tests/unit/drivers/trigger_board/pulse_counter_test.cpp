@@ -31,7 +31,7 @@ struct Accounted : ::testing::Test {
   Pulse pulse{};
 };
 
-TEST_F(Accounted, aPauseWhoseFirstReportIsLostIsStillAPause) {
+TEST_F(Accounted, pauseWithLostFirstReportIsRecognised) {
   account.expect_pause(4);
   ASSERT_TRUE(take(1));
   ASSERT_TRUE(take(7));
@@ -39,7 +39,7 @@ TEST_F(Accounted, aPauseWhoseFirstReportIsLostIsStillAPause) {
   EXPECT_EQ(account.counters().lost, 1U);
 }
 
-TEST_F(Accounted, losesBeforeAPauseAreNotTakenForIt) {
+TEST_F(Accounted, lossesBeforeAPauseAreCounted) {
   account.expect_pause(4);
   ASSERT_TRUE(take(3));
   EXPECT_FALSE(pulse.resumed);
@@ -48,12 +48,12 @@ TEST_F(Accounted, losesBeforeAPauseAreNotTakenForIt) {
   EXPECT_EQ(account.counters().lost, 2U);
 }
 
-TEST_F(Accounted, whatTheBoardLeftOutByItselfIsNotLost) {
+TEST_F(Accounted, numbersSkippedByTheBoardAreNotLost) {
   ASSERT_TRUE(take(4, 2));
   EXPECT_EQ(account.counters().lost, 0U);
 }
 
-TEST_F(Accounted, theEndTellsOfReportsThatNeverCame) {
+TEST_F(Accounted, missingReportsAreCountedAtTheEnd) {
   ASSERT_TRUE(take(1));
   account.end(2, 0);
   EXPECT_EQ(account.counters().lost, 0U);
@@ -63,7 +63,7 @@ TEST_F(Accounted, theEndTellsOfReportsThatNeverCame) {
   EXPECT_EQ(account.counters().lost, 3U);
 }
 
-TEST_F(Accounted, repeatedOldAndBackwardEventsAreRefused) {
+TEST_F(Accounted, repeatedAndOlderEventsAreRefused) {
   ASSERT_TRUE(take(1));
   EXPECT_FALSE(take(1));
   EXPECT_FALSE(take(0));
@@ -78,7 +78,7 @@ TEST_F(Accounted, repeatedOldAndBackwardEventsAreRefused) {
   EXPECT_EQ(account.counters().lost, 0U);
 }
 
-TEST(PulseCounter, numbersGoOnOverThirtyTwoBits) {
+TEST(PulseCounter, numbersContinueBeyond32Bits) {
   PulseCounter account;
   account.set_intervals(30'000, 0);
   account.begin(7, 0xFFFFFFFEU);
@@ -93,7 +93,7 @@ TEST(PulseCounter, numbersGoOnOverThirtyTwoBits) {
   EXPECT_EQ(account.counters().lost, 2U);
 }
 
-TEST_F(Accounted, exposuresThatCannotBeAreRefusedAndCounted) {
+TEST_F(Accounted, impossibleExposuresAreRefusedAndCounted) {
   TriggerEvent e = event(1, 2 * kPeriod);
   e.exposure[0] = {120, 8120};
   e.exposure[1] = {-5, 100};

@@ -35,7 +35,7 @@ struct TerminalRig {
   Device device{std::make_unique<SerialPort>(board.port()), options()};
 };
 
-TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
+TEST(RealTime, concurrentCallsAreSafe) {
   TerminalRig rig;
   for (int round = 0; round < 2; ++round) {
     ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
@@ -70,9 +70,9 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
   }
 }
 
-TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
+TEST(RealTime, deviceThreadAllocatesNothingWhileReading) {
   if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+    GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   TerminalRig rig;
   ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
   Pulse p;

@@ -22,7 +22,7 @@ class Stamps : public ::testing::TestWithParam<Case> {};
 
 /// |mapped − true| of the edges later than ten seconds after the first, over seeds whose crystals
 /// are off by ±50 ppm.
-TEST_P(Stamps, areRightAndNeverBeyondTheirBound) {
+TEST_P(Stamps, errorsStayWithinTheirBound) {
   const Case& c = GetParam();
   std::vector<double> us;
   double squares = 0;

@@ -31,7 +31,7 @@ TEST(V4l2Controls, namesBecomeKeys) {
   EXPECT_EQ(key_of("µ"), "");
 }
 
-TEST(V4l2Controls, aValueIsANumberInRangeOrAMenuItem) {
+TEST(V4l2Controls, valueIsANumberInRangeOrAMenuItem) {
   std::int64_t value = -1;
   const Control c = menu({{0, "manual_mode"}, {3, "aperture_priority_mode"}});
   EXPECT_TRUE(value_of(c, "Aperture Priority Mode", &value));
@@ -57,7 +57,7 @@ TEST(V4l2Controls, clampedValuesLieOnTheGrid) {
   EXPECT_EQ(clamped(integer(5, 1, 1), 3), 5) << "a driver whose range is empty";
 }
 
-TEST(V4l2Controls, anExternalTriggerIsFoundByItsMenusWords) {
+TEST(V4l2Controls, externalTriggerIsFoundByMenuNames) {
   EXPECT_EQ(trigger_on(menu({{0, "off"}, {1, "software"}, {2, "external_edge"}})), 2);
   EXPECT_EQ(trigger_on(menu({{0, "free_running"}, {1, "hardware"}})), 1);
   EXPECT_EQ(trigger_on(menu({{0, "off"}, {1, "on"}})), 1);

@@ -18,7 +18,7 @@ const PixelFormat& format(std::uint32_t fourcc) {
   return *f;
 }
 
-TEST(V4l2Formats, withoutAWishTheCheapestIsTaken) {
+TEST(V4l2Formats, cheapestFormatIsTheDefault) {
   const std::uint32_t offered[] = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_Y16,
                                    V4L2_PIX_FMT_GREY};
   EXPECT_EQ(choose_format(offered, "")->fourcc, V4L2_PIX_FMT_GREY);
@@ -28,7 +28,7 @@ TEST(V4l2Formats, withoutAWishTheCheapestIsTaken) {
   EXPECT_EQ(choose_format(bridge, "")->fourcc, V4L2_PIX_FMT_NV12) << "its luma plane needs no copy";
 }
 
-TEST(V4l2Formats, aWishIsTakenByItsFourCharacters) {
+TEST(V4l2Formats, formatIsChosenByItsFourCharacters) {
   const std::uint32_t offered[] = {V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_Y10, V4L2_PIX_FMT_YUYV};
   EXPECT_EQ(choose_format(offered, "YUYV")->fourcc, V4L2_PIX_FMT_YUYV);
   EXPECT_EQ(choose_format(offered, "Y10")->fourcc, V4L2_PIX_FMT_Y10)
@@ -38,7 +38,7 @@ TEST(V4l2Formats, aWishIsTakenByItsFourCharacters) {
   EXPECT_EQ(choose_format({}, ""), nullptr);
 }
 
-TEST(V4l2Formats, aFrameNeedsNoPaddingAfterItsLastRow) {
+TEST(V4l2Formats, lastRowNeedsNoPadding) {
   const PixelFormat& grey = format(V4L2_PIX_FMT_GREY);
   EXPECT_EQ(min_frame_bytes(grey, 640, 480, 640), 640U * 480);
   EXPECT_EQ(min_frame_bytes(grey, 630, 480, 640), 640U * 479 + 630);
@@ -96,7 +96,7 @@ Laid lay(std::uint32_t fourcc, int width, int height, std::size_t stride, Random
   return laid;
 }
 
-TEST_P(V4l2Luma, isWhatWasLaidIn) {
+TEST_P(V4l2Luma, equalsTheWrittenLuma) {
   Random random(GetParam());
   const PixelFormat& f = format(GetParam());
   for (const int width : {1, 3, 4, 7, 64, 97, 640}) {
@@ -124,7 +124,7 @@ INSTANTIATE_TEST_SUITE_P(, V4l2Luma,
                                            V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_VYUY),
                          [](const auto& p) { return name_of(p.param); });
 
-TEST(V4l2Formats, wordsDeeperThanToldSaturate) {
+TEST(V4l2Formats, wordsBeyondTheirDepthSaturate) {
   const PixelFormat shifted{V4L2_PIX_FMT_Y16, Layout::words,
                             2};  // a sensor of ten bits that lays them low into Y16
   const std::uint8_t words[] = {0xFF, 0x03, 0x00, 0x04, 0x08, 0x00};

@@ -41,13 +41,13 @@ struct Exchange : ::testing::Test {
   Frame frame{};
 };
 
-TEST_F(Exchange, theKernelKeepsItsReserve) {
+TEST_F(Exchange, kernelKeepsItsReserve) {
   EXPECT_FALSE(exchange.hold_buffer(0, 0, kBufferReserve - 1));
   EXPECT_EQ(exchange.statistics().underruns, 1U);
   EXPECT_TRUE(exchange.hold_buffer(0, 0, kBufferReserve));
 }
 
-TEST_F(Exchange, aStopFreesWhatNobodyTookButNotWhatSomebodyHolds) {
+TEST_F(Exchange, stopFreesUntakenButNotHeldBuffers) {
   ASSERT_TRUE(offer(1, 5));
   ASSERT_TRUE(offer(3, 6));
   ASSERT_EQ(exchange.wait({}, &frame), DeviceStatus::ok);
@@ -60,7 +60,7 @@ TEST_F(Exchange, aStopFreesWhatNobodyTookButNotWhatSomebodyHolds) {
   for (const std::uint32_t buffer : free.list()) EXPECT_NE(buffer, 1U);
 }
 
-TEST_F(Exchange, aLossAfterTheStopIsNone) {
+TEST_F(Exchange, lossAfterStopIsIgnored) {
   exchange.record_dead_node();
   exchange.end();
   exchange.lose(HostStamp(42));
@@ -68,7 +68,7 @@ TEST_F(Exchange, aLossAfterTheStopIsNone) {
   EXPECT_TRUE(exchange.drain()) << "the owner opens the node anew";
 }
 
-TEST(V4l2Slots, anImageMayBeginBehindAHeader) {
+TEST(V4l2Slots, imageMayFollowAHeader) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
   slots.install(memory(4, 10));
@@ -76,7 +76,7 @@ TEST(V4l2Slots, anImageMayBeginBehindAHeader) {
   EXPECT_EQ(slots.view(slot).data, slots.buffer(0).data() + 128);
 }
 
-TEST(V4l2Slots, whatIsHeldOutlivesTheCamera) {
+TEST(V4l2Slots, heldImageOutlivesTheCamera) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
   slots.install(memory(4, 10));
@@ -107,7 +107,7 @@ TEST(V4l2Slots, imagesOfAnotherLayoutDoNotFit) {
   EXPECT_FALSE(slots.fit(true, 64));
 }
 
-TEST(V4l2Slots, moreBuffersThanSlotsAreNotUsed) {
+TEST(V4l2Slots, buffersBeyondTheSlotsAreNotUsed) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
   std::vector<FrameSlot> held;

@@ -5,7 +5,7 @@
 namespace vergence::v4l2 {
 namespace {
 
-TEST(V4l2Settings, aCameraWithoutAnExposureInUnitsCannotBeAskedForAnother) {
+TEST(V4l2Settings, exposureWithoutUnitsCannotBeChanged) {
   ExposureSetting actual{Duration::milliseconds(3), 1};
   EXPECT_EQ(change_exposure(Controls{}, Settings{}, {Duration::milliseconds(2), 0}, &actual),
             DeviceStatus::unsupported);

@@ -12,7 +12,7 @@ constexpr std::uint32_t kMonotonic = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
 constexpr Duration kExposure = Duration::milliseconds(8), kReadout = Duration::milliseconds(12);
 constexpr HostStamp kArrival{5'000'000'000};
 
-TEST(V4l2Stamps, theKindIsInTheFlags) {
+TEST(V4l2Stamps, flagsGiveTheKind) {
   EXPECT_EQ(stamp_kind(kMonotonic | V4L2_BUF_FLAG_TSTAMP_SRC_SOE, 1), StampKind::exposure_start);
   EXPECT_EQ(stamp_kind(kMonotonic | V4L2_BUF_FLAG_TSTAMP_SRC_EOF, 1), StampKind::frame_end);
   EXPECT_EQ(stamp_kind(kMonotonic | V4L2_BUF_FLAG_ERROR | V4L2_BUF_FLAG_KEYFRAME, 1),
@@ -24,7 +24,7 @@ TEST(V4l2Stamps, theKindIsInTheFlags) {
   EXPECT_EQ(stamp_kind(kMonotonic, 0), StampKind::none) << "a zero is no stamp";
 }
 
-TEST(V4l2Stamps, exposureStartIsReckonedBackFromWhatTheStampIsOf) {
+TEST(V4l2Stamps, exposureStartIsComputedByKindOfStamp) {
   const std::int64_t stamp = 4'900'000'000;
   EXPECT_EQ(exposure_start(StampKind::exposure_start, stamp, kArrival, kExposure, kReadout),
             DeviceStamp(stamp));
@@ -34,7 +34,7 @@ TEST(V4l2Stamps, exposureStartIsReckonedBackFromWhatTheStampIsOf) {
             DeviceStamp(kArrival.ns() - 20'000'000));
 }
 
-TEST(V4l2Sequence, countsFromZeroAndTellsGaps) {
+TEST(V4l2Sequence, countsFromZeroAndReportsGaps) {
   struct Row {
     std::uint32_t sequence;
     int ms;  // of the stamp, where the buffers have no numbers
@@ -56,7 +56,7 @@ TEST(V4l2Sequence, countsFromZeroAndTellsGaps) {
   expect(Duration::milliseconds(40), {{0, 0, 0, 0}, {0, 43, 1, 0}, {0, 157, 4, 2}, {0, 158, 5, 0}});
 }
 
-TEST(V4l2Raster, keepsTheFirstFrameOfEveryIntervalOfTheClock) {
+TEST(V4l2Raster, keepsTheFirstFrameOfEachInterval) {
   const Duration interval = Duration::milliseconds(100),
                  frame = Duration::nanoseconds(16'683'333);  // 59.94 Hz
   // Two cameras at one rate, started at different times: what they keep lies within one frame of
@@ -83,7 +83,7 @@ TEST(V4l2Raster, keepsTheFirstFrameOfEveryIntervalOfTheClock) {
   }
 }
 
-TEST(V4l2Raster, anIntervalWithoutAFrameIsMissing) {
+TEST(V4l2Raster, intervalWithoutAFrameIsMissing) {
   Raster raster(Duration::milliseconds(100));
   SequenceCounter::Step step;
   EXPECT_TRUE(raster.keep(DeviceStamp(1'050'000'000), &step));

@@ -15,7 +15,7 @@ namespace {
 
 using xbus::LocalFrame;
 
-TEST(Frames, anSensorLookingEastIsTheSameInEveryFrame) {
+TEST(Frames, eastHeadingIsTheSameInEveryFrame) {
   // Forward is east: in ENU the identity, in NWU a quarter turn to the right, in NED a quarter turn
   // and upside down.
   const double h = std::sqrt(0.5);
@@ -31,7 +31,7 @@ TEST(Frames, anSensorLookingEastIsTheSameInEveryFrame) {
   EXPECT_EQ(enu_vector({1, 2, 3}, LocalFrame::ned), (xbus::Three{2, 1, -3})) << "north, east, down";
 }
 
-TEST(Frames, attitudeTurnsVectorsAsVelocityDoes) {
+TEST(Frames, attitudeRotatesVectorsLikeVelocity) {
   // v_enu by the attitude in ENU of a body vector must be the frame's change of v by the attitude
   // in that frame.
   Random random(3);
@@ -50,12 +50,12 @@ TEST(Frames, attitudeTurnsVectorsAsVelocityDoes) {
   }
 }
 
-TEST(Frames, whatIsNoRotationIsNoAttitude) {
+TEST(Frames, invalidRotationGivesNoAttitude) {
   EXPECT_FALSE(enu_attitude({0, 0, 0, 0}, LocalFrame::enu));
   EXPECT_FALSE(enu_attitude({NAN, 0, 0, 1}, LocalFrame::enu));
 }
 
-TEST(SampleTime, survivesEveryWrapAndTellsARestart) {
+TEST(SampleTime, continuesAcrossWrapsAndReportsARestart) {
   SampleTime day;
   EXPECT_EQ(day.next(863'999'900, {}), ClockStep::first);
   EXPECT_EQ(day.next(0, {}), ClockStep::forward);
@@ -95,7 +95,7 @@ TEST(SampleTime, tenYearsStayExact) {
   }
 }
 
-TEST(SampleCounter, wrapsAndBridgesGapsByTheTimeBetween) {
+TEST(SampleCounter, gapsAndWrapsAreResolvedByTime) {
   SampleCounter c;
   EXPECT_EQ(c.next(65'535, 0), ClockStep::first);
   EXPECT_EQ(c.next(0, 1), ClockStep::forward);
@@ -113,7 +113,7 @@ TEST(SampleCounter, wrapsAndBridgesGapsByTheTimeBetween) {
 
 /// Messages of one period behind one another on a line without a converter: each read ends with a
 /// message.
-TEST(ArrivalTiming, lastBytesGiveTheLineUnderAllArrivals) {
+TEST(ArrivalTiming, arrivalsGiveTheirLowerBoundAndDrift) {
   constexpr std::uint32_t kBaud = 115200;
   constexpr Duration kProcessing = Duration::milliseconds(2);
   ArrivalTiming timing(kBaud, kProcessing);
@@ -138,7 +138,7 @@ TEST(ArrivalTiming, lastBytesGiveTheLineUnderAllArrivals) {
   EXPECT_NEAR(timing.drift(), 40e-6, 2e-6);
 }
 
-TEST(ArrivalTiming, aReadThatEndsInsideAMessageWaitsForIt) {
+TEST(ArrivalTiming, readEndingInsideAMessageWaitsForIt) {
   ArrivalTiming timing(115200, {});
   timing.read(50, HostStamp(1'000'000'000));
   timing.read(80, HostStamp(1'002'700'000));
@@ -190,7 +190,7 @@ TEST(Decoder, capturesGiveReadingsInStepWithTheirClock) {
   }
 }
 
-TEST(Decoder, anMtdataOfAnotherLengthIsRefused) {
+TEST(Decoder, mtdataOfAnotherLengthIsRefused) {
   Decoder decoder;
   StreamSettings settings;
   settings.generation = xbus::Generation::legacy;

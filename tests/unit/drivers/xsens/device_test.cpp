@@ -24,7 +24,7 @@ class BothGenerations : public ::testing::TestWithParam<Generation> {
   [[nodiscard]] static bool legacy() { return GetParam() == Generation::legacy; }
 };
 
-TEST_P(BothGenerations, isFoundSetAndReadInEastNorthUp) {
+TEST_P(BothGenerations, isFoundConfiguredAndReadInEnu) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 8);
   XsensRig rig(sensor);
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
@@ -87,7 +87,7 @@ std::pair<std::int64_t, std::int64_t> gap_in(const Times& times, const OfTime& n
 
 // Cameras that SyncOut triggers are paired by a gap: every pulse on either side of it has to have
 // its reading, also behind a converter that keeps bytes for 16 ms.
-TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
+TEST(XsensDevice, pauseLosesNoReadingAndIsMarked) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 30);
   Options options;
   options.sync_out_hz = 25;
@@ -113,7 +113,7 @@ TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
   EXPECT_EQ(rig.disconnects, 0);
 }
 
-TEST(XsensDevice, aStopEndsThePulsesWhereSyncOutIsInUse) {
+TEST(XsensDevice, stopEndsSyncOutPulses) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4);
   Options options;
   options.sync_out_hz = 25;
@@ -124,7 +124,7 @@ TEST(XsensDevice, aStopEndsThePulsesWhereSyncOutIsInUse) {
   EXPECT_FALSE(rig.simulator->measuring());
 }
 
-TEST_P(BothGenerations, whatIsSetAlreadyIsNotWrittenAgain) {
+TEST_P(BothGenerations, unchangedSettingsAreNotWrittenAgain) {
   test::XsensSimulatorOptions sensor = simulated(GetParam());
   XsensRig rig(sensor);
   Options options;
@@ -173,7 +173,7 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
   }
 }
 
-TEST_P(BothGenerations, isFoundAtAnotherBaudRateAndBroughtToTheOneAskedFor) {
+TEST_P(BothGenerations, otherBaudRateIsFoundAndChanged) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 30);
   sensor.baud = 57600;
   sensor.layout = {0x0004, 0x001};  // what that rate carries
@@ -187,7 +187,7 @@ TEST_P(BothGenerations, isFoundAtAnotherBaudRateAndBroughtToTheOneAskedFor) {
   EXPECT_EQ(rig.readings(50).size(), 50U);
 }
 
-TEST_P(BothGenerations, aLineTooSlowIsRefusedWithWhatWouldDo) {
+TEST_P(BothGenerations, slowLineIsRefusedNamingTheNeededRate) {
   XsensRig rig(simulated(GetParam()));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok);
   EXPECT_EQ(rig.device->configure(400, nullptr), DeviceStatus::no_bandwidth);
@@ -203,7 +203,7 @@ TEST_P(BothGenerations, aLineTooSlowIsRefusedWithWhatWouldDo) {
       << "and it can still be set otherwise";
 }
 
-TEST_P(BothGenerations, oneThatLostItsSettingsIsSetAgain) {
+TEST_P(BothGenerations, lostSettingsAreWrittenAgain) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
   XsensRig rig(sensor);
   // From 9 s on its messages hold nothing that was asked for, until it is told to stop measuring.
@@ -253,7 +253,7 @@ struct Timing {
 
 class Stamps : public ::testing::TestWithParam<Timing> {};
 
-TEST_P(BothGenerations, oneThatFellSilentIsToldToMeasureAgain) {
+TEST_P(BothGenerations, silentSensorIsToldToMeasureAgain) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
   sensor.silences = {HostStamp(9'000'000'000)};
   XsensRig rig(sensor);
@@ -261,7 +261,7 @@ TEST_P(BothGenerations, oneThatFellSilentIsToldToMeasureAgain) {
   EXPECT_EQ(rig.disconnects, 1);
 }
 
-TEST_P(Stamps, areRightWithinThreeTenthsOfAMillisecondAfterTwentySeconds) {
+TEST_P(Stamps, errorIsBelow300usAfterTwentySeconds) {
   const Timing& t = GetParam();
   std::vector<double> errors;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
@@ -304,7 +304,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 // ---- what is special to one of them, and what is none
 
-TEST(Mark4, atOneHertzALostSampleIsNoSilence) {
+TEST(Mark4, lostSampleAtOneHertzIsNoSilence) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 40);
   XsensRig rig(sensor);
   rig.between->tamper([n = 0](HostStamp at, std::vector<std::uint8_t>* bytes) mutable {
@@ -316,7 +316,7 @@ TEST(Mark4, atOneHertzALostSampleIsNoSilence) {
   EXPECT_EQ(rig.disconnects, 0);
 }
 
-TEST(Mark4, positionsThatAreMissingNowAndThenMakeNoHoleInTheFix) {
+TEST(Mark4, occasionalMissingPositionKeepsTheFix) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   sensor.missing_position = 0.2;
   XsensRig rig(sensor);
@@ -326,7 +326,7 @@ TEST(Mark4, positionsThatAreMissingNowAndThenMakeNoHoleInTheFix) {
   EXPECT_LT(all.size(), 1700U);
 }
 
-TEST(Mark4, aDriveWithoutAFixIsToldAndGoesOn) {
+TEST(Mark4, missingFixIsReportedAndReadingContinues) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   XsensRig rig(sensor, {}, {}, [](std::uint64_t n, Duration t) {
     InsSample s = easy_drive(n, t);

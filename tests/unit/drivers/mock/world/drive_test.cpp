@@ -23,7 +23,7 @@ Drive make(DriveKind kind) {
   return Drive(options, bare_world());
 }
 
-TEST(Drive, derivativesAreThoseOfTheFunction) {
+TEST(Drive, derivativesMatchCentralDifferences) {
   // Central differences over ±h miss a derivative by h²/6 of the one two orders higher: a 12 Hz
   // shake of 0.02° or 0.6 mm has a third derivative of 150 rad/s³ and 260 m/s³, with h = 0.1 ms
   // below 1e-6. Rounding: 1e-16 · 300 m / h = 3e-10.
@@ -42,7 +42,7 @@ TEST(Drive, derivativesAreThoseOfTheFunction) {
   }
 }
 
-TEST(Drive, staysWithinTheDriversLimits) {
+TEST(Drive, speedAndAccelerationStayWithinLimits) {
   DriveOptions options;
   options.vibration = 0;
   options.suspension = 0;
@@ -64,7 +64,7 @@ TEST(Drive, staysWithinTheDriversLimits) {
   EXPECT_NEAR(steepest * 180 / std::numbers::pi, WorldOptions{}.hill_deg, 0.1);
 }
 
-TEST(Drive, vehicleStandsOnTheGroundAndLooksWhereItGoes) {
+TEST(Drive, vehicleFollowsGroundAndHeading) {
   DriveOptions options;
   options.suspension = 0;
   options.vibration = 0;

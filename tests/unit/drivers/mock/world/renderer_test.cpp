@@ -104,7 +104,7 @@ Vec2 seen_in_row(const Camera& camera, const Transform& T_camera_enu, int row, d
   return pixel;
 }
 
-TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
+TEST(Renderer, edgesLieWhereTheLensModelPutsThem) {
   for (const bool distorted : {false, true}) {
     Plates scene;
     scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
@@ -149,7 +149,7 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   }
 }
 
-TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
+TEST(Renderer, noiseHasTheStatedVarianceAndSeed) {
   Plates scene;
   scene.plate(-100, 100, -100, 100, 6.0, 1);
   Renderer renderer(scene.world(), Camera(lens(false)));
@@ -178,7 +178,7 @@ TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
   EXPECT_NEAR(mean, 0.8 * 255, 0.1);
 }
 
-TEST(Renderer, everyTargetDrawsTheSamePicture) {
+TEST(Renderer, everySimdTargetDrawsTheSameImage) {
   Plates scene;
   scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
   const auto town = std::make_shared<const World>(WorldOptions{.seed = 5, .texture_detail = 0});
@@ -209,7 +209,7 @@ TEST(Renderer, everyTargetDrawsTheSamePicture) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-TEST(Renderer, oddSizesAndStridesStayInsideTheirRows) {
+TEST(Renderer, oddSizesStayInsideTheirRows) {
   Plates scene;
   Intrinsics k = lens(true);
   k.width = 53;
