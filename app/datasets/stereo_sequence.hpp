@@ -11,7 +11,6 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
-#include "app/datasets/image_store.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
@@ -32,6 +31,9 @@ enum class SequenceFormat : std::uint8_t {
 };
 
 struct RecordedIns;  // recorded_ins.hpp
+namespace detail {
+class BagImages;
+}
 
 /// One frame as the data set lists it.
 struct StereoPair {
@@ -54,28 +56,20 @@ struct StereoSequence {
   std::filesystem::path root;
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
-  /// Name of the file, for calibrations.csv.
-  std::string calibration_source;
-  /// File of the stamps, for messages.
-  std::filesystem::path times;
-  /// Frames that are not in `pairs`: without stamp, without partner or out of order.
-  std::size_t left_out = 0;
-  /// Messages about skipped or suspicious data.
-  std::vector<std::string> remarks{};
-  /// Assumed values where the files lack data, a phrase each.
-  std::vector<std::string> assumptions{};
-  /// A file holds both images, with the columns of the left one first; file[0] and file[1] are
-  /// equal.
-  bool side_by_side = false;
-  /// Store of the images; null: they are files below root.
-  std::shared_ptr<const ImageStore> store{};
-  /// INS that comes with the images; null: it has its own files (read_recorded_ins()), or there is
-  /// none.
-  std::shared_ptr<const RecordedIns> ins{};
-  /// Effective bits of images with 16 bits per sample (find_deep_bits()).
-  int deep_bits = 16;
-  /// Images are raw mosaics, which are converted to grey (core/types/bayer.hpp).
-  bool bayer = false;
+  std::string calibration_source;  // the file's name, for calibrations.csv
+  std::filesystem::path times;     // the file that the stamps are from, for messages about them
+  std::size_t left_out = 0;  // frames that are none of `pairs`: no stamp, no partner, out of order
+  std::vector<std::string> remarks{};  // what was left out or is doubtful: a message each
+  std::vector<std::string>
+      assumptions{};          // facts the files leave out, and the values assumed: one phrase each
+  bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
+                              // file[1] are the same
+  std::shared_ptr<const detail::BagImages>
+      store{};                               // of a bag; nothing: images are files below root
+  std::shared_ptr<const RecordedIns> ins{};  // that came with the images; nothing: it has files of
+                                             // its own (read_recorded_ins()), or there is none
+  int deep_bits = 16;  // of images of 16 bits a sample: so many are used (find_deep_bits())
+  bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
 /// A calibration that is used instead of the data set's own: where it is from, and how to have it,
@@ -113,8 +107,15 @@ struct BagTopics {
 /// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
-/// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data
-/// set's own.
+/// What of a drive is opened, and with which calibration.
+struct SequenceOptions {
+  std::optional<GivenCalibration> calibration{};  // nothing: the data set's own
+  CalibrationUse use{};              // what of the calibration is wanted, whichever it is
+  std::array<int, 2> cameras{0, 1};  // left and right of a data set with more than two (kitti_raw)
+  BagTopics topics{};                // of a bag
+};
+
+/// A drive of the given format.
 ///
 /// kitti     calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N
 ///           belongs to line N of times.txt.
@@ -136,29 +137,18 @@ struct BagTopics {
 /// (docs/datasets.md); rosbag    paired by the nearest header.stamp, that of the left camera
 /// counts; CameraInfo beside
 ///           the images, and the INS.
-/// session   A session's folder with drive.mcap (docs/session_files.md); the pairs that have both
-///           images, and the INS.
+/// session   Refused: SessionSource replays it as it was recorded.
 ///
-/// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
-/// set that has more than two (kitti_raw).
-/// `topics`: of a bag. InputError (file, line, what): folders or files that are not there, no
-/// images, numbers of images and times that do not go together, times that are no numbers, times in
-/// another unit or running backwards (check_times()), a calibration that makes no rig, images of
-/// another size than the calibration.
+/// InputError (file, line, what): folders or files that are not there, no images, numbers of images
+/// and times that do not go together, times that are no numbers, times in another unit or running
+/// backwards (check_times()), a calibration that makes no rig, images of another size than the
+/// calibration.
 ///
 ///     const StereoSequence drive = open_sequence(SequenceFormat::euroc, "MH_01_easy");
 ///     for (const StereoPair& pair : drive.pairs) use(drive.root / pair.file[0], pair.stamp);
-[[nodiscard]] StereoSequence open_sequence(
-    SequenceFormat format, const std::filesystem::path& folder,
-    const std::optional<std::filesystem::path>& calibration = std::nullopt,
-    const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1},
-    const BagTopics& topics = {});
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format,
                                            const std::filesystem::path& folder,
-                                           const GivenCalibration& calibration,
-                                           const CalibrationUse& use,
-                                           const std::array<int, 2>& cameras = {0, 1},
-                                           const BagTopics& topics = {});
+                                           const SequenceOptions& options = {});
 
 /// Size of an image of the sequence, from its head. → as read_image_size()
 [[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

@@ -68,15 +68,11 @@ struct SourceIns {
 struct SourceFacts {
   StartingCalibration begin{};
   Adoption adoption = Adoption::after_fixed_frames;
-  Recorder::WhenFull when_full = Recorder::WhenFull::wait;
-  /// Recorder::Options::disk_full.
-  std::function<bool(Stamp)> disk_full{};
-  /// Number of frames of the drive; 0 if unknown.
-  std::uint64_t frames = 0;
-  /// First stamp of the drive.
-  Stamp first{};
-  /// Relation of the stamps to this machine's clock, in real time.
-  std::optional<ClockTie> tie{};
+  WhenFull when_full = WhenFull::wait;     // the session's files fall behind
+  std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
+  std::uint64_t frames = 0;                // of the whole drive; 0 if unknown
+  Stamp first{};                           // of the drive
+  std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
   std::optional<SourceIns> ins{};
   /// Ground truth of a recording, the reference for an estimate without INS.
   Trajectory truth{};

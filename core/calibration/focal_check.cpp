@@ -39,6 +39,7 @@ void FocalCheck::measure(RigSolver& solver, RigSolveRequest request,
   if (!measures_ || solved.status != RigSolveStatus::ok || request.given == nullptr) return;
   request.measure_focal_lengths = true;
   request.rig.T_camera_left = solved.rig.T_camera_left;
+  request.rig.intrinsics = solved.rig.intrinsics;
   request.from_rig = true;
   request.known = nullptr;
   const RigSolution found = solver.solve(request);

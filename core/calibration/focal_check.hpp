@@ -23,9 +23,13 @@ class FocalCheck {
   /// `enabled`: as the options say.
   explicit FocalCheck(bool enabled) noexcept : enabled_(enabled) {}
 
-  /// Before a solve: whether it measures. A lens keeps its focal length: once a full window
-  /// has measured it as it was given, it is not measured again.
-  void begin_solve() noexcept { measures_ = enabled_ && !known_; }
+  /// Call before a solve of `frames` frames; `full`: no solve has more of them. It measures if it
+  /// is full or has twice the frames of the last measurement, until a full one has measured the
+  /// focal length as it was given: a lens keeps it.
+  void begin_solve(std::size_t frames, bool full) noexcept {
+    measures_ = enabled_ && !known_ && (full || frames >= 2 * measured_frames_);
+    if (measures_) measured_frames_ = frames;
+  }
   /// After `solved`, the solve of the solver's log that `request` asked for;
   /// begins with its result. Frames before the log's do not go in: what they say of the rig was
   /// said with the focal length believed.
@@ -40,6 +44,7 @@ class FocalCheck {
  private:
   bool enabled_, measures_ = false;
   bool known_ = false;  // by a full window, and as it was given
+  std::size_t measured_frames_ = 0;
   FocalMeasurement newest_{}, solved_{};
   double solve_ms_ = 0;
 };

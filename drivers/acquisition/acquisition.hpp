@@ -93,14 +93,12 @@ class Acquisition final : private Notifier {
   struct Options {
     SyncOptions sync{};
     bool wait_when_full = false;
-    /// Stamp that corresponds to tie_host.
-    Stamp tie_stamp{};
-    /// Time of the host's clock at tie_stamp.
-    HostStamp tie_host{};
-    /// Stamps are rounded to whole multiples of it; > 0.
-    Duration stamp_grid = Duration::nanoseconds(1);
-    /// Set by start(); null: pulses are not recorded.
-    PulseObserver* pulse_observer = nullptr;
+    Stamp tie_stamp{};     // this stamp …
+    HostStamp tie_host{};  // … was this time of the host's clock
+    Duration stamp_grid =
+        Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
+    FrameObserver* frame_observer = nullptr;  // null: no one is told of single frames
+    PulseObserver* pulse_observer = nullptr;  // set by start(); null: pulses are not recorded
   };
 
   /// `ins` may be null. The cameras in the order of the rig, camera 0 first.

@@ -78,6 +78,16 @@ TEST_F(Ros2Restarts, restartedBridgeServesOldReaders) {
   }
 }
 
+TEST_F(Ros2Restarts, otherDomainReceivesNothing) {
+  StreamSession session(socket_);
+  const auto bridge = start_bridge(socket_, domain_);
+  const RosParticipant here(domain_), elsewhere(domain_ + 1);
+  RosReader<RosOdometry> odometry(here, "/vergence/odometry"),
+      other(elsewhere, "/vergence/odometry");
+  EXPECT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; }));
+  EXPECT_EQ(other.next(2s), nullptr);
+}
+
 std::size_t resident_kb(pid_t pid) {
   std::ifstream status(fmt::format("/proc/{}/status", pid));
   for (std::string word; status >> word;)

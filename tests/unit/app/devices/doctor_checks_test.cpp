@@ -192,7 +192,7 @@ const std::vector<Case>& cases() {
   return all;
 }
 
-TEST(Doctor, listsFindingsOfMachine) {
+TEST(Doctor, findingsFollowTheMachine) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(c.name);
     FakeMachine f;
@@ -215,7 +215,7 @@ TEST(Doctor, bareMachineHasNoProblem) {
   for (const Finding& finding : findings) EXPECT_EQ(finding.state, ok) << finding.check;
 }
 
-TEST(Doctor, readsUserBufferSettingAfterPackage) {
+TEST(Doctor, lastingBufferFileSortsAfterPackagesOwn) {
   FakeMachine f;
   put_gige(f);
   f.file("/proc/sys/net/core/rmem_max", "212992\n");

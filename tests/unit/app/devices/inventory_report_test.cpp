@@ -14,7 +14,7 @@ namespace {
 
 using test::contains;
 
-TEST(DoctorReport, keepsCommandsAndEscapesDeviceText) {
+TEST(DoctorReport, commandsStayWholeAndControlCodesAreRemoved) {
   const std::string command = "sudo sysctl -w net.core.rmem_max=10485760 # longer than the line";
   const std::vector<Finding> findings{
       {"receive_buffer", FindingState::problem, "too little \033[2J", {command}},
@@ -33,7 +33,7 @@ TEST(DoctorReport, keepsCommandsAndEscapesDeviceText) {
   EXPECT_EQ(json["findings"][0]["fix"].at(0), command);
 }
 
-TEST(DevicesReport, escapesDeviceText) {
+TEST(DevicesReport, controlCodesOfDevicesAreRemoved) {
   Inventory i;
   i.ports = {test::port(0x0403, 0xD38B, "X\0337")};
   EXPECT_FALSE(contains(devices_text(i, {80, false}), "\033"));

@@ -15,7 +15,7 @@ namespace {
 
 using test::FakeMachine;
 
-TEST(Machine, readsOnlyNumbers) {
+TEST(Machine, numbersAreReadAndOtherTextIsNone) {
   const FakeMachine f;
   f.file("/sys/good", "  42\n");
   f.file("/sys/negative", "-1\n");
@@ -32,7 +32,7 @@ TEST(Machine, readsOnlyNumbers) {
     EXPECT_FALSE(f.machine.number(name)) << name;
 }
 
-TEST(Machine, readsLimitsAndCapabilities) {
+TEST(Machine, limitsAndCapabilitiesAreRead) {
   const FakeMachine f;
   f.file("/proc/self/status", "Name:\tx\nCapPrm:\t0000000000000000\nCapEff:\t0000000000003000\n");
   f.file("/proc/self/limits",
@@ -49,7 +49,7 @@ TEST(Machine, readsLimitsAndCapabilities) {
   EXPECT_FALSE(f.machine.limit("Max absent"));
 }
 
-TEST(Machine, inaccessibleFolderIsNotWritable) {
+TEST(Machine, roomBehindClosedFolderIsNotWritable) {
   const test::TemporaryFolder folder;
   (void)folder.write("closed/a/b/file", "");
   ASSERT_EQ(::chmod(folder.path().c_str(), 0755), 0);
@@ -68,7 +68,7 @@ TEST(Machine, inaccessibleFolderIsNotWritable) {
   EXPECT_EQ(WEXITSTATUS(status), 0) << "1: it may write; 2: unknown; 3: no other user here";
 }
 
-TEST(UsbDevices, listsDevicesAndSkipsInvalid) {
+TEST(UsbDevices, devicesAreListedAndNonsenseIsSkipped) {
   const FakeMachine f;
   const auto usb = [&f](const std::string& port, const std::string& vendor) {
     const std::string at = "/sys/bus/usb/devices/" + port + "/";
@@ -109,7 +109,7 @@ TEST(SerialPorts, kindFollowsUsbIds) {
   EXPECT_EQ(serial_kind(0x1234, 0x5678), SerialKind::unknown);
 }
 
-TEST(SerialPorts, namesByNodeLinkOrSerial) {
+TEST(SerialPorts, portIsNamedByNodeLinkOrSerial) {
   const FakeMachine f;
   f.file("/dev/ttyUSB0", "");
   std::filesystem::create_symlink("ttyUSB0", f.folder / "dev/imu");

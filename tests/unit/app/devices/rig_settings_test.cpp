@@ -35,7 +35,7 @@ void expect_equal(const RigCalibration& a, const RigCalibration& b) {
   }
 }
 
-TEST(RigSettings, cameraSettingsOverrideRigSettings) {
+TEST(RigSettings, aCamerasOwnNumbersGoBeforeThoseOfTheRig) {
   const RigCalibration rig = mounted_rig(
       configured({"rig.nominal.k1=-0.1", "cameras.1.intrinsics=[500, 501, 322, 241]",
                   "cameras.1.distortion=[-0.2, 0.05, 0.001]",
@@ -49,7 +49,7 @@ TEST(RigSettings, cameraSettingsOverrideRigSettings) {
   EXPECT_DOUBLE_EQ(rig.baseline, 0.5);
 }
 
-TEST(RigSettings, intrinsicsErrorsFollowSigmasAndSeed) {
+TEST(RigSettings, intrinsicsErrorsHaveTheirSigmasAndTheirSeed) {
   const std::vector<std::string> errors{"mock.intrinsics_error.principal_point_px=0.5",
                                         "mock.intrinsics_error.focal_percent=0.1"};
   double centre = 0, focal = 0;
@@ -74,7 +74,7 @@ TEST(RigSettings, intrinsicsErrorsFollowSigmasAndSeed) {
   EXPECT_NEAR(std::sqrt(focal / (2 * kSeeds)), 1e-3, 1e-3 * 5 / std::sqrt(2000.0));
 }
 
-TEST(RigSettings, renderedRigHasNoErrors) {
+TEST(RigSettings, renderedRigAndTruthRigHaveNoErrors) {
   const Configuration c =
       configured({"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1",
                   "mock.texture_detail=0", "mock.drive=still"});
@@ -86,7 +86,7 @@ TEST(RigSettings, renderedRigHasNoErrors) {
   EXPECT_NEAR(log_so3(moved.R).x(), 0.2 * std::numbers::pi / 180, 1e-12);
 }
 
-TEST(RigSettings, refusalNamesKeyOfImpossibleRig) {
+TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
   struct Bad {
     std::vector<std::string> set;
     const char* mentions;

@@ -37,7 +37,7 @@ Session with_reference(Session s, const Transform& T_reference_world) {
   return s;
 }
 
-TEST(Analysis, alignedReferenceHasNoError) {
+TEST(Analysis, aReferenceThatIsTheSameElsewhereGivesNoError) {
   // From the camera's axes to one with z up, turned and far away.
   Mat3 up;
   up << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -52,7 +52,7 @@ TEST(Analysis, alignedReferenceHasNoError) {
   EXPECT_FALSE(a.map_is_enu);
 }
 
-TEST(Analysis, reportsSignedDriftAfterFirst100m) {
+TEST(Analysis, driftAfterHundredMetresKeepsSizeAndSign) {
   Session s = with_reference(bent_drive(600), Transform{});
   for (std::size_t i = 400; i < 600; ++i) {  // after 200 m: up 2 m, turned left by 3°
     s.frames[i].T_world_left.t.y() -= 2;
@@ -65,7 +65,7 @@ TEST(Analysis, reportsSignedDriftAfterFirst100m) {
   EXPECT_NEAR(a.vertical.end, 2, 1e-9);
 }
 
-TEST(Analysis, reportsMissingReference) {
+TEST(Analysis, withoutAReferenceThereAreNoErrorsAndItIsSaid) {
   Session other_time = with_reference(bent_drive(50), Transform{});
   for (StampedPose& p : other_time.reference) p.stamp = Stamp(p.stamp.ns() + 3'600'000'000'000);
   Session unplaced = with_reference(bent_drive(50), Transform{});
@@ -84,7 +84,7 @@ TEST(Analysis, reportsMissingReference) {
   EXPECT_TRUE(analyse(unplaced).ins_unplaced);
 }
 
-TEST(Analysis, lostFramesBreakTrajectory) {
+TEST(Analysis, lostFramesHaveNoPlaceAndMissingOnesABreak) {
   Session s = bent_drive(100);
   for (std::size_t i = 40; i < 45; ++i)
     s.frames[i].posed = false, s.frames[i].status = PoseStatus::lost;
@@ -98,7 +98,7 @@ TEST(Analysis, lostFramesBreakTrajectory) {
   EXPECT_NEAR(a.ok_share.value(), 85.0 / 90.0, 1e-12);
 }
 
-TEST(Analysis, usesInsErrorsOfFile) {
+TEST(Analysis, errorsToTheInsAreThoseOfTheFile) {
   Session s = bent_drive(10);
   for (std::size_t i = 5; i < 10; ++i) {
     Frame& f = s.frames[i];
@@ -116,7 +116,7 @@ TEST(Analysis, usesInsErrorsOfFile) {
   EXPECT_EQ(a.theirs_x[7], 4);
 }
 
-TEST(Analysis, insDriftUsesPositionsOnly) {
+TEST(Analysis, driftAgainstInsUsesPositionsOnly) {
   Session s = bent_drive(600);
   Mat3 up;
   up << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // camera axes that look east, in enu

@@ -30,7 +30,7 @@ std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last)
   };
 }
 
-TEST(Recorder, temporarilyFullDiskLosesNothing) {
+TEST(Recorder, brieflyFullDiskLosesNothing) {
   const test::TemporaryFolder folder;
   Recorder::Options options;
   options.disk_full = full_from_to(20, 40);
@@ -52,7 +52,7 @@ TEST(Recorder, temporarilyFullDiskLosesNothing) {
   EXPECT_NE(errors[0].find("No space left on device"), std::string::npos) << errors[0];
 }
 
-TEST(Recorder, fullDiskLosesAndCountsCompleteLines) {
+TEST(Recorder, longFullDiskLosesWholeCountedLines) {
   const test::TemporaryFolder folder;
   constexpr std::uint64_t kFrames = 14'000;  // 170 bytes each in poses.csv: twice what memory holds
   Recorder::Options options;
@@ -71,7 +71,7 @@ TEST(Recorder, fullDiskLosesAndCountsCompleteLines) {
                                      std::to_string(totals->lost_lines) + " were lost"});
 }
 
-TEST(LineFile, handsOverDataAboveLimit) {
+TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
   const test::TemporaryFolder folder;
   LineFile file(folder / "a.txt", 16);
   std::string all;

@@ -20,7 +20,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(SessionFolder, acceptsNewOrEmptyFolderOnly) {
+TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
   const test::TemporaryFolder folder;
   EXPECT_TRUE(make_session_folder(folder / "a/b/session"));
   EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/session"));
@@ -37,7 +37,7 @@ TEST(SessionFolder, acceptsNewOrEmptyFolderOnly) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a/b/session"));
 }
 
-TEST(Recorder, writesExactStampsAndNoLostPoses) {
+TEST(Recorder, stampsAreExactAndLostFramesHaveNoPose) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   FrameReport first = pose(0, PoseStatus::ok, 0);
@@ -77,7 +77,7 @@ TEST(Recorder, writesExactStampsAndNoLostPoses) {
   EXPECT_TRUE(totals->faults.empty());
 }
 
-TEST(Recorder, writesOneJsonObjectPerEvent) {
+TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   EventRecord event;
@@ -114,10 +114,10 @@ TEST(Recorder, writesOneJsonObjectPerEvent) {
   EXPECT_EQ(nlohmann::json::parse(lines[2])["fields"], nlohmann::json({{"gap_s", 2.5}}));
 }
 
-TEST(Recorder, liveDropsAreCountedWithoutBlocking) {
+TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   const test::TemporaryFolder folder;
   std::promise<void> posted;
-  Recorder::Options options{.when_full = Recorder::WhenFull::drop, .keep_trajectory = false};
+  Recorder::Options options{.when_full = WhenFull::drop, .keep_trajectory = false};
   // The recorder's thread hangs at the first pose until all are posted. A producer that waited for
   // it would do so until it is let go after all, and nothing would be dropped.
   options.disk_full = [all_posted = posted.get_future().share(), hung = false](Stamp) mutable {
@@ -125,7 +125,7 @@ TEST(Recorder, liveDropsAreCountedWithoutBlocking) {
     return false;
   };
   Recorder recorder(folder.path(), options);
-  constexpr std::uint64_t kFrames = 1000;  // many times what may wait
+  constexpr std::uint64_t kFrames = 5000;  // several times what may wait
   for (std::uint64_t i = 0; i < kFrames; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
   posted.set_value();
   const auto totals = recorder.close();
@@ -136,7 +136,7 @@ TEST(Recorder, liveDropsAreCountedWithoutBlocking) {
   EXPECT_TRUE(totals->trajectory.empty());
 }
 
-TEST(Recorder, writesDuringSession) {
+TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   recorder.on_report(pose(0, PoseStatus::ok, 0));
@@ -148,7 +148,7 @@ TEST(Recorder, writesDuringSession) {
   EXPECT_TRUE(found);
 }
 
-TEST(Recorder, postingDoesNotAllocate) {
+TEST(Recorder, postingAllocatesNothing) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   const test::TemporaryFolder folder;

@@ -39,7 +39,7 @@ CalibrationFile found(const Configuration& c, double t_y) {
   return file;
 }
 
-TEST(StartingCalibration, followsOrderOfPrecedence) {
+TEST(StartingCalibration, scratchThenFileThenStateThenConfiguration) {
   const test::TemporaryFolder folder;
   const Configuration c = configuration(folder);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
@@ -67,7 +67,7 @@ TEST(StartingCalibration, followsOrderOfPrecedence) {
   }
 }
 
-TEST(StartingCalibration, detectsReplacedCamera) {
+TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   const test::TemporaryFolder folder;
   Configuration c = configuration(folder, "gige");
   c.cameras[0].serial = "192.168.7.2";
@@ -87,7 +87,7 @@ TEST(StartingCalibration, detectsReplacedCamera) {
       << other.remarks[0];
 }
 
-TEST(StartingCalibration, camerasWithoutExtrinsicsStartFromScratch) {
+TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   const test::TemporaryFolder folder;
   Configuration c = configuration(folder, "gige");
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::given)

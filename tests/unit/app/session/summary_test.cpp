@@ -16,7 +16,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(TimeHistogram, hasExactMeanAndMaxAndBinnedPercentiles) {
+TEST(TimeHistogram, meanAndMaxAreExactAndPercentilesWithinTheirBin) {
   auto h = std::make_unique<TimeHistogram>();
   for (int i = 1; i <= 1000; ++i) h->add(0.01 * i);
   EXPECT_NEAR(h->mean(), 5.005, 1e-9);
@@ -36,7 +36,7 @@ SummaryInput input() {
   return in;
 }
 
-TEST(Summary, countsFramesAndHasNullWithoutReference) {
+TEST(Summary, framesAreCountedAndMissingReferenceIsNull) {
   auto totals = std::make_unique<SessionTotals>();
   totals->read = 5, totals->ok = 3, totals->degraded = 1, totals->lost = 1;
   totals->estimate.add(8);
@@ -58,7 +58,7 @@ TEST(Summary, countsFramesAndHasNullWithoutReference) {
   EXPECT_TRUE(json["calibration"]["depth_error_percent"]["20"].is_null());
 }
 
-TEST(Summary, reportsKnownScaleAndNullLongSegments) {
+TEST(Summary, knownScaleIsFoundAndShortDriveHasNoLongSegments) {
   // A bent path of about 80 m, the estimate 2 % too long: one scale explains all of it.
   std::vector<StampedPose> estimate, reference;
   for (int i = 0; i <= 160; ++i) {
@@ -94,7 +94,7 @@ RigCalibration with_yaw_sigma(double sigma) {
   return rig;
 }
 
-TEST(Summary, yawSigmaGivesDepthErrorAndRating) {
+TEST(Summary, aYawSigmaTellsTheDepthErrorAndTheWord) {
   // A yaw error σ moves the disparity by f σ (a narrow lens: the same everywhere), so σ_z/z = z
   // σ/b: at 20 m 200 σ.
   const std::array<std::pair<double, const char*>, 3> cases{
@@ -114,7 +114,7 @@ TEST(Summary, yawSigmaGivesDepthErrorAndRating) {
   }
 }
 
-TEST(Summary, reportsLimitOfDepthAccuracy) {
+TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
   auto totals = std::make_unique<SessionTotals>();
   SummaryInput in = input();
   in.calibration = with_yaw_sigma(2e-4);
@@ -126,7 +126,7 @@ TEST(Summary, reportsLimitOfDepthAccuracy) {
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "intrinsics");
 }
 
-TEST(Summary, reportsErrorsInUnitsAndSigmas) {
+TEST(Summary, errorsOfACalibrationAreInUnitsAndInSigmas) {
   auto totals = std::make_unique<SessionTotals>();
   SummaryInput in = input();
   in.calibration = with_yaw_sigma(1e-3);
