@@ -41,7 +41,7 @@ struct MountOptions {
   Duration min_correlation = Duration::seconds(
       60);  // of attitude and place: a drive is too short to tell how slowly they wander
   // A parameter whose sigma is above this is `not_observable`.
-  double rotation_sigma = 0.035;  // rad, two degrees: as much as the drawing knows
+  double rotation_sigma = 0.035;  // rad, two degrees: accuracy of a drawing
   double lever_sigma = 0.5;       // m
   Duration offset_sigma = Duration::milliseconds(30);
 };
@@ -74,7 +74,7 @@ struct Mount {
   double residual_position = 0;  // m, of e_p
 };
 
-/// `nominal`: how the bodies are turned by the drawing; rotations are told against it, and it
+/// `nominal`: rotation by the drawing; rotations are reported relative to it, and it
 /// stands where the drive tells none. Stamps ascend (precondition). Memory: the heap; not for the
 /// real-time path. Time: linear in the moments, kMountRounds rounds. Not `ok`: *mount untouched.
 [[nodiscard]] MountStatus estimate_ins_extrinsics(std::span<const StampedPose> estimate,

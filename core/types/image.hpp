@@ -5,12 +5,12 @@
 
 namespace vergence {
 
-/// An 8-bit grey image somebody else owns, row 0 on top. Bytes between `width` and `stride` are
-/// padding of any value.
+/// View of an 8-bit grey image, which it does not own, row 0 on top. Bytes between `width` and
+/// `stride` are padding of any value.
 ///
 /// Ownership  A view; the memory outlives it by contract of who hands it out (FramePool slot,
 ///            pyramid level).
-/// Threads    Plain reads; as many readers as wanted while nobody writes.
+/// Threads    Plain reads; any number of readers while no thread writes.
 struct ImageView {
   const std::uint8_t* data = nullptr;
   int width = 0;
