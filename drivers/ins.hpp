@@ -21,6 +21,12 @@ struct InsQuality {
   bool sync_out = false;  // a pulse left SyncOut with this sample
 };
 
+/// One reading on the session's clock: stamp and error bound are set. Plain, goes through rings.
+struct InsRecord {
+  InsSample sample{};
+  InsQuality quality{};  // `status` is the device's, or the data set's, own word
+};
+
 /// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the host's
 /// clock is tied to Unix time elsewhere.
 struct InsReading {

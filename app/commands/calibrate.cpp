@@ -9,19 +9,18 @@
 namespace vergence::app {
 namespace {
 
-DriveCalibrationRequest sequence_request(const CalibrateOptions& a) {
+ExitCode calibrate_sequence(const CalibrateOptions& a) {
   check_writable(a.out, a.force);
-  DriveCalibrationRequest r;
+  ReplayRequest r;
   r.data = a.data;
   r.format = sequence_format(a.format, a.data);
   r.topics = {a.left_topic, a.right_topic, "", ""};
   check_topics(r.format, r.topics);
-  r.out = a.out;
   r.calibration = a.calibration;
   r.baseline = a.baseline;
   r.configuration = a.common.configuration(std::nullopt);
-  r.quiet = a.common.quiet;
-  return r;
+  r.session.quiet = a.common.quiet;
+  return calibrate_from_drive(r, a.out);
 }
 
 }  // namespace
@@ -29,7 +28,7 @@ DriveCalibrationRequest sequence_request(const CalibrateOptions& a) {
 void add_calibrate(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code) {
   const auto a = std::make_shared<CalibrateOptions>();
   a->declare(root)->callback([a, arguments, exit_code] {
-    *exit_code = a->given == CalibrateCommand::sequence ? calibrate_from_drive(sequence_request(*a))
+    *exit_code = a->given == CalibrateCommand::sequence ? calibrate_sequence(*a)
                                                         : run_checkerboard_tool(arguments);
   });
 }

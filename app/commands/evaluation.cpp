@@ -13,6 +13,7 @@
 #include "app/runtime/terminal_text.hpp"
 #include "app/session/ins_file.hpp"
 #include "core/math/angle.hpp"
+#include "core/math/robust.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -120,9 +121,8 @@ Duration usual_interval(const Trajectory& poses) {
   for (std::size_t i = 1; i < poses.size(); ++i)
     ns.push_back(poses[i].stamp.ns() / 2 - poses[i - 1].stamp.ns() / 2);
   if (ns.empty()) return {};
-  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
-  std::nth_element(ns.begin(), middle, ns.end());
-  return Duration::nanoseconds(2 * std::min(*middle, std::numeric_limits<std::int64_t>::max() / 2));
+  return Duration::nanoseconds(
+      2 * std::min(median(std::span(ns)), std::numeric_limits<std::int64_t>::max() / 2));
 }
 
 /// Stamps of 0 s, 1 s, 2 s … are most often numbers of frames.

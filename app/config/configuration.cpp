@@ -222,7 +222,8 @@ void apply(const Entry& entry, Configuration* configuration) {
     case KeyType::text:
       if (!key->words.empty()) {
         const std::string value = as_switch(entry.value, key->words);
-        if (std::find(key->words.begin(), key->words.end(), value) == key->words.end())
+        const bool unset = value.empty() && to_text(key->get(Configuration{})).empty();
+        if (!unset && std::find(key->words.begin(), key->words.end(), value) == key->words.end())
           throw InputError(fmt::format("{}: {} is \"{}\"{}; it is one of {}", entry.origin,
                                        key->name, entry.value.substr(0, 60),
                                        value_suggestion(entry.value, *key), range_text(*key)));
@@ -311,12 +312,16 @@ void apply_camera_options(const std::vector<Entry>& entries, Configuration* conf
 /// `record: [poses, images]` switches its words on.
 std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
   constexpr std::string_view kGroup = "record.";
+  std::vector<std::string> words;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys)
+      if (key.name.starts_with(kGroup) && !key.words.empty())
+        words.push_back(key.name.substr(kGroup.size()));
   for (Entry& entry : entries) {
     const bool item =
         entry.name.starts_with(kGroup) && entry.name.size() > kGroup.size() &&
         entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos;
     if (!item) continue;
-    const std::vector<std::string> words{"poses", "ins", "images", "pulses"};
     if (!entry.scalar || std::find(words.begin(), words.end(), entry.value) == words.end())
       throw InputError(fmt::format("{}: record lists \"{}\"{}; it takes {}", entry.origin,
                                    entry.value.substr(0, 60), did_you_mean(entry.value, words),

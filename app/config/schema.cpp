@@ -110,7 +110,7 @@ class Rows {
     return *this;
   }
 
-  /// A text that is one of a few words.
+  /// A text that is one of a few words, or empty where that is the default.
   Rows& word(const char* name, std::string Settings::*field, std::vector<std::string> words,
              const char* meaning) {
     text(name, field, 0, meaning);
@@ -297,9 +297,8 @@ Group cameras() {
         Rows<C>(
             "cameras." + std::to_string(k), "The cameras, a list; the first is the left one.",
             [k](auto& c) -> auto& { return c.cameras[k]; })
-            .text("driver", &C::driver, 16,
-                  "Driver: `mock`, `gige`, `iidc-usb`, `iidc-1394` or `v4l2`. Empty: "
-                  "there is no such camera.")
+            .word("driver", &C::driver, {"mock", "gige", "iidc-usb", "iidc-1394", "v4l2"},
+                  "Driver. Empty: there is no such camera.")
             .text("name", &C::name, 32, "Name in messages and in calibration.yaml.")
             .text("serial", &C::serial, 64,
                   "Serial number, or for GigE the address; empty: the next camera found.")
@@ -392,7 +391,7 @@ Group trigger() {
   using T = TriggerSettings;
   return Rows<T>(
              "trigger", "Trigger of the cameras.", [](auto& c) -> auto& { return c.trigger; })
-      .text("driver", &T::driver, 16,
+      .word("driver", &T::driver, {"none", "mock", "board"},
             "Source of the pulses: `board`, a trigger board on a serial port "
             "(docs/synchronisation.md); `mock`, with mock cameras; `none`: a source that reports "
             "nothing, or no source.")
@@ -454,9 +453,8 @@ Group ins() {
   return Rows<I>(
              "ins", "Inertial navigation system that the pose is compared with.",
              [](auto& c) -> auto& { return c.ins; })
-      .text("driver", &I::driver, 16,
-            "Driver: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock "
-            "cameras), or `none`.")
+      .word("driver", &I::driver, {"none", "mock", "xsens", "nmea", "ubx"},
+            "Driver: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock cameras).")
       .text("port", &I::port, 200,
             "Serial port, preferably a stable link: `/dev/serial/by-id/…`. Empty: the only USB "
             "serial port.")
@@ -700,7 +698,7 @@ Group mock() {
   return Rows<M>(
              "mock", "World and vehicle of the simulated rig (docs/simulated_rig.md).",
              [](auto& c) -> auto& { return c.mock; })
-      .text("world", &M::world, 16, "Rendered world: `suburb`.")
+      .word("world", &M::world, {"suburb"}, "Rendered world.")
       .choice("drive", &M::drive,
               {{"loop", Kind::loop},
                {"figure-eight", Kind::figure_eight},

@@ -74,6 +74,7 @@ Transform transform_of(const Fact& fact) {
   Transform T;
   T.R << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
   T.t << v[3], v[7], v[11];
+  if (accept_rotation(T.R)) T.R = normalised(T.R);  // else find_implausible() judges it
   return T;
 }
 
@@ -388,14 +389,15 @@ class RigReader {
 
   /// From where both cameras sit in a body.
   bool from_body(int k) {
-    const auto T_camera_body = [this](int camera) -> std::optional<Transform> {
-      if (const Fact* fact = own("from_body", camera)) return transform_of(*fact);
-      if (const Fact* fact = own("to_body", camera)) return transform_of(*fact).inverse();
+    const auto T_body_camera = [this](int camera) -> std::optional<Transform> {
+      if (const Fact* fact = own("from_body", camera)) return transform_of(*fact).inverse();
+      if (const Fact* fact = own("to_body", camera)) return transform_of(*fact);
       return std::nullopt;
     };
-    const auto left = T_camera_body(0), right = T_camera_body(k);
-    if (!left || !right) return false;
-    place(k) = *right * left->inverse();
+    const auto left = T_body_camera(0), other = T_body_camera(k);
+    if (!left || !other) return false;
+    place(k) = other->inverse() * *left;
+    if (accept_rotation(place(k).R)) place(k).R = normalised(place(k).R);
     return true;
   }
 
@@ -535,6 +537,18 @@ CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
   }
   finish(texts.back().name, use, &out);
   return out;
+}
+
+Transform read_body_mount(const fs::path& file) {
+  const auto trees = settings_trees(read_text(file, kLargestYaml), file.string());
+  for (const YamlFile& tree : trees)
+    for (const Fact& fact : facts_of(tree)) {
+      if (fact.part != "to_body") continue;
+      const Transform T = transform_of(fact);
+      if (!accept_rotation(T.R)) fail(fact, " is not a rigid transform");
+      return T;
+    }
+  refuse(file, 0, "has no T_BS, the place of the camera in the body");
 }
 
 CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size,

@@ -45,6 +45,10 @@ struct CalibrationText {
                                                     Remarks* remarks,
                                                     const CalibrationUse& use = {});
 
+/// T_BS of one camera's sensor.yaml (EuRoC): p_body = T p_camera. InputError: there is none, or it
+/// is no rigid transform.
+[[nodiscard]] Transform read_body_mount(const std::filesystem::path& file);
+
 namespace detail {
 /// The files that IN or OUT stand for; a folder stands for left.yaml and right.yaml in it. Commas
 /// stand between files where there is none of the whole name.

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/detail/bag_images.hpp"
 #include "core/types/bayer.hpp"
 
 namespace vergence::app {

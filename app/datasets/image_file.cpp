@@ -9,6 +9,7 @@
 #include <cerrno>
 
 #include "app/datasets/detail/image_kinds.hpp"
+#include "app/runtime/file_descriptor.hpp"
 
 namespace vergence::app {
 namespace {
@@ -26,38 +27,23 @@ const detail::ImageKind* kind_of(Bytes bytes) noexcept {
   return nullptr;
 }
 
-/// A descriptor that closes itself. Opening does not wait, as that of a pipe would.
-class OpenFile {
- public:
-  explicit OpenFile(const char* path) noexcept
-      : fd_(::open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
-  ~OpenFile() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  [[nodiscard]] int fd() const noexcept { return fd_; }
-
- private:
-  int fd_;
-};
-
 /// Up to `limit` bytes from the file's start.
 ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
                            std::vector<std::uint8_t>* bytes) {
-  const OpenFile in(file.c_str());
-  if (in.fd() < 0) {
+  // Opening does not wait, as that of a pipe would.
+  const FileDescriptor in(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!in) {
     if (errno == EMFILE || errno == ENFILE) return ImageFileStatus::too_many_files;
     return errno == ENOENT || errno == ENOTDIR ? ImageFileStatus::missing
                                                : ImageFileStatus::unreadable;
   }
   struct stat about {};
-  if (::fstat(in.fd(), &about) != 0 || !S_ISREG(about.st_mode) || about.st_size > kMaxFile)
+  if (::fstat(in.get(), &about) != 0 || !S_ISREG(about.st_mode) || about.st_size > kMaxFile)
     return ImageFileStatus::unreadable;
   bytes->resize(std::min(limit, static_cast<std::size_t>(about.st_size)));
   std::size_t got = 0;
   while (got < bytes->size()) {
-    const ssize_t n = ::read(in.fd(), bytes->data() + got, bytes->size() - got);
+    const ssize_t n = ::read(in.get(), bytes->data() + got, bytes->size() - got);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return ImageFileStatus::unreadable;
     if (n == 0) break;  // became shorter meanwhile: the checks of the content see it

@@ -10,7 +10,7 @@
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/euroc_sensor.hpp"
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/times_file.hpp"
@@ -554,7 +554,10 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
   for (std::size_t k = 0; k < 2; ++k)
     sensors[k] = (folder / cameras[k].below).parent_path() / "sensor.yaml";
   if (sensors[0] != sensors[1] && present(sensors[0]) && present(sensors[1])) {
-    sequence->calibration = read_sensor_rig(sensors[0], sensors[1]);
+    std::vector<CalibrationText> texts;
+    for (const fs::path& file : sensors)
+      texts.push_back({file.string(), read_text(file, kLargestYaml)});
+    sequence->calibration = parse_any_calibration(texts, std::nullopt, &sequence->remarks).rig;
     sequence->calibration_source = sensors[1].lexically_relative(folder).string();
     return;
   }

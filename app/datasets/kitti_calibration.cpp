@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "app/config/calibration_file.hpp"
-#include "app/datasets/euroc_sensor.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 
@@ -58,13 +57,17 @@ class Text {
     return values;
   }
 
+  [[nodiscard]] Mat3 rotation(const std::string& key) const {
+    const auto r = numbers<9>(key);
+    const Mat3 R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data());
+    if (!accept_rotation(R)) fail(key, "is no rotation, it is off orthonormal by more than 1e-4");
+    return normalised(R);
+  }
+
   [[nodiscard]] Transform rigid(const std::string& R, const std::string& T) const {
-    const auto r = numbers<9>(R);
     const auto t = numbers<3>(T);
     Transform out;
-    if (!accept_rotation(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data()),
-                         &out.R))
-      fail(R, "is no rotation, it is off orthonormal by more than 1e-4");
+    out.R = rotation(R);
     out.t = {t[0], t[1], t[2]};
     return out;
   }
@@ -108,10 +111,7 @@ Intrinsics camera_of(const Text& text, int number, bool rectified, Transform* T_
   Intrinsics lens;
   if (rectified) {
     // All were turned into the axes of camera 00 as it became.
-    const auto r = text.numbers<9>(key("R_rect", 0));
-    if (!accept_rotation(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data()),
-                         &T_camera_camera0->R))
-      text.fail(key("R_rect", 0), "is no rotation");
+    T_camera_camera0->R = text.rotation(key("R_rect", 0));
     lens = text.projection(key("P_rect", number), &T_camera_camera0->t);
   } else {
     const auto K = text.numbers<9>(key("K", number));
@@ -127,6 +127,14 @@ Intrinsics camera_of(const Text& text, int number, bool rectified, Transform* T_
 }
 
 }  // namespace
+
+bool accept_rotation(const Mat3& written) noexcept {
+  // Between seven digits (1.5e-7 in KITTI's poses) and a matrix that is no rotation (1e-3 would
+  // bend a kilometre by a metre).
+  constexpr double kOrthonormality = 1e-4;
+  const double error = (written * written.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
+  return error <= kOrthonormality && written.determinant() > 0;
+}
 
 RigCalibration read_kitti_projections(const std::filesystem::path& file,
                                       const std::array<int, 2>& cameras,

@@ -13,6 +13,10 @@
 /// another count, no numbers, no rotation, no size, no projection of a rectified camera.
 namespace vergence::app {
 
+/// A rotation as a file gives it: R Rᵀ is off the identity by up to 1e-4 in an element, and it is
+/// no reflection.
+[[nodiscard]] bool accept_rotation(const Mat3& written) noexcept;
+
 /// The rig of two rectified cameras by their projections, `P0` or `P_rect_00`. Its images have the
 /// size `S_rect_00` where the file says one, else `size`; InputError: there is none.
 [[nodiscard]] RigCalibration read_kitti_projections(const std::filesystem::path& file,

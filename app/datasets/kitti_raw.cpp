@@ -64,7 +64,7 @@ FixStatus fix_of(int status, int satellites_used, int mode) noexcept {
 int whole(double v) noexcept { return std::abs(v) < 1e6 ? static_cast<int>(std::lround(v)) : -1; }
 
 /// Nothing: fewer numbers than there are columns, or a place that is none.
-std::optional<RecordedReading> parse_packet(std::string_view text) noexcept {
+std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   std::array<std::string_view, kFields> fields;
   Lines lines(text);
   std::string_view line;
@@ -72,7 +72,7 @@ std::optional<RecordedReading> parse_packet(std::string_view text) noexcept {
   std::array<double, kFields> v{};
   for (std::size_t i = 0; i < kFields; ++i)
     if (!parse_number(fields[i], &v[i])) return std::nullopt;
-  RecordedReading r;
+  InsRecord r;
   InsSample& s = r.sample;
   s.position = {v[latitude], v[longitude], v[altitude]};
   const double largest = std::max({std::abs(v[roll]), std::abs(v[pitch]), std::abs(v[yaw])});
@@ -102,7 +102,7 @@ std::optional<RecordedReading> parse_packet(std::string_view text) noexcept {
 /// The packets that lines of timestamps.txt are of, and how many of them, and of those that are
 /// left out.
 struct Packets {
-  std::vector<RecordedReading> readings{};
+  std::vector<InsRecord> readings{};
   std::vector<Stamp> stamps{};
   std::size_t missing = 0, broken = 0, without_stamp = 0;
   std::string first_missing{}, first_broken{};
@@ -117,7 +117,7 @@ Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) 
       if (out.missing++ == 0) out.first_missing = name;
       continue;
     }
-    std::optional<RecordedReading> reading;
+    std::optional<InsRecord> reading;
     try {
       reading = parse_packet(read_text(data / name, kLongestPacket));
     } catch (const InputError&) {  // not readable, or longer than a packet: one more that is broken
@@ -152,7 +152,7 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
                          kFields, packets.first_broken));
   add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are left out");
   add_remark(disordered, "stamps go back or repeat one; their packets are left out");
-  const auto fixed = [](const RecordedReading& r) { return r.sample.fix == FixStatus::fix_3d; };
+  const auto fixed = [](const InsRecord& r) { return r.sample.fix == FixStatus::fix_3d; };
   add_remark(ins->readings.size() - static_cast<std::size_t>(std::count_if(
                                         ins->readings.begin(), ins->readings.end(), fixed)),
              fmt::format("of {} packets have no satellites' fix: nothing is compared there",

@@ -14,13 +14,8 @@
 /// its poses with.
 namespace vergence::app {
 
-struct RecordedReading {
-  InsSample sample{};
-  InsQuality quality{};  // `status` is the data set's own word
-};
-
 struct RecordedIns {
-  std::vector<RecordedReading> readings{};  // stamps strictly ascending, on the clock of the images
+  std::vector<InsRecord> readings{};      // stamps strictly ascending, on the clock of the images
   std::optional<Transform> T_ins_left{};  // p_ins = T_ins_left · p_left as published with the data
                                           // set; nothing: it is not
   std::string mount_source{};             // the files that say so

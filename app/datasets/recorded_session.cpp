@@ -61,10 +61,10 @@ std::optional<FrameRecord> read_frame(std::span<const std::uint8_t> bytes) {
   return f;
 }
 
-std::optional<RecordedReading> read_reading(std::span<const std::uint8_t> bytes) {
+std::optional<InsRecord> read_reading(std::span<const std::uint8_t> bytes) {
   RosReader in(bytes, detail::MessageEncoding::cdr);
   (void)in.header();
-  RecordedReading r;
+  InsRecord r;
   InsSample& s = r.sample;
   InsQuality& q = r.quality;
   s.number = in.get<std::uint64_t>();

@@ -45,7 +45,7 @@ class RecordedSession {
 
   [[nodiscard]] const SessionDescription& description() const noexcept { return description_; }
   [[nodiscard]] const std::vector<RecordedFrame>& frames() const noexcept { return frames_; }
-  [[nodiscard]] const std::vector<RecordedReading>& readings() const noexcept { return readings_; }
+  [[nodiscard]] const std::vector<InsRecord>& readings() const noexcept { return readings_; }
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
   /// All images that the estimator had are here, and no frame is missing between two.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
@@ -56,7 +56,7 @@ class RecordedSession {
   /// Gives back what frames() and readings() take, and they are empty; all else stays.
   void clear_frames() noexcept {
     frames_ = std::vector<RecordedFrame>();
-    readings_ = std::vector<RecordedReading>();
+    readings_ = std::vector<InsRecord>();
   }
 
  private:
@@ -66,7 +66,7 @@ class RecordedSession {
 
   SessionDescription description_;
   std::vector<RecordedFrame> frames_;
-  std::vector<RecordedReading> readings_;
+  std::vector<InsRecord> readings_;
   std::vector<std::string> remarks_;
   bool complete_ = true;
   std::unique_ptr<Files> files_;

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"

@@ -355,7 +355,7 @@ RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
   const Conventions conventions = decide(lines, &ins.remarks);
   ins.readings.reserve(lines.size());
   for (const Line& line : lines) {
-    RecordedReading reading;
+    InsRecord reading;
     reading.sample = sample_of(line, conventions, ins.readings.size());
     reading.quality.filter_valid = true;  // the log tells nothing else
     ins.readings.push_back(reading);

@@ -7,6 +7,7 @@
 
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/text_file.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app {
 namespace {
@@ -65,12 +66,6 @@ bool ascend(std::span<const std::string_view> times, const TimeForm& form) {
   return true;
 }
 
-double middle_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Unit of times since 1970, which share their leading digits; nullopt if they do not. A clock that
 /// began when the machine did may have as many digits in a smaller unit: then its steps are those
 /// of a drive in `relative` only.
@@ -93,7 +88,7 @@ std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> time
   for (const TimeUnit unit :
        {TimeUnit::seconds, TimeUnit::milliseconds, TimeUnit::microseconds, TimeUnit::nanoseconds}) {
     const auto of_a_drive = [&](TimeUnit u) {
-      const double step = middle_of(steps) * std::pow(10.0, static_cast<int>(u) - 9);
+      const double step = median(std::span(steps)) * std::pow(10.0, static_cast<int>(u) - 9);
       return step >= kShortest && step <= kLongest;
     };
     const double seconds = middle * std::pow(10.0, static_cast<int>(unit) - 9);

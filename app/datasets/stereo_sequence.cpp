@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <system_error>
 
+#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/recorded_session.hpp"
@@ -16,65 +17,32 @@ namespace {
 std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
 
 StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder,
-                              bool given, const CalibrationUse& use,
-                              const std::array<int, 2>& cameras, const BagTopics& topics) {
+                              const SequenceOptions& o) {
+  const bool given = o.calibration.has_value();
   switch (format) {
     case SequenceFormat::kitti:
       return detail::open_kitti(folder, given);
     case SequenceFormat::kitti_raw:
-      return detail::open_kitti_raw(folder, given, cameras);
+      return detail::open_kitti_raw(folder, given, o.cameras);
     case SequenceFormat::euroc:
-      return detail::open_euroc(folder, given, use);
+      return detail::open_euroc(folder, given, o.use);
     case SequenceFormat::folder:
-      return detail::open_folder(folder, given, use);
+      return detail::open_folder(folder, given, o.use);
     case SequenceFormat::st_lucia:
       return detail::open_st_lucia(folder, given);
     case SequenceFormat::mcap:
-      return detail::open_bag(detail::BagFormat::mcap, folder, given, topics);
+      return detail::open_bag(detail::BagFormat::mcap, folder, given, o.topics);
     case SequenceFormat::rosbag:
-      return detail::open_bag(detail::BagFormat::rosbag, folder, given, topics);
+      return detail::open_bag(detail::BagFormat::rosbag, folder, given, o.topics);
     case SequenceFormat::db3:
-      return detail::open_bag(detail::BagFormat::sqlite, folder, given, topics);
+      return detail::open_bag(detail::BagFormat::sqlite, folder, given, o.topics);
     case SequenceFormat::session:
-      return detail::open_recorded_session(folder, given);
+      refuse(folder, 0,
+             "is a recorded session, which is replayed as it was recorded; for anything else write "
+             "it as a data set: vergence export SESSION --format folder --out DIR");
   }
   refuse(folder, 0, "has no reader for its format");
 }
-
-/// Checks common to all formats. `source`: the file it is from.
-StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source,
-                       const CalibrationUse& use);
-
-}  // namespace
-
-StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                             const std::optional<std::filesystem::path>& calibration,
-                             const CalibrationUse& use, const std::array<int, 2>& cameras,
-                             const BagTopics& topics) {
-  if (calibration)
-    return open_sequence(format, folder,
-                         GivenCalibration{calibration->string(),
-                                          [&](const StereoSequence&) {
-                                            return read_calibration(*calibration, use);
-                                          }},
-                         use, cameras, topics);
-  if (!is_bag(format)) detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, false, use, cameras, topics);
-  const std::filesystem::path source = sequence.root / sequence.calibration_source;
-  return checked(std::move(sequence), source, use);
-}
-
-StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                             const GivenCalibration& calibration, const CalibrationUse& use,
-                             const std::array<int, 2>& cameras, const BagTopics& topics) {
-  if (!is_bag(format)) detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, true, use, cameras, topics);
-  sequence.calibration = calibration.read(sequence).rig;
-  sequence.calibration_source = std::filesystem::path(calibration.name).filename().string();
-  return checked(std::move(sequence), calibration.name, use);
-}
-
-namespace {
 
 /// One stamp that leaps ahead costs its frame, not all those after it.
 void mark_out_of_order(std::vector<StereoPair>* pairs) {
@@ -87,8 +55,9 @@ void mark_out_of_order(std::vector<StereoPair>* pairs) {
   for (const std::size_t kept : detail::ascending(stamps)) (*pairs)[kept].in_order = true;
 }
 
-StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source,
-                       const CalibrationUse& use) {
+/// Checks common to all formats. `source`: the file that the calibration is from.
+void check(const std::filesystem::path& source, const CalibrationUse& use, StereoSequence* opened) {
+  StereoSequence& sequence = *opened;
   check_times(sequence);
   mark_out_of_order(&sequence.pairs);
   apply_use(use, &sequence.calibration);
@@ -109,10 +78,23 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
   // Names and words of files stand in them.
   for (auto* messages : {&sequence.remarks, &sequence.assumptions})
     for (std::string& message : *messages) message = harmless(message);
-  return sequence;
 }
 
 }  // namespace
+
+StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
+                             const SequenceOptions& options) {
+  if (!is_bag(format)) detail::require_folder(folder, "a drive");
+  StereoSequence sequence = open_by_format(format, folder, options);
+  std::filesystem::path source = sequence.root / sequence.calibration_source;
+  if (options.calibration) {
+    source = options.calibration->name;
+    sequence.calibration = options.calibration->read(sequence).rig;
+    sequence.calibration_source = source.filename().string();
+  }
+  check(source, options.use, &sequence);
+  return sequence;
+}
 
 std::optional<SequenceFormat> bag_format(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
@@ -183,7 +165,7 @@ RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path
                               const std::array<int, 2>& cameras, bool mount_wanted) {
   if (format == SequenceFormat::kitti_raw) return detail::read_oxts(folder, cameras, mount_wanted);
   if (format == SequenceFormat::st_lucia) return detail::read_st_lucia_ins(folder);
-  return {};  // bags and sessions have it in StereoSequence::ins
+  return {};  // bags have it in StereoSequence::ins
 }
 
 ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

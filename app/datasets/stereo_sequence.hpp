@@ -11,7 +11,6 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
-#include "app/datasets/image_store.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
@@ -32,6 +31,9 @@ enum class SequenceFormat : std::uint8_t {
 };
 
 struct RecordedIns;  // recorded_ins.hpp
+namespace detail {
+class BagImages;
+}
 
 /// One frame as the data set lists it.
 struct StereoPair {
@@ -60,9 +62,10 @@ struct StereoSequence {
       assumptions{};          // facts the files leave out, and the values assumed: one phrase each
   bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
                               // file[1] are the same
-  std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
-  std::shared_ptr<const RecordedIns> ins{};   // that came with the images; nothing: it has files of
-                                              // its own (read_recorded_ins()), or there is none
+  std::shared_ptr<const detail::BagImages>
+      store{};                               // of a bag; nothing: images are files below root
+  std::shared_ptr<const RecordedIns> ins{};  // that came with the images; nothing: it has files of
+                                             // its own (read_recorded_ins()), or there is none
   int deep_bits = 16;  // of images of 16 bits a sample: so many are used (find_deep_bits())
   bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
@@ -100,8 +103,15 @@ struct BagTopics {
 /// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
-/// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data
-/// set's own.
+/// What of a drive is opened, and with which calibration.
+struct SequenceOptions {
+  std::optional<GivenCalibration> calibration{};  // nothing: the data set's own
+  CalibrationUse use{};              // what of the calibration is wanted, whichever it is
+  std::array<int, 2> cameras{0, 1};  // left and right of a data set with more than two (kitti_raw)
+  BagTopics topics{};                // of a bag
+};
+
+/// A drive of the given format.
 ///
 /// kitti     calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N
 ///           belongs to line N of times.txt.
@@ -123,29 +133,18 @@ struct BagTopics {
 /// (docs/datasets.md); rosbag    paired by the nearest header.stamp, that of the left camera
 /// counts; CameraInfo beside
 ///           the images, and the INS.
-/// session   A session's folder with drive.mcap (docs/session_files.md); the pairs that have both
-///           images, and the INS.
+/// session   Refused: SessionSource replays it as it was recorded.
 ///
-/// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
-/// set that has more than two (kitti_raw).
-/// `topics`: of a bag. InputError (file, line, what): folders or files that are not there, no
-/// images, numbers of images and times that do not go together, times that are no numbers, times in
-/// another unit or running backwards (check_times()), a calibration that makes no rig, images of
-/// another size than the calibration.
+/// InputError (file, line, what): folders or files that are not there, no images, numbers of images
+/// and times that do not go together, times that are no numbers, times in another unit or running
+/// backwards (check_times()), a calibration that makes no rig, images of another size than the
+/// calibration.
 ///
 ///     const StereoSequence drive = open_sequence(SequenceFormat::euroc, "MH_01_easy");
 ///     for (const StereoPair& pair : drive.pairs) use(drive.root / pair.file[0], pair.stamp);
-[[nodiscard]] StereoSequence open_sequence(
-    SequenceFormat format, const std::filesystem::path& folder,
-    const std::optional<std::filesystem::path>& calibration = std::nullopt,
-    const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1},
-    const BagTopics& topics = {});
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format,
                                            const std::filesystem::path& folder,
-                                           const GivenCalibration& calibration,
-                                           const CalibrationUse& use,
-                                           const std::array<int, 2>& cameras = {0, 1},
-                                           const BagTopics& topics = {});
+                                           const SequenceOptions& options = {});
 
 /// Size of an image of the sequence, from its head. → as read_image_size()
 [[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

@@ -8,9 +8,10 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
-#include "app/datasets/euroc_sensor.hpp"
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_table.hpp"
 #include "app/datasets/times_file.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app {
 namespace {
@@ -435,10 +436,8 @@ class Reader {
     std::vector<std::int64_t> steps(poses.size() - 1);
     for (std::size_t i = 0; i < steps.size(); ++i)
       steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);  // halves do not overflow
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    constexpr double kLongest = 10;  // s
-    if (const double step = 2e-9 * static_cast<double>(*middle); step > kLongest)
+    constexpr double kLongest = 10;                                        // s
+    if (const double step = 2e-9 * static_cast<double>(median(std::span(steps))); step > kLongest)
       refuse(
           file_, 0,
           fmt::format("has poses that follow one another after {:.6g} (median), read as seconds: "
@@ -519,7 +518,7 @@ void set_times_beside(const fs::path& file, TrajectoryFile* trajectory) {
 }
 
 void bring_to_camera(const fs::path& sensor, Trajectory* poses) {
-  const Transform T_body_left = read_sensor_mount(sensor);
+  const Transform T_body_left = read_body_mount(sensor);
   for (StampedPose& pose : *poses) pose.T_world_body = pose.T_world_body * T_body_left;
 }
 
@@ -562,11 +561,11 @@ std::optional<TruthFiles> find_truth(const fs::path& folder) {
   const fs::path sequence = (folder.has_filename() ? folder : folder.parent_path()).filename();
   for (const fs::path& poses :
        {folder / "poses.txt", folder / ".." / ".." / "poses" / (sequence.string() + ".txt")})
-    if (present(poses)) return TruthFiles{TruthFiles::Kind::kitti, poses, folder / "times.txt"};
+    if (present(poses)) return TruthFiles{TruthFiles::Kind::kitti, poses};
   for (const fs::path& mav : {folder / "mav0", folder}) {
-    const fs::path csv = mav / "state_groundtruth_estimate0" / "data.csv",
-                   camera = mav / "cam0" / "sensor.yaml";
-    if (present(csv) && present(camera)) return TruthFiles{TruthFiles::Kind::euroc, csv, camera};
+    const fs::path csv = mav / "state_groundtruth_estimate0" / "data.csv";
+    if (present(csv) && present(mav / "cam0" / "sensor.yaml"))
+      return TruthFiles{TruthFiles::Kind::euroc, csv};
   }
   return std::nullopt;
 }
@@ -583,14 +582,6 @@ TrajectoryFile read_trajectory_file(const fs::path& path, const TrajectoryOption
            "has no trajectory.tum, no poses.txt (KITTI) and no "
            "mav0/state_groundtruth_estimate0/data.csv with cam0/sensor.yaml (EuRoC)");
   return read_file(truth->poses, options);
-}
-
-Trajectory read_trajectory(const fs::path& path) {
-  TrajectoryFile file = read_trajectory_file(path);
-  if (!file.timed)
-    refuse(path, 0,
-           "holds KITTI poses, which carry no stamps: put the sequence's times.txt beside it");
-  return std::move(file.poses);
 }
 
 Trajectory in_other_order(Trajectory poses, QuaternionOrder read) {

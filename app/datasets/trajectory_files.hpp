@@ -53,8 +53,6 @@ struct TrajectoryFile {
 /// T_BS.
 [[nodiscard]] TrajectoryFile read_trajectory_file(const std::filesystem::path& path,
                                                   const TrajectoryOptions& options = {});
-/// Its poses.
-[[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
 /// Reads one file without files next to it.
 [[nodiscard]] Trajectory read_tum(const std::filesystem::path& file);
 
@@ -65,8 +63,7 @@ struct TrajectoryFile {
 /// Where the truth of a data-set folder lies.
 struct TruthFiles {
   enum class Kind { kitti, euroc } kind = Kind::kitti;
-  std::filesystem::path poses;   // poses.txt or data.csv
-  std::filesystem::path second;  // times.txt, or sensor.yaml of cam0
+  std::filesystem::path poses;  // poses.txt or data.csv
 };
 
 /// KITTI: `poses.txt` and `times.txt` in the folder, or the benchmark's own tree (sequences/NN with

@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "app/devices/rig_settings.hpp"
 #include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/runtime/nearest.hpp"
 #include "drivers/common/side_by_side_camera.hpp"
 #include "drivers/gige/gige.hpp"
 #include "drivers/iidc/iidc.hpp"
@@ -17,12 +17,11 @@
 namespace vergence::app {
 namespace {
 
-const CameraDriverRow& row_of(const CameraRequest& request) {
-  for (const CameraDriverRow& row : camera_driver_rows())
-    if (request.driver == row.name) return row;
-  const auto names = camera_driver_names();
-  throw InputError(fmt::format("{}.driver is \"{}\"{}; supported: {}", request.key, request.driver,
-                               did_you_mean(request.driver, names), fmt::join(names, ", ")));
+/// The schema has checked the name.
+const CameraDriverRow& row_of(const std::string& driver) {
+  const auto& rows = camera_driver_rows();
+  return *std::find_if(rows.begin(), rows.end(),
+                       [&](const CameraDriverRow& row) { return driver == row.name; });
 }
 
 std::string list_of(const std::vector<DeviceInfo>& found) {
@@ -35,16 +34,15 @@ std::string list_of(const std::vector<DeviceInfo>& found) {
 }
 
 /// The message for an open() that gave nothing.
-std::string refusal(const CameraRequest& request, const std::string& serial,
-                    const CameraDriverRow& row, CameraDriver& driver, DeviceStatus status) {
-  const std::string who = fmt::format("{}: the {} camera {}", request.key, row.name,
+std::string refusal(const std::string& key, const std::string& serial, const CameraDriverRow& row,
+                    CameraDriver& driver, DeviceStatus status) {
+  const std::string who = fmt::format("{}: the {} camera {}", key, row.name,
                                       serial.empty() ? "" : "\"" + serial + "\" ");
   std::string error = driver.last_error();
   switch (status) {
     case DeviceStatus::not_found:
       return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who,
-                         list_of(driver.enumerate()), request.key,
-                         error.empty() ? "" : ": " + error);
+                         list_of(driver.enumerate()), key, error.empty() ? "" : ": " + error);
     case DeviceStatus::busy:
       return fmt::format("{}is in use by another program; end that one{}", who,
                          error.empty() ? "" : ": " + error);
@@ -57,43 +55,45 @@ std::string refusal(const CameraRequest& request, const std::string& serial,
   }
 }
 
-bool are_one_camera(const CameraRequest& a, const CameraRequest& b) {
+bool are_one_camera(const CameraSettings& a, const CameraSettings& b) {
   return a.half != ImageHalf::whole && b.half != ImageHalf::whole && a.half != b.half &&
          a.driver == b.driver && a.serial == b.serial;
 }
 
 /// A half needs its other one, asked for in the same way.
-void check_half(const CameraRequest& request, const std::vector<CameraRequest>& requests) {
-  if (request.half == ImageHalf::whole) return;
-  const auto other = std::find_if(requests.begin(), requests.end(), [&](const CameraRequest& r) {
-    return are_one_camera(r, request);
+void check_half(const Configuration& c, std::size_t k) {
+  const CameraSettings& camera = c.cameras[k];
+  if (camera.half == ImageHalf::whole) return;
+  const auto other = std::find_if(c.cameras.begin(), c.cameras.end(), [&](const CameraSettings& s) {
+    return are_one_camera(s, camera);
   });
-  const bool left = request.half == ImageHalf::left;
-  if (other == requests.end())
+  const bool left = camera.half == ImageHalf::left;
+  if (other == c.cameras.end())
     throw InputError(fmt::format(
         "{}.image_half is {}, and no other entry is the {} half of the same image: give one the "
         "same driver and serial, and image_half: {}",
-        request.key, left ? "left" : "right", left ? "right" : "left", left ? "right" : "left"));
-  const CameraConfiguration& a = request.configuration;
-  const CameraConfiguration& b = other->configuration;
+        camera_key(k), left ? "left" : "right", left ? "right" : "left", left ? "right" : "left"));
+  const auto j = static_cast<std::size_t>(other - c.cameras.begin());
+  const CameraConfiguration a = camera_configuration(c, k), b = camera_configuration(c, j);
   if (a.exposure != b.exposure || a.gain_db != b.gain_db || a.pixel_format != b.pixel_format ||
       a.offset_x != b.offset_x || a.offset_y != b.offset_y ||
       options_text(a.options) != options_text(b.options))
     throw InputError(
         fmt::format("{} and {} are halves of one camera's image and differ: set exposure_us, "
                     "gain_db, pixel_format, offset and options equally",
-                    request.key, other->key));
+                    camera_key(k), camera_key(j)));
 }
 
 /// The drivers in use, and who is taken.
 class Openings {
  public:
-  explicit Openings(const std::vector<CameraRequest>& requests) {
-    for (const CameraRequest& r : requests) {
-      check_half(r, requests);
-      if (r.half == ImageHalf::right) continue;  // its left half stands for the camera
-      ++sharing_[r.driver];
-      if (!r.serial.empty()) taken_.emplace_back(r.driver, r.serial);
+  explicit Openings(const Configuration& c) : configuration_(c) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(camera_count(c)); ++k) {
+      const CameraSettings& camera = c.cameras[k];
+      check_half(c, k);
+      if (camera.half == ImageHalf::right) continue;  // its left half stands for the camera
+      ++sharing_[camera.driver];
+      if (!camera.serial.empty()) taken_.emplace_back(camera.driver, camera.serial);
     }
     for (const auto& [name, serial] : taken_)
       if (std::count(taken_.begin(), taken_.end(), std::pair(name, serial)) > 1)
@@ -101,60 +101,65 @@ class Openings {
             "two entries of cameras have the serial \"{}\"; each camera can be one only", serial));
   }
 
-  OpenedCamera open(const CameraRequest& request) {
+  OpenedCamera open(std::size_t k) {
+    const CameraSettings& camera = configuration_.cameras[k];
     OpenedCamera opened;
-    opened.device = request.half == ImageHalf::whole ? open_device(request) : open_half(request);
-    CameraConfiguration requested = request.configuration;
-    requested.sharing = sharing_[request.driver];
+    opened.device = camera.half == ImageHalf::whole ? open_device(k) : open_half(k);
+    CameraConfiguration requested = camera_configuration(configuration_, k);
+    requested.sharing = sharing_[camera.driver];
     const DeviceStatus status = opened.device->configure(requested, &opened.actual);
-    require_configured(camera_title(request.key, opened.device->info()), status,
+    require_configured(camera_title(camera_key(k), opened.device->info()), status,
                        opened.device->last_error());
     return opened;
   }
 
  private:
   struct OpenHalf {
-    const CameraRequest* of;
+    const CameraSettings* of;
     std::unique_ptr<CameraDevice> device;
   };
 
   /// The camera behind two entries is opened with the first of them.
-  std::unique_ptr<CameraDevice> open_half(const CameraRequest& request) {
+  std::unique_ptr<CameraDevice> open_half(std::size_t k) {
+    const CameraSettings& camera = configuration_.cameras[k];
     for (OpenHalf& h : halves_)
-      if (are_one_camera(*h.of, request) && h.device != nullptr) return std::move(h.device);
-    auto [left, right] = split_side_by_side(open_device(request));
-    const bool is_left = request.half == ImageHalf::left;
-    halves_.push_back({&request, is_left ? std::move(right) : std::move(left)});
+      if (are_one_camera(*h.of, camera) && h.device != nullptr) return std::move(h.device);
+    auto [left, right] = split_side_by_side(open_device(k));
+    const bool is_left = camera.half == ImageHalf::left;
+    halves_.push_back({&camera, is_left ? std::move(right) : std::move(left)});
     return is_left ? std::move(left) : std::move(right);
   }
 
-  std::unique_ptr<CameraDevice> open_device(const CameraRequest& request) {
-    const CameraDriverRow& row = row_of(request);
-    std::unique_ptr<CameraDriver>& driver = drivers_[request.driver];
+  std::unique_ptr<CameraDevice> open_device(std::size_t k) {
+    const CameraDriverRow& row = row_of(configuration_.cameras[k].driver);
+    std::unique_ptr<CameraDriver>& driver = drivers_[row.name];
     if (driver == nullptr) driver = row.make();
-    std::string serial = request.serial;
-    if (serial.empty()) serial = next(request, *driver);
+    std::string serial = configuration_.cameras[k].serial;
+    if (serial.empty()) serial = next(k, *driver);
     DeviceStatus status = DeviceStatus::ok;
     auto device = driver->open(serial, &status);
-    if (device == nullptr) refuse_device(status, refusal(request, serial, row, *driver, status));
+    if (device == nullptr)
+      refuse_device(status, refusal(camera_key(k), serial, row, *driver, status));
     return device;
   }
 
-  /// The serial of the next camera that nobody has or names.
-  std::string next(const CameraRequest& request, CameraDriver& driver) {
+  /// The serial of the next camera that no entry has or names.
+  std::string next(std::size_t k, CameraDriver& driver) {
+    const std::string& name = configuration_.cameras[k].driver;
     const std::vector<DeviceInfo> found = driver.enumerate();
     for (const DeviceInfo& d : found) {
-      const std::pair who(request.driver, d.serial);
+      const std::pair who(name, d.serial);
       if (std::find(taken_.begin(), taken_.end(), who) != taken_.end()) continue;
       taken_.push_back(who);
       return d.serial;
     }
     const std::string error = driver.last_error();
-    throw DeviceError(fmt::format(
-        "{}: no unassigned {} camera was found; {}; check cable and power{}", request.key,
-        request.driver, list_of(found), error.empty() ? "" : ": " + error));
+    throw DeviceError(
+        fmt::format("{}: no unassigned {} camera was found; {}; check cable and power{}",
+                    camera_key(k), name, list_of(found), error.empty() ? "" : ": " + error));
   }
 
+  const Configuration& configuration_;
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;
   std::map<std::string, int> sharing_;
   std::vector<OpenHalf> halves_;  // opened with the other one, not asked for yet
@@ -179,25 +184,21 @@ const std::vector<CameraDriverRow>& camera_driver_rows() {
   return rows;
 }
 
-std::vector<std::string> camera_driver_names() {
-  std::vector<std::string> names;
-  for (const CameraDriverRow& row : camera_driver_rows()) names.emplace_back(row.name);
-  return names;
-}
+std::string camera_key(std::size_t k) { return fmt::format("cameras.{}", k); }
 
 std::string camera_title(const std::string& key, const DeviceInfo& info) {
   return fmt::format("{} ({} {})", key, info.driver, info.serial);
 }
 
-std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests,
+std::vector<OpenedCamera> open_cameras(const Configuration& configuration,
                                        std::vector<std::string>* remarks) {
-  Openings openings(requests);
+  Openings openings(configuration);
   std::vector<OpenedCamera> cameras;
-  for (const CameraRequest& request : requests) {
-    cameras.push_back(openings.open(request));
-    const std::string remark = cameras.back().device->remark();
-    if (!remark.empty())
-      remarks->push_back(camera_title(request.key, cameras.back().device->info()) + ": " + remark);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(camera_count(configuration)); ++k) {
+    cameras.push_back(openings.open(k));
+    const CameraDevice& device = *cameras.back().device;
+    if (const std::string remark = device.remark(); !remark.empty())
+      remarks->push_back(camera_title(camera_key(k), device.info()) + ": " + remark);
   }
   return cameras;
 }

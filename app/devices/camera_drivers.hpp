@@ -19,15 +19,6 @@ struct CameraDriverRow {
 /// The table of drivers for real cameras: everything that talks to one is chosen here. The mock's
 /// cameras come from its rig.
 [[nodiscard]] const std::vector<CameraDriverRow>& camera_driver_rows();
-[[nodiscard]] std::vector<std::string> camera_driver_names();
-
-/// One camera as the configuration wants it.
-struct CameraRequest {
-  std::string key;  // `cameras.0`, for messages
-  std::string driver, serial;
-  ImageHalf half = ImageHalf::whole;
-  CameraConfiguration configuration;  // `sharing` is filled in: the requests with the same driver
-};
 
 /// One that is open and configured.
 struct OpenedCamera {
@@ -35,15 +26,18 @@ struct OpenedCamera {
   CameraConfiguration actual;
 };
 
-/// Opens and configures them in order. An empty serial takes the next camera that no other request
-/// names. A left half and a right one with the same driver and serial are one camera.
+/// Opens and configures the cameras of a configuration in order. An empty serial takes the next
+/// camera that no other entry names. A left half and a right one with the same driver and serial
+/// are one camera.
 ///
 /// Errors  As refuse_device(), one message: the key, what was found or what the camera offers,
 ///         what to do. Nothing stays open then.
 /// `remarks`: messages about what works, but not as well as it should.
-[[nodiscard]] std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests,
+[[nodiscard]] std::vector<OpenedCamera> open_cameras(const Configuration& configuration,
                                                      std::vector<std::string>* remarks);
 
+/// The key of a camera's entry: `cameras.0`.
+[[nodiscard]] std::string camera_key(std::size_t k);
 /// A camera for a message: `cameras.0 (gige 15021234)`.
 [[nodiscard]] std::string camera_title(const std::string& key, const DeviceInfo& info);
 

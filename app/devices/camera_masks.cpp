@@ -1,7 +1,6 @@
 #include "app/devices/camera_masks.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <span>
 #include <system_error>
 
@@ -23,54 +22,12 @@ std::filesystem::path find_beside(const std::filesystem::path& folder, const std
   return folder / path;
 }
 
-/// The numbers of a binary PGM's head, and where its pixels begin.
-struct PgmHead {
-  int width = 0, height = 0, white = 0;
-  std::size_t pixels = 0;
-};
-
-bool is_pgm(Bytes b) noexcept {
-  return b.size() > 2 && b[0] == 'P' && b[1] == '5' && std::isspace(b[2]) != 0;
-}
-
-/// Width, height and white after "P5", apart by white space, in which `#` begins a remark. False:
-/// not that.
-bool read_pgm_head(Bytes b, PgmHead* head) noexcept {
-  constexpr int kMax = 1 << 15;
-  std::size_t at = 2;
-  for (int* number : {&head->width, &head->height, &head->white}) {
-    for (; at < b.size() && (std::isspace(b[at]) != 0 || b[at] == '#'); ++at)
-      if (b[at] == '#')
-        while (at + 1 < b.size() && b[at] != '\n') ++at;
-    const std::size_t first = at;
-    for (; at < b.size() && std::isdigit(b[at]) != 0 && *number <= kMax; ++at)
-      *number = 10 * *number + (b[at] - '0');
-    if (at == first || *number < 1 || *number > kMax) return false;
-  }
-  head->pixels = at + 1;
-  return at < b.size() && std::isspace(b[at]) != 0;
-}
-
-ImageFileStatus read_pgm(Bytes b, ImageSize requested, ImageSize* size,
-                         std::uint8_t* out) noexcept {
-  PgmHead head;
-  if (!read_pgm_head(b, &head) || head.white > 255) return ImageFileStatus::not_an_image;
-  *size = {head.width, head.height};
-  if (*size != requested) return ImageFileStatus::wrong_size;
-  const auto n = static_cast<std::size_t>(head.width) * static_cast<std::size_t>(head.height);
-  if (b.size() - head.pixels < n) return ImageFileStatus::truncated;
-  std::copy_n(b.begin() + static_cast<std::ptrdiff_t>(head.pixels), n, out);
-  return ImageFileStatus::ok;
-}
-
-ImageFileStatus read_png(Bytes b, ImageSize requested, ImageSize* size,
-                         std::uint8_t* out) noexcept {
-  constexpr std::array<std::uint8_t, 4> kPng{0x89, 'P', 'N', 'G'};
-  // A JPEG's zeros are not zero: its compression leaves ripples about every edge.
-  if (b.size() < kPng.size() || !std::equal(kPng.begin(), kPng.end(), b.begin()))
-    return ImageFileStatus::not_an_image;
-  const ImageFileStatus status = check_image(b, size);
-  if (status != ImageFileStatus::ok) return status;
+/// PNG or PGM: a JPEG's zeros are not zero, because its compression leaves ripples about every
+/// edge.
+ImageFileStatus read_pixels(Bytes b, ImageSize requested, ImageSize* size,
+                            std::uint8_t* out) noexcept {
+  if (b.empty() || (b[0] != 0x89 && b[0] != 'P')) return ImageFileStatus::not_an_image;
+  if (const auto status = check_image(b, size); status != ImageFileStatus::ok) return status;
   return decode_grey(b, requested, out, static_cast<std::size_t>(requested.width));
 }
 
@@ -84,9 +41,7 @@ std::vector<std::uint8_t> read_mask(const std::string& key, const std::filesyste
                                    static_cast<std::size_t>(requested.height));
   ImageSize size;
   ImageFileStatus status = read_image_file(file, &bytes);
-  if (status == ImageFileStatus::ok)
-    status = is_pgm(bytes) ? read_pgm(bytes, requested, &size, pixels.data())
-                           : read_png(bytes, requested, &size, pixels.data());
+  if (status == ImageFileStatus::ok) status = read_pixels(bytes, requested, &size, pixels.data());
   if (status == ImageFileStatus::not_an_image)
     fail("is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
   if (status == ImageFileStatus::wrong_size)

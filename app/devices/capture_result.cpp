@@ -1,13 +1,12 @@
 #include "app/devices/capture_result.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstdint>
 #include <cstring>
-#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -131,50 +130,6 @@ std::vector<std::string> camera_names(const Configuration& c, int cameras) {
 
 namespace {
 
-/// Ends the stream when nothing has come for too long, or a signal has.
-class Watchdog {
- public:
-  Watchdog(Acquisition* source, Duration limit, const SignalGuard& signals)
-      : source_(source),
-        limit_(limit.ns()),
-        signals_(signals),
-        until_(std::chrono::steady_clock::now() + limit_),
-        thread_([this] { watch(); }) {}
-  ~Watchdog() {
-    {
-      const std::lock_guard lock(mutex_);
-      quit_ = true;
-    }
-    changed_.notify_one();
-    thread_.join();
-  }
-  Watchdog(const Watchdog&) = delete;
-  Watchdog& operator=(const Watchdog&) = delete;
-
-  void feed() {
-    const std::lock_guard lock(mutex_);
-    until_ = std::chrono::steady_clock::now() + limit_;
-  }
-
- private:
-  void watch() {
-    constexpr auto kPollInterval = std::chrono::milliseconds(50);
-    std::unique_lock lock(mutex_);
-    while (!quit_ && !signals_.stop_requested() && std::chrono::steady_clock::now() < until_)
-      changed_.wait_for(lock, kPollInterval);
-    source_->stop();
-  }
-
-  Acquisition* source_;
-  std::chrono::nanoseconds limit_;
-  const SignalGuard& signals_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool quit_ = false;
-  std::chrono::steady_clock::time_point until_;
-  std::thread thread_;
-};
-
 void on_event(const DeviceEvent& event, CaptureResult* capture) {
   const auto k = static_cast<std::size_t>(event.camera);
   if (event.kind == DeviceEvent::Kind::camera_disconnected) capture->gone[k] = true;
@@ -197,7 +152,16 @@ CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
   Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), o);
   start_acquisition(&source);
   {
-    Watchdog watchdog(&source, options.limit, signals);
+    using Clock = std::chrono::steady_clock;
+    const auto limit = std::chrono::nanoseconds(options.limit.ns());
+    std::atomic<Clock::time_point> until{Clock::now() + limit};
+    // Ends the stream when nothing has come for too long, or a signal has.
+    const std::jthread watchdog([&](const std::stop_token& done) {
+      constexpr auto kPollInterval = std::chrono::milliseconds(50);
+      while (!done.stop_requested() && !signals.stop_requested() && Clock::now() < until.load())
+        std::this_thread::sleep_for(kPollInterval);
+      source.stop();
+    });
     int passed = 0;
     for (Acquired item; capture.sets < options.count && source.next(&item);) {
       if (const auto* event = std::get_if<DeviceEvent>(&item)) on_event(*event, &capture);
@@ -213,7 +177,7 @@ CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
              frame->set.proof,
              {rig.images.begin(), rig.images.begin() + static_cast<std::ptrdiff_t>(n)}});
         ++capture.sets;
-        watchdog.feed();
+        until = Clock::now() + limit;
       }
       source.release(*frame);
     }

@@ -7,7 +7,6 @@
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/runtime/nearest.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -20,52 +19,31 @@ bool all_mock(const Configuration& c) {
 }
 
 /// Checks that a configuration suits real devices before opening them.
-std::vector<CameraRequest> requests_of(const Configuration& c) {
-  std::vector<CameraRequest> requests;
-  const int cameras = nominal_rig(c).cameras;
-  if (cameras < 2)
-    throw InputError(
-        "cameras: one camera is configured, two are needed for scale; for example cameras: "
-        "[{driver: gige}, {driver: gige}]");
-  for (int k = 0; k < cameras; ++k) {
-    const CameraSettings& s = c.cameras[static_cast<std::size_t>(k)];
-    const std::string key = fmt::format("cameras.{}", k);
+void check_real_drive(const Configuration& c) {
+  check_cameras(c);
+  (void)nominal_rig(c);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(camera_count(c)); ++k) {
+    const CameraSettings& s = c.cameras[k];
     if (s.driver == "mock")
-      throw InputError(key +
+      throw InputError(camera_key(k) +
                        ".driver is mock, but another camera is real; simulated and real cameras "
                        "cannot be mixed");
-    if (s.width != c.cameras[0].width || s.height != c.cameras[0].height)
-      throw InputError(fmt::format(
-          "{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one size",
-          key, s.width, s.height, c.cameras[0].width, c.cameras[0].height));
-    CameraRequest r;
-    r.key = key;
-    r.driver = s.driver;
-    r.serial = s.serial;
-    r.half = s.half;
-    const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
-    r.configuration = {s.width, s.height, c.trigger.rate, start.exposure, start.gain_db, s.trigger};
-    r.configuration.offset_x = s.offset_x;
-    r.configuration.offset_y = s.offset_y;
-    r.configuration.pixel_format = s.pixel_format;
-    r.configuration.options = s.options;
     if (c.sync.mode != SyncMode::master_strobe && s.trigger != c.cameras[0].trigger)
       throw InputError(fmt::format(
-          "{}.trigger is {}, that of camera 0 is {}; all cameras of a rig are triggered alike", key,
-          to_string(s.trigger), to_string(c.cameras[0].trigger)));
-    requests.push_back(std::move(r));
+          "{}.trigger is {}, that of camera 0 is {}; all cameras of a rig are triggered alike",
+          camera_key(k), to_string(s.trigger), to_string(c.cameras[0].trigger)));
   }
-  if (c.trigger.driver != "none" && c.trigger.driver != "board")
-    throw InputError(
-        fmt::format("trigger.driver is \"{}\"{}; with real cameras it is board, or none where "
-                    "something else pulses",
-                    c.trigger.driver, did_you_mean(c.trigger.driver, {"board", "none"})));
-  if (c.trigger.driver == "board" && requests[0].configuration.trigger != CameraTrigger::hardware)
+  for (const auto& [key, driver] :
+       {std::pair{"trigger.driver", c.trigger.driver}, std::pair{"ins.driver", c.ins.driver}})
+    if (driver == "mock")
+      throw InputError(std::string(key) +
+                       " is mock, but the cameras are real; simulated and real devices cannot be "
+                       "mixed");
+  if (c.trigger.driver == "board" && c.cameras[0].trigger != CameraTrigger::hardware)
     throw InputError(
         fmt::format("trigger.driver is board and cameras[].trigger {}; the board's pulses are for "
                     "cameras with trigger: hardware",
                     to_string(c.cameras[0].trigger)));
-  return requests;
 }
 
 }  // namespace
@@ -102,12 +80,12 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
 }
 
 void DriveDevices::open_real(const Configuration& c) {
-  const std::vector<CameraRequest> requests = requests_of(c);
-  sync_ = sync_options(c, static_cast<int>(requests.size()));
+  check_real_drive(c);
+  sync_ = sync_options(c, camera_count(c));
   const TriggerConfiguration pulses = trigger_configuration(c, sync_.cameras);
-  opened_ = open_cameras(requests, &remarks_);
+  opened_ = open_cameras(c, &remarks_);
   for (const OpenedCamera& camera : opened_) cameras_.push_back(camera.device.get());
-  opened_ins_ = open_ins(ins_request(c.ins), &remarks_);
+  opened_ins_ = open_ins(c.ins, &remarks_);
   ins_ = opened_ins_.get();
   if (sync_.mode == SyncMode::ins_syncout) check_sync_out(c, ins_->info());
   if (c.trigger.driver == "board") {
@@ -117,8 +95,7 @@ void DriveDevices::open_real(const Configuration& c) {
   std::vector<DeviceTiming> timings;
   for (const OpenedCamera& camera : opened_) timings.push_back(camera.device->timing());
   fit_to_devices(c, timings, trigger_ != nullptr, &sync_);
-  const CameraTrigger trigger = requests[0].configuration.trigger;
-  if (trigger == CameraTrigger::software) {
+  if (c.cameras[0].trigger == CameraTrigger::software) {
     software_ = std::make_unique<SoftwareTrigger>(cameras_);
     if (software_->configure(pulses, nullptr) != DeviceStatus::ok)
       throw InputError("trigger.rate is not possible");

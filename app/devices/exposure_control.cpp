@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 
 namespace vergence::app {
 namespace {
@@ -25,63 +26,19 @@ bool has(const Frame& frame, const ExposureSetting& setting) noexcept {
 
 }  // namespace
 
-/// A camera whose frames are looked at as they are handed out.
-class ExposureControl::Watched final : public CameraDevice {
- public:
-  Watched(ExposureControl* owner, std::size_t k, CameraDevice* camera)
-      : owner_(owner), k_(k), camera_(camera) {}
-
-  const DeviceInfo& info() const noexcept override { return camera_->info(); }
-  DeviceStatus configure(const CameraConfiguration& requested,
-                         CameraConfiguration* actual) noexcept override {
-    return camera_->configure(requested, actual);
-  }
-  DeviceTiming timing() const noexcept override { return camera_->timing(); }
-  DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
-  DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
-    const DeviceStatus status = camera_->wait(limit, frame);
-    if (status == DeviceStatus::ok && frame->status == FrameStatus::complete)
-      owner_->observe(k_, *frame, camera_->view(frame->slot));
-    return status;
-  }
-  ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
-  void release(FrameSlot slot) noexcept override { camera_->release(slot); }
-  void stop() noexcept override { camera_->stop(); }
-  DeviceStatus trigger_once() noexcept override { return camera_->trigger_once(); }
-  DeviceStatus set_exposure(const ExposureSetting& requested,
-                            ExposureSetting* actual) noexcept override {
-    return camera_->set_exposure(requested, actual);
-  }
-  std::string last_error() const override { return camera_->last_error(); }
-  std::string remark() const override { return camera_->remark(); }
-  CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
-
- private:
-  ExposureControl* owner_;
-  std::size_t k_;
-  CameraDevice* camera_;
-};
-
-ExposureControl::ExposureControl(const std::vector<CameraDevice*>& cameras, int width, int height,
+ExposureControl::ExposureControl(std::vector<CameraDevice*> cameras, int width, int height,
                                  const ImageView& mask, const exposure::ExposureOptions& options,
                                  const ExposureSetting& start, bool at_once)
-    : meter_(width, height, mask),
+    : cameras_(std::move(cameras)),
+      meter_(width, height, mask),
       options_(options),
       controller_(options, start),
       at_once_(at_once) {
-  for (CameraDevice* camera : cameras)
-    watched_.push_back(std::make_unique<Watched>(this, watched_.size(), camera));
   taken_.fill(start);
   if (!at_once_) thread_ = std::thread([this] { work(); });
 }
 
 ExposureControl::~ExposureControl() { settle(); }
-
-std::vector<CameraDevice*> ExposureControl::cameras() const {
-  std::vector<CameraDevice*> all;
-  for (const auto& w : watched_) all.push_back(w.get());
-  return all;
-}
 
 void ExposureControl::settle() noexcept {
   stop_.store(true, std::memory_order_release);
@@ -100,7 +57,7 @@ ExposureCounters ExposureControl::counters() const noexcept {
   return c;
 }
 
-void ExposureControl::observe(std::size_t k, const Frame& frame, const ImageView& image) noexcept {
+void ExposureControl::on_frame(std::size_t k, const Frame& frame) noexcept {
   if (unsupported_.load(std::memory_order_relaxed) || under_way_.load(std::memory_order_acquire))
     return;
   if (asked_) {  // it is done: from here on images may have it
@@ -114,7 +71,8 @@ void ExposureControl::observe(std::size_t k, const Frame& frame, const ImageView
     return;
   }
   if (k != 0) return;
-  const auto next = controller_.step(meter_.measure(image, options_.may_saturate));
+  const auto next =
+      controller_.step(meter_.measure(cameras_[0]->view(frame.slot), options_.may_saturate));
   if (!next) return;
   changes_.fetch_add(1, std::memory_order_relaxed);
   ask(*next);
@@ -143,9 +101,9 @@ void ExposureControl::ask(const ExposureSetting& requested) noexcept {
 
 void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
   bool unequal = false;
-  for (std::size_t k = 0; k < watched_.size(); ++k) {
+  for (std::size_t k = 0; k < cameras_.size(); ++k) {
     ExposureSetting actual = requested;
-    const DeviceStatus status = watched_[k]->set_exposure(requested, &actual);
+    const DeviceStatus status = cameras_[k]->set_exposure(requested, &actual);
     if (status == DeviceStatus::unsupported) unsupported_.store(true);
     if (status != DeviceStatus::ok) {
       refused_.fetch_add(1, std::memory_order_relaxed);

@@ -2,12 +2,12 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <thread>
 #include <vector>
 
 #include "core/memory/ring.hpp"
 #include "core/types/calibration.hpp"
+#include "drivers/acquisition/acquisition.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/common/wake_event.hpp"
 #include "drivers/exposure/brightness.hpp"
@@ -15,7 +15,7 @@
 
 namespace vergence::app {
 
-/// Counters of a run; exact after the last wait for frames and settle().
+/// Counters of a run; exact after the last frame and settle().
 struct ExposureCounters {
   std::uint64_t changes = 0;  // asked of the cameras
   std::uint64_t refused = 0;  // by a camera that was gone, or could not
@@ -29,39 +29,35 @@ struct ExposureCounters {
 /// Exposure and gain of all cameras of a rig from how bright camera 0's images are; the same for
 /// all, so that their mid-exposures agree.
 ///
-/// Stands between the cameras and whoever waits for their frames: cameras() are to be used in their
-/// place. Each image of camera 0 is looked at when it is handed out, some 10 µs; what is to change
+/// Each image of camera 0 is measured when the acquisition takes it, some 10 µs; what is to change
 /// is asked of the cameras by a thread of its own, because a device may take seconds to answer.
 /// That thread would come at another image on every run: in virtual time the cameras are asked at
 /// once.
-/// Ownership  The cameras outlive it, its cameras() do not. Threads: those of the cameras' callers,
-///            camera 0's and the others' wait() one; a thread of its own.
-/// Memory     At construction; none in wait(). Errors: counted.
-class ExposureControl {
+/// Ownership  The cameras outlive it. Threads: on_frame(), one caller; a thread of its own.
+/// Memory     At construction; none in on_frame(). Errors: counted.
+class ExposureControl final : public FrameObserver {
  public:
   /// `mask` of camera 0, read here only; it has the images' size or is empty. Preconditions: valid
   /// options, at least one camera, all of them configured with `start` and `width` x `height`.
-  ExposureControl(const std::vector<CameraDevice*>& cameras, int width, int height,
-                  const ImageView& mask, const exposure::ExposureOptions& options,
-                  const ExposureSetting& start, bool at_once);
-  ~ExposureControl();
+  ExposureControl(std::vector<CameraDevice*> cameras, int width, int height, const ImageView& mask,
+                  const exposure::ExposureOptions& options, const ExposureSetting& start,
+                  bool at_once);
+  ~ExposureControl() override;
   ExposureControl(const ExposureControl&) = delete;
   ExposureControl& operator=(const ExposureControl&) = delete;
 
-  [[nodiscard]] std::vector<CameraDevice*> cameras() const;
-  /// Ends the thread. Owner, after the last wait(); twice is harmless.
+  void on_frame(std::size_t k, const Frame& frame) noexcept override;
+  /// Ends the thread. Owner, after the last frame; twice is harmless.
   void settle() noexcept;
   [[nodiscard]] ExposureCounters counters() const noexcept;
 
  private:
-  class Watched;
-  void observe(std::size_t k, const Frame& frame, const ImageView& image) noexcept;
   [[nodiscard]] bool is_without(std::size_t k, const Frame& frame) noexcept;
   void ask(const ExposureSetting& requested) noexcept;
   void set_all(const ExposureSetting& requested) noexcept;
   void work() noexcept;
 
-  std::vector<std::unique_ptr<Watched>> watched_;
+  std::vector<CameraDevice*> cameras_;
   exposure::BrightnessMeter meter_;
   exposure::ExposureOptions options_;
   exposure::ExposureController controller_;

@@ -15,12 +15,10 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
-#include <condition_variable>
 #include <cstring>
 #include <exception>
 #include <fstream>
-#include <memory>
-#include <mutex>
+#include <future>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -30,18 +28,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/datasets/decimal.hpp"
 #include "app/devices/camera_drivers.hpp"
 
 namespace vergence::app {
 
 namespace fs = std::filesystem;
 namespace {
-
-std::string_view trimmed(std::string_view s) {
-  const auto first = s.find_first_not_of(" \t\r\n");
-  if (first == std::string_view::npos) return {};
-  return s.substr(first, s.find_last_not_of(" \t\r\n") - first + 1);
-}
 
 template <class Integer>
 std::optional<Integer> whole_number(const std::optional<std::string>& text, int base) {
@@ -231,33 +224,24 @@ constexpr std::array<std::uint16_t, 9> kBoardVendors{
     0x1A86,  // QinHeng: the CH340 of cheap boards
 };
 
-/// Result of a driver's own thread, which may outlive the one that waits.
 struct Search {
-  std::mutex mutex;
-  std::condition_variable changed;
-  bool done = false;
   std::vector<DeviceInfo> found;
   std::string explanation;
 };
 
-std::shared_ptr<Search> begin_search(const CameraDriverRow& row) {
-  auto search = std::make_shared<Search>();
-  std::thread([search, make = row.make] {
-    std::vector<DeviceInfo> found;
-    std::string explanation;
+/// On a thread of the driver's own, which may outlive the one that waits.
+std::future<Search> begin_search(const CameraDriverRow& row) {
+  std::packaged_task<Search()> task([make = row.make]() -> Search {
     try {
       const auto driver = make();
-      found = driver->enumerate();
-      explanation = driver->last_error();
+      std::vector<DeviceInfo> found = driver->enumerate();
+      return {std::move(found), driver->last_error()};
     } catch (const std::exception& e) {
-      explanation = std::string("it cannot look: ") + e.what();
+      return {{}, std::string("it cannot look: ") + e.what()};
     }
-    const std::lock_guard lock(search->mutex);
-    search->found = std::move(found);
-    search->explanation = std::move(explanation);
-    search->done = true;
-    search->changed.notify_all();
-  }).detach();
+  });
+  std::future<Search> search = task.get_future();
+  std::thread(std::move(task)).detach();
   return search;
 }
 
@@ -345,7 +329,7 @@ bool names_port(const Machine& machine, const std::string& key, const FoundPort&
 
 Inventory make_inventory(const Machine& machine, const InventoryOptions& options) {
   Inventory inventory;
-  std::vector<std::pair<const CameraDriverRow*, std::shared_ptr<Search>>> searches;
+  std::vector<std::pair<const CameraDriverRow*, std::future<Search>>> searches;
   for (const CameraDriverRow& row : camera_driver_rows())
     if (options.drivers.empty() || std::find(options.drivers.begin(), options.drivers.end(),
                                              row.name) != options.drivers.end())
@@ -356,13 +340,13 @@ Inventory make_inventory(const Machine& machine, const InventoryOptions& options
 
   const auto until =
       std::chrono::steady_clock::now() + std::chrono::nanoseconds(options.limit.ns());
-  for (const auto& [row, search] : searches) {
+  for (auto& [row, search] : searches) {
     DriverFindings d{row->name, row->meaning, true, {}, {}};
-    std::unique_lock lock(search->mutex);
-    d.answered = search->changed.wait_until(lock, until, [&s = *search] { return s.done; });
+    d.answered = search.wait_until(until) == std::future_status::ready;
     if (d.answered) {
-      d.cameras = search->found;
-      d.explanation = search->explanation;
+      Search found = search.get();
+      d.cameras = std::move(found.found);
+      d.explanation = std::move(found.explanation);
     } else {
       d.explanation = fmt::format(
           "no answer within {:.0f} s: a device or its kernel driver hangs; unplug it, and look at "

@@ -10,19 +10,16 @@
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
 
 namespace {
 
-/// Checks a key that takes one of a few words where cameras are the mock's.
-void one_of(const std::string& key, const std::string& value,
-            const std::vector<std::string>& words) {
-  for (const std::string& word : words)
-    if (value == word) return;
-  throw InputError(fmt::format("{} is \"{}\"{}; with mock cameras it takes {}", key, value,
-                               did_you_mean(value, words), fmt::join(words, ", ")));
+/// Checks a key that takes fewer words where cameras are the mock's.
+void one_of(const char* key, const std::string& value, const std::vector<std::string>& words) {
+  if (std::find(words.begin(), words.end(), value) == words.end())
+    throw InputError(fmt::format("{} is \"{}\"; with mock cameras it takes {}", key, value,
+                                 fmt::join(words, ", ")));
 }
 
 std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<std::string>& more) {
@@ -52,28 +49,11 @@ Duration trigger_delay(const Configuration& c, std::size_t k) {
 }  // namespace
 
 void check_drive(const Configuration& c) {
-  const int n = camera_count(c);
-  if (n == 0)
-    throw InputError(
-        "cameras: no camera is configured; set at least cameras: [{driver: mock}, {driver: mock}]");
-  if (n < 2)
-    throw InputError(
-        "cameras: one camera is configured, two are needed for scale; for example cameras: "
-        "[{driver: mock}, {driver: mock}]");
-  for (int k = 0; k < n; ++k) {
-    const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
-    one_of(fmt::format("cameras.{}.driver", k), camera.driver, {"mock"});
-    if (camera.width != c.cameras[0].width || camera.height != c.cameras[0].height)
-      throw InputError(
-          fmt::format("cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a "
-                      "rig have one size",
-                      k, camera.width, camera.height, c.cameras[0].width, c.cameras[0].height));
-  }
+  check_cameras(c);
   one_of("ins.driver", c.ins.driver, {"mock", "none"});
   one_of("trigger.driver", c.trigger.driver, {"mock"});
-  one_of("mock.world", c.mock.world, {"suburb"});
-  (void)sync_options(c, n);
-  (void)trigger_configuration(c, n);
+  (void)sync_options(c, camera_count(c));
+  (void)trigger_configuration(c, camera_count(c));
 }
 
 MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults,
@@ -118,10 +98,8 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     throw InputError(e.what());
   }
   for (int k = 0; k < rig.cameras; ++k) {
-    const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
-    const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
-    const CameraConfiguration requested{camera.width,   camera.height, c.trigger.rate,
-                                        start.exposure, start.gain_db, CameraTrigger::hardware};
+    CameraConfiguration requested = camera_configuration(c, static_cast<std::size_t>(k));
+    requested.trigger = CameraTrigger::hardware;
     configured(drive.rig->camera(k).configure(requested, nullptr), fmt::format("cameras.{}", k));
   }
   configured(drive.rig->trigger().configure(trigger_configuration(c, rig.cameras), nullptr),

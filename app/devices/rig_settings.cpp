@@ -87,6 +87,21 @@ int camera_count(const Configuration& c) {
   return n;
 }
 
+void check_cameras(const Configuration& c) {
+  const int n = camera_count(c);
+  if (n < 2)
+    throw InputError(fmt::format(
+        "cameras: {0} configured, two are needed for scale; for example cameras: "
+        "[{{driver: {1}}}, {{driver: {1}}}]",
+        n == 0 ? "no camera is" : "one camera is", n == 0 ? "mock" : c.cameras[0].driver));
+  for (std::size_t k = 1; k < static_cast<std::size_t>(n); ++k)
+    if (c.cameras[k].width != c.cameras[0].width || c.cameras[k].height != c.cameras[0].height)
+      throw InputError(fmt::format(
+          "cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one "
+          "size",
+          k, c.cameras[k].width, c.cameras[k].height, c.cameras[0].width, c.cameras[0].height));
+}
+
 RigCalibration mounted_rig(const Configuration& c) {
   RigCalibration rig;
   rig.cameras = camera_count(c);
@@ -162,6 +177,18 @@ ExposureSetting starting_exposure(const Configuration& c, std::size_t k) {
   const CameraSettings& camera = c.cameras[exposes_by_itself(c) ? 0 : k];
   const ExposureSetting own{microseconds(camera.exposure_us), camera.gain_db};
   return exposes_by_itself(c) ? exposure::within(exposure_options(c), own) : own;
+}
+
+CameraConfiguration camera_configuration(const Configuration& c, std::size_t k) {
+  const CameraSettings& s = c.cameras[k];
+  const ExposureSetting start = starting_exposure(c, k);
+  CameraConfiguration requested{s.width,        s.height,      c.trigger.rate,
+                                start.exposure, start.gain_db, s.trigger};
+  requested.offset_x = s.offset_x;
+  requested.offset_y = s.offset_y;
+  requested.pixel_format = s.pixel_format;
+  requested.options = s.options;
+  return requested;
 }
 
 }  // namespace vergence::app

@@ -13,6 +13,9 @@ namespace vergence::app {
 /// Cameras with a driver. InputError: a hole in the list.
 [[nodiscard]] int camera_count(const Configuration& configuration);
 
+/// InputError: fewer than two cameras, or cameras of different image sizes.
+void check_cameras(const Configuration& configuration);
+
 /// The rig as it is mounted, which a mock renders: each camera's own `model`, `intrinsics`,
 /// `distortion` and `T_camera_left`, or where it has none those of `rig.nominal`, parallel cameras
 /// one baseline apart.
@@ -36,5 +39,9 @@ namespace vergence::app {
 /// Initial exposure of camera k: its own; where exposures are controlled camera 0's, inside the
 /// bounds, for all alike.
 [[nodiscard]] ExposureSetting starting_exposure(const Configuration& configuration, std::size_t k);
+
+/// What camera k is asked for when it is opened; `sharing` is left at its default.
+[[nodiscard]] CameraConfiguration camera_configuration(const Configuration& configuration,
+                                                       std::size_t k);
 
 }  // namespace vergence::app

@@ -3,30 +3,11 @@
 #include <fmt/format.h>
 
 #include "app/runtime/errors.hpp"
-#include "app/runtime/nearest.hpp"
 #include "drivers/gnss/gnss.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
 #include "drivers/xsens/xsens.hpp"
 
 namespace vergence::app {
-
-std::string serial_open_error(const std::string& who, DeviceStatus status,
-                              const std::string& error) {
-  switch (status) {
-    case DeviceStatus::busy:
-      return fmt::format(
-          "{} is in use by another program; end that one (ModemManager opens new ports: tell it "
-          "not to)",
-          who);
-    case DeviceStatus::no_permission:
-      return fmt::format(
-          "{} cannot be opened without permission; add the user to group dialout, and log in again",
-          who);
-    default:
-      return fmt::format("{} cannot be used: {}", who,
-                         error.empty() ? std::string(to_string(status)) : error);
-  }
-}
 
 void refuse_device(DeviceStatus status, const std::string& message) {
   switch (status) {
@@ -58,98 +39,62 @@ void require_configured(const std::string& title, DeviceStatus status, const std
 
 namespace {
 
-xsens::Options xsens_options(const InsRequest& request) {
+/// Why a device on a serial port cannot be opened. `error`: the driver's message, may be empty.
+std::string serial_open_error(const std::string& who, DeviceStatus status,
+                              const std::string& error) {
+  switch (status) {
+    case DeviceStatus::busy:
+      return fmt::format(
+          "{} is in use by another program; end that one (ModemManager opens new ports: tell it "
+          "not to)",
+          who);
+    case DeviceStatus::no_permission:
+      return fmt::format(
+          "{} cannot be opened without permission; add the user to group dialout, and log in again",
+          who);
+    default:
+      return fmt::format("{} cannot be used: {}", who,
+                         error.empty() ? std::string(to_string(status)) : error);
+  }
+}
+
+/// The drivers of real INS by their name in the configuration, which the schema has checked.
+std::unique_ptr<InsDriver> make_ins_driver(const InsSettings& s) {
+  const auto baud = static_cast<std::uint32_t>(s.baud);
+  const Duration processing = Duration::seconds(s.processing_ms * 1e-3);
+  if (s.driver == "nmea") return gnss::make_driver({gnss::Protocol::nmea, baud, processing});
+  if (s.driver == "ubx") return gnss::make_driver({gnss::Protocol::ubx, baud, processing});
   xsens::Options o;
-  o.baud = request.baud;
-  o.sync_out_hz = request.sync_out_hz;
-  o.sync_out_width_ms = request.sync_out_width_ms;
-  o.processing = Duration::seconds(request.processing_ms * 1e-3);
-  return o;
-}
-
-std::unique_ptr<InsDriver> make_xsens(const InsRequest& request) {
-  return xsens::make_driver(xsens_options(request));
-}
-
-template <gnss::Protocol kProtocol>
-gnss::Options gnss_options(const InsRequest& request) {
-  return {kProtocol, request.baud, Duration::seconds(request.processing_ms * 1e-3)};
-}
-
-template <gnss::Protocol kProtocol>
-std::unique_ptr<InsDriver> make_gnss(const InsRequest& request) {
-  return gnss::make_driver(gnss_options<kProtocol>(request));
-}
-
-const InsDriverRow& row_of(const InsRequest& request) {
-  if (const InsDriverRow* row = find_ins_driver(request.driver)) return *row;
-  const auto names = ins_driver_names();
-  throw InputError(
-      fmt::format("ins.driver is \"{}\"{}; supported: {}, mock (with mock cameras) and none",
-                  request.driver, did_you_mean(request.driver, names), fmt::join(names, ", ")));
+  o.baud = baud;
+  o.sync_out_hz = s.sync_out_hz;
+  o.sync_out_width_ms = s.sync_out_width_ms;
+  o.processing = processing;
+  return xsens::make_driver(o);
 }
 
 }  // namespace
-
-const std::vector<InsDriverRow>& ins_driver_rows() {
-  static const std::vector<InsDriverRow> rows{
-      {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens},
-      {"nmea", "satellite receiver or compass that sends NMEA 0183 on a serial port",
-       &make_gnss<gnss::Protocol::nmea>},
-      {"ubx", "u-blox receiver that sends UBX-NAV-PVT on a serial port",
-       &make_gnss<gnss::Protocol::ubx>},
-  };
-  return rows;
-}
-
-InsRequest ins_request(const InsSettings& s) {
-  return {s.driver,       s.port,
-          s.rate,         static_cast<std::uint32_t>(s.baud),
-          s.sync_out_hz,  s.sync_out_width_ms,
-          s.processing_ms};
-}
-
-const InsDriverRow* find_ins_driver(const std::string& name) {
-  for (const InsDriverRow& row : ins_driver_rows())
-    if (name == row.name) return &row;
-  return nullptr;
-}
-
-std::vector<std::string> ins_driver_names() {
-  std::vector<std::string> names;
-  for (const InsDriverRow& row : ins_driver_rows()) names.emplace_back(row.name);
-  return names;
-}
 
 std::string ins_title(const DeviceInfo& info) {
   return fmt::format("ins ({}{}{}, {} on {})", info.driver, info.serial.empty() ? "" : " ",
                      info.serial, info.model, info.place);
 }
 
-std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::string>* remarks) {
-  if (request.driver == "none") return nullptr;
-  const InsDriverRow& row = row_of(request);
-  const std::unique_ptr<InsDriver> driver = row.make(request);
+std::unique_ptr<InsDevice> open_ins(const InsSettings& settings,
+                                    std::vector<std::string>* remarks) {
+  if (settings.driver == "none") return nullptr;
+  const std::unique_ptr<InsDriver> driver = make_ins_driver(settings);
   DeviceStatus status = DeviceStatus::ok;
-  std::unique_ptr<InsDevice> device = driver->open(request.port, &status);
+  std::unique_ptr<InsDevice> device = driver->open(settings.port, &status);
   if (device == nullptr)
-    refuse_device(status,
-                  serial_open_error(fmt::format("ins: the {} INS{}", row.name,
-                                                request.port.empty() ? "" : " on " + request.port),
-                                    status, driver->last_error()));
-  status = device->configure(request.rate_hz, nullptr);
+    refuse_device(
+        status, serial_open_error(fmt::format("ins: the {} INS{}", settings.driver,
+                                              settings.port.empty() ? "" : " on " + settings.port),
+                                  status, driver->last_error()));
+  status = device->configure(settings.rate, nullptr);
   require_configured(ins_title(device->info()), status, device->last_error());
   if (const std::string remark = device->remark(); !remark.empty())
     remarks->push_back(ins_title(device->info()) + ": " + remark);
   return device;
-}
-
-trigger_board::Options trigger_board_options(const TriggerSettings& settings) {
-  trigger_board::Options o;
-  o.baud = static_cast<std::uint32_t>(settings.baud);
-  o.pps = settings.pps;
-  o.ins = settings.ins;
-  return o;
 }
 
 std::string board_title(const DeviceInfo& info) {
@@ -159,7 +104,11 @@ std::string board_title(const DeviceInfo& info) {
 std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings& settings,
                                                           const TriggerConfiguration& pulses,
                                                           std::vector<std::string>* remarks) {
-  trigger_board::Driver driver(trigger_board_options(settings));
+  trigger_board::Options options;
+  options.baud = static_cast<std::uint32_t>(settings.baud);
+  options.pps = settings.pps;
+  options.ins = settings.ins;
+  trigger_board::Driver driver(options);
   DeviceStatus status = DeviceStatus::ok;
   std::unique_ptr<trigger_board::Device> board = driver.open_board(settings.port, &status);
   if (board == nullptr)

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <system_error>
 
+#include "app/runtime/file_descriptor.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "drivers/clock.hpp"
 
@@ -21,28 +22,20 @@ namespace {
   throw std::system_error(errno, std::generic_category(), what);
 }
 
-/// Closed at the end of its scope: mappings keep their memory.
-struct Descriptor {
-  int fd = -1;
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-};
-
 }  // namespace
 
 RecordRing::RecordRing(std::size_t bytes) {
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
   capacity_ = (std::max<std::size_t>(bytes, 1) + page - 1) / page * page;
-  const Descriptor memory{::memfd_create("vergence-record", MFD_CLOEXEC)};
-  if (memory.fd < 0 || ::ftruncate(memory.fd, static_cast<off_t>(capacity_)) != 0)
+  const FileDescriptor memory(::memfd_create("vergence-record", MFD_CLOEXEC));  // mappings keep it
+  if (!memory || ::ftruncate(memory.get(), static_cast<off_t>(capacity_)) != 0)
     fail("memory for the recording's queue");
   void* both = ::mmap(nullptr, 2 * capacity_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (both == MAP_FAILED) fail("address space for the recording's queue");
   memory_ = static_cast<std::uint8_t*>(both);
   for (std::size_t at : {std::size_t{0}, capacity_})
     if (::mmap(memory_ + at, capacity_, PROT_READ | PROT_WRITE,
-               MAP_SHARED | MAP_FIXED | MAP_POPULATE, memory.fd, 0) == MAP_FAILED) {
+               MAP_SHARED | MAP_FIXED | MAP_POPULATE, memory.get(), 0) == MAP_FAILED) {
       const int error = errno;
       ::munmap(memory_, 2 * capacity_);
       errno = error;

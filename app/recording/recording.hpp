@@ -14,6 +14,7 @@
 
 #include "app/recording/mcap_file.hpp"
 #include "app/recording/recording_files.hpp"
+#include "app/runtime/queue_thread.hpp"
 #include "core/memory/arena.hpp"
 #include "core/types/time.hpp"
 #include "drivers/common/wake_event.hpp"
@@ -107,7 +108,6 @@ struct RecordingCounters {
 ///            tried again every RecordingFiles::kRetry; messages by take_errors().
 class Recording {
  public:
-  enum class WhenFull : std::uint8_t { drop, wait };
   struct Options {
     RecordingFiles::Options files{};
     std::vector<std::size_t> queues;  // bytes of each

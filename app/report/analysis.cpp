@@ -9,6 +9,7 @@
 #include "app/report/svg.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/math/angle.hpp"
+#include "core/math/robust.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app::report {
@@ -28,9 +29,7 @@ void measure_time(const Session& s, Analysis* a) {
   a->breaks.assign(s.frames.size(), 0);
   if (steps.empty()) return;
   a->duration_s = a->time_s.back();
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  a->interval_s = *middle;
+  a->interval_s = median(std::span(steps));
   for (std::size_t i = 1; i < s.frames.size(); ++i)
     a->breaks[i] = a->time_s[i] - a->time_s[i - 1] > kWideGap * a->interval_s ? 1 : 0;
 }

@@ -20,6 +20,17 @@ namespace vergence::app::report {
 
 namespace {
 
+/// 12 400: a space between thousands.
+std::string grouped(std::size_t count) {
+  const std::string digits = std::to_string(count);
+  std::string text;
+  for (std::size_t i = 0; i < digits.size(); ++i) {
+    if (i > 0 && (digits.size() - i) % 3 == 0) text += ' ';
+    text += digits[i];
+  }
+  return text;
+}
+
 /// Table rows "name value" under group headings. Names and values are escaped here.
 class MetricTable {
  public:
@@ -154,18 +165,11 @@ std::string event_row(const Session& s, const EventRun& run) {
 
 }  // namespace
 
-std::string grouped(std::size_t count) {
-  const std::string digits = std::to_string(count);
-  std::string text;
-  for (std::size_t i = 0; i < digits.size(); ++i) {
-    if (i > 0 && (digits.size() - i) % 3 == 0) text += ' ';
-    text += digits[i];
-  }
-  return text;
-}
-
 std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
 
+namespace {
+
+/// Counts, errors, times, calibration, memory, drops; a figure that does not exist has no row.
 std::string metrics_table(const Session& session, const Analysis& analysis) {
   MetricTable f;
   f.group("Session");
@@ -179,8 +183,6 @@ std::string metrics_table(const Session& session, const Analysis& analysis) {
   calibration_group(session, analysis, &f);
   return std::move(f).finish();
 }
-
-namespace {
 
 /// One row of words about a calibration; empty when nothing is known of it.
 std::string health_row(const nlohmann::json& summary, const char* name, const std::string& path) {
@@ -214,8 +216,7 @@ std::string depth_text(const CalibrationRow& c) {
   return text;
 }
 
-}  // namespace
-
+/// The rating of the calibration and the depth errors it predicts, at the start and at the end.
 std::string health_table(const Session& session) {
   const std::string rows = health_row(session.summary, "at the start", "calibration.initial.") +
                            health_row(session.summary, "at the end", "calibration.");
@@ -230,6 +231,7 @@ std::string health_table(const Session& session) {
          "uncertainty of the calibration.</p>\n";
 }
 
+/// The newest sixty calibrations: outcome, cause, latency, fit and depth.
 std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMax = 60;
   std::string out =
@@ -262,6 +264,7 @@ std::string calibrations_table(const Session& session) {
   return out + "</table>\n";
 }
 
+/// Successive events of one kind and message are one row; of very many the first and the last.
 std::string events_table(const Session& session) {
   constexpr std::size_t kEachEnd = 80;
   const std::vector<EventRun> runs = condensed(session.events);
@@ -277,13 +280,8 @@ std::string events_table(const Session& session) {
     }
     out += event_row(session, runs[i]);
   }
-  if (session.events_dropped > 0)
-    out += fmt::format("<tr><td></td><td></td><td>… and {} more in events.jsonl</td></tr>\n",
-                       grouped(session.events_dropped));
   return out + "</table>\n";
 }
-
-namespace {
 
 /// A plot with its title and, below it, one sentence that says how to read it.
 std::string figure(std::string_view caption, const std::string& drawing,

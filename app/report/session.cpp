@@ -4,7 +4,9 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,82 +18,111 @@
 
 namespace vergence::app::report {
 
-FileLines::FileLines(const std::filesystem::path& file) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(file, ignored);
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
-    refuse(file, 0, "is no file: a folder, a pipe or a device");  // a pipe would wait for ever
-  in_.open(file, std::ios::binary);
-  if (!in_) refuse(file, 0, std::string("cannot be opened (") + std::strerror(errno) + ")");
-}
-
-bool FileLines::next(std::string_view* line) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  line_.resize(kLongestLine);
-  for (;;) {
-    in_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
-    if (in_.eof()) {
-      torn_ = in_.gcount() > 0;
-      return false;
-    }
-    if (in_.bad()) return false;
-    if (in_.fail()) {  // too long
-      in_.clear();
-      in_.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
-      continue;
-    }
-    std::string_view whole(line_.data(), static_cast<std::size_t>(in_.gcount()) - 1);
-    if (!std::exchange(begun_, true) && whole.starts_with(kByteOrderMark))
-      whole.remove_prefix(kByteOrderMark.size());
-    *line = trimmed(whole);
-    if (!line->empty() && line->front() != '#') return true;
-  }
-}
-
-CsvRows::CsvRows(NextLine next_line) : next_line_(std::move(next_line)) {
-  std::string_view head;
-  if (!next_line_(&head)) return;
-  std::vector<std::string_view> names(kMaxColumns);
-  names.resize(std::min(split(head, ',', names), kMaxColumns));
-  names_.assign(names.begin(), names.end());
-  fields_.resize(names_.size());
-}
-
-std::optional<std::size_t> CsvRows::column(std::string_view name) const noexcept {
-  const auto found = std::find(names_.begin(), names_.end(), name);
-  if (found == names_.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - names_.begin());
-}
-
-bool CsvRows::next() {
-  std::string_view line;
-  while (next_line_(&line)) {
-    if (split(line, ',', fields_) == names_.size()) return true;
-    ++torn_;
-  }
-  return false;
-}
-
-std::string_view CsvRows::text(std::optional<std::size_t> column) const noexcept {
-  return column ? fields_[*column] : std::string_view{};
-}
-
-std::optional<double> CsvRows::number(std::optional<std::size_t> column) const noexcept {
-  double value = 0;
-  if (!parse_number(text(column), &value)) return std::nullopt;
-  return value;
-}
-
-std::optional<std::int64_t> CsvRows::integer(std::optional<std::size_t> column) const noexcept {
-  return parse_integer(text(column));
-}
-
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLargestSummary = std::size_t{16} << 20U;  // bytes
 constexpr std::size_t kLongestEventLine = std::size_t{64} << 10U;
+constexpr std::size_t kLongestLine = std::size_t{1} << 20U;  // bytes; longer ones are passed over
+
+/// The lines of a file one after the other as Lines gives those of a text, whatever the file's
+/// length. What follows the last line's end is left out: a killed writer leaves it, and a number
+/// cut in the middle looks like another one.
+///
+/// Memory  The longest line.
+/// Errors  The constructor throws InputError: not there, no file, not readable.
+class FileLines {
+ public:
+  explicit FileLines(const fs::path& file) {
+    std::error_code ignored;
+    const auto status = fs::status(file, ignored);
+    if (fs::exists(status) && !fs::is_regular_file(status))
+      refuse(file, 0, "is no file: a folder, a pipe or a device");  // a pipe would wait for ever
+    in_.open(file, std::ios::binary);
+    if (!in_) refuse(file, 0, std::string("cannot be opened (") + std::strerror(errno) + ")");
+  }
+
+  /// False at the end. The view holds until the next call.
+  [[nodiscard]] bool next(std::string_view* line) {
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    line_.resize(kLongestLine);
+    for (;;) {
+      in_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
+      if (in_.eof()) {
+        torn_ = in_.gcount() > 0;
+        return false;
+      }
+      if (in_.bad()) return false;
+      if (in_.fail()) {  // too long
+        in_.clear();
+        in_.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+        continue;
+      }
+      std::string_view whole(line_.data(), static_cast<std::size_t>(in_.gcount()) - 1);
+      if (!std::exchange(begun_, true) && whole.starts_with(kByteOrderMark))
+        whole.remove_prefix(kByteOrderMark.size());
+      *line = trimmed(whole);
+      if (!line->empty() && line->front() != '#') return true;
+    }
+  }
+  /// At the end: the file does not end with a line's end.
+  [[nodiscard]] bool torn() const noexcept { return torn_; }
+  /// At the end: the rest could not be read.
+  [[nodiscard]] bool failed() const noexcept { return in_.bad(); }
+
+ private:
+  std::ifstream in_;
+  std::string line_{};
+  bool begun_ = false, torn_ = false;
+};
+
+using Column = std::optional<std::size_t>;
+
+/// Rows of a table whose first line names the columns, commas between, nothing quoted: what the
+/// recorder writes. A row with another number of fields than the head has has empty ones.
+class CsvRows {
+ public:
+  explicit CsvRows(FileLines* lines) : lines_(lines) {
+    std::string_view head;
+    if (!lines_->next(&head)) return;
+    std::vector<std::string_view> names(kMaxColumns);
+    names.resize(std::min(split(head, ',', names), kMaxColumns));
+    names_.assign(names.begin(), names.end());
+    fields_.resize(names_.size());
+  }
+  /// Position of a column by its name; nothing when the table lacks it.
+  [[nodiscard]] Column column(std::string_view name) const noexcept {
+    const auto found = std::find(names_.begin(), names_.end(), name);
+    return found == names_.end() ? Column() : static_cast<std::size_t>(found - names_.begin());
+  }
+  /// False at the end.
+  [[nodiscard]] bool next() {
+    std::string_view line;
+    if (!lines_->next(&line)) return false;
+    if (split(line, ',', fields_) != names_.size())
+      std::fill(fields_.begin(), fields_.end(), std::string_view());
+    return true;
+  }
+  /// Field of the last row; empty if the column does not exist.
+  [[nodiscard]] std::string_view text(Column column) const noexcept {
+    return column ? fields_[*column] : std::string_view{};
+  }
+  /// Nothing: empty, or not one finite number.
+  [[nodiscard]] std::optional<double> number(Column column) const noexcept {
+    double value = 0;
+    return parse_number(text(column), &value) ? std::optional(value) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<std::int64_t> integer(Column column) const noexcept {
+    return parse_integer(text(column));
+  }
+
+ private:
+  static constexpr std::size_t kMaxColumns = 256;
+  FileLines* lines_;
+  std::vector<std::string> names_;
+  std::vector<std::string_view> fields_;
+};
 
 const nlohmann::json* find_path(const nlohmann::json& json, std::string_view path) {
   const nlohmann::json* at = &json;
@@ -135,11 +166,6 @@ std::optional<FileLines> open_part(const fs::path& file, const char* consequence
   return part_of(file, consequence, session, [&] { return FileLines(file); });
 }
 
-void leave_out(const char* file, std::size_t most, Session* session) {
-  session->left_out.push_back(
-      fmt::format("{} has more than {} lines; the rest is left out", file, most));
-}
-
 void report_damage(const char* file, const FileLines& lines, std::size_t rows,
                    std::size_t disordered, Session* session) {
   if (rows > 0)
@@ -155,6 +181,29 @@ void report_damage(const char* file, const FileLines& lines, std::size_t rows,
     session->missing.push_back(
         fmt::format("{}: {} line{} left out whose stamp is not later than the one before", file,
                     disordered, disordered == 1 ? "" : "s"));
+}
+
+/// Reads up to `most` rows of a file. `next` gives a row, nothing for a damaged one; false: the
+/// end.
+template <class Row, class Next>
+void read_rows(const char* file, std::size_t most, const FileLines& lines, const Next& next,
+               std::vector<Row>* rows, Session* session) {
+  constexpr bool kAscending = std::is_same_v<Row, Frame> || std::is_same_v<Row, StampedPose>;
+  std::size_t damaged = 0, disordered = 0;
+  for (std::optional<Row> row; next(&row);) {
+    if (rows->size() == most) {
+      session->left_out.push_back(
+          fmt::format("{} has more than {} lines; the rest is left out", file, most));
+      break;
+    }
+    if (!row)
+      ++damaged;
+    else if (kAscending && !rows->empty() && row->stamp <= rows->back().stamp)
+      ++disordered;
+    else
+      rows->push_back(std::move(*row));
+  }
+  report_damage(file, lines, damaged, disordered, session);
 }
 
 constexpr std::size_t kMaxReasons = 64;
@@ -227,7 +276,6 @@ class PoseColumns {
   }
 
  private:
-  using Column = std::optional<std::size_t>;
   template <std::size_t N>
   [[nodiscard]] static bool numbers(const CsvRows& rows, const std::array<Column, N>& columns,
                                     std::array<double, N>* out) {
@@ -260,11 +308,11 @@ std::optional<StampedPose> tum_pose(std::string_view line) {
   return pose;
 }
 
-bool read_poses(const fs::path& folder, std::size_t most, Session* session) {
+bool read_poses(const fs::path& folder, Session* session) {
   auto lines = open_part(folder / "poses.csv",
                          "status, inliers and times of the frames are not known", session);
   if (!lines) return false;
-  CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
+  CsvRows rows(&*lines);
   if (!rows.column("stamp_ns")) {
     session->missing.emplace_back(
         "poses.csv has no head that names its columns: status, inliers and times of the frames are "
@@ -275,52 +323,34 @@ bool read_poses(const fs::path& folder, std::size_t most, Session* session) {
   constexpr std::uintmax_t kLine = 200;  // bytes, about
   std::error_code error;
   if (const auto size = fs::file_size(folder / "poses.csv", error); !error)
-    session->frames.reserve(std::min(most, static_cast<std::size_t>(size / kLine)));
-  std::size_t unreadable = 0, disordered = 0;
-  while (rows.next()) {
-    if (session->frames.size() == most) {
-      leave_out("poses.csv", most, session);
-      break;
-    }
-    const auto frame = columns.read(rows, session);
-    if (!frame)
-      ++unreadable;
-    else if (!session->frames.empty() && frame->stamp <= session->frames.back().stamp)
-      ++disordered;
-    else
-      session->frames.push_back(*frame);
-  }
-  report_damage("poses.csv", *lines, rows.torn_rows() + unreadable, disordered, session);
+    session->frames.reserve(std::min(kMaxFrames, static_cast<std::size_t>(size / kLine)));
+  const auto next = [&](std::optional<Frame>* frame) {
+    if (!rows.next()) return false;
+    *frame = columns.read(rows, session);
+    return true;
+  };
+  read_rows("poses.csv", kMaxFrames, *lines, next, &session->frames, session);
   return true;
 }
 
 std::vector<StampedPose> read_trajectory_part(const fs::path& folder, const char* name,
-                                              const char* consequence, std::size_t most,
-                                              Session* session) {
+                                              const char* consequence, Session* session) {
   std::vector<StampedPose> poses;
   auto lines = open_part(folder / name, consequence, session);
   if (!lines) return poses;
-  std::size_t damaged = 0, disordered = 0;
-  for (std::string_view line; lines->next(&line);) {
-    if (poses.size() == most) {
-      leave_out(name, most, session);
-      break;
-    }
-    const auto pose = tum_pose(line);
-    if (!pose)
-      ++damaged;
-    else if (!poses.empty() && pose->stamp <= poses.back().stamp)
-      ++disordered;
-    else
-      poses.push_back(*pose);
-  }
-  report_damage(name, *lines, damaged, disordered, session);
+  const auto next = [&lines](std::optional<StampedPose>* pose) {
+    std::string_view line;
+    if (!lines->next(&line)) return false;
+    *pose = tum_pose(line);
+    return true;
+  };
+  read_rows(name, kMaxFrames, *lines, next, &poses, session);
   return poses;
 }
 
-void frames_from_trajectory(const fs::path& folder, std::size_t most, Session* session) {
+void frames_from_trajectory(const fs::path& folder, Session* session) {
   for (const StampedPose& p :
-       read_trajectory_part(folder, "trajectory.tum", "there is no trajectory", most, session)) {
+       read_trajectory_part(folder, "trajectory.tum", "there is no trajectory", session)) {
     Frame f;
     f.stamp = p.stamp;
     f.posed = true;
@@ -339,43 +369,45 @@ bool read_six(const CsvRows& rows, const char* prefix, std::array<double, 6>* ou
   return true;
 }
 
+std::optional<CalibrationRow> read_calibration_row(const CsvRows& rows) {
+  const auto text = [&rows](const char* name) { return rows.text(rows.column(name)); };
+  const auto number = [&rows](const char* name) {
+    return rows.number(rows.column(name)).value_or(kNone);
+  };
+  CalibrationRow c;
+  const auto stamp = rows.integer(rows.column("stamp_ns"));
+  const auto camera = rows.integer(rows.column("camera"));
+  if (!stamp || !camera || *camera < 1 || *camera >= kMaxCameras || !read_six(rows, "", &c.value))
+    return std::nullopt;
+  c.stamp = Stamp(*stamp);
+  c.camera = static_cast<int>(*camera);
+  c.accepted = text("outcome") == "accepted";
+  c.kept = text("outcome") == "unchanged";
+  c.cause = text("cause").substr(0, kLongestText);
+  c.reason = text("reason").substr(0, kLongestText);
+  c.frames = rows.integer(rows.column("frames")).value_or(0);
+  c.latency_frames = number("latency_frames");
+  c.decided = std::isfinite(c.latency_frames);
+  c.held_out_before_px = number("held_out_before_px");
+  c.held_out_after_px = number("held_out_after_px");
+  c.reference_depth_m = number("reference_depth_m");
+  c.depth_sigma_percent = number("depth_sigma_percent");
+  c.depth_error_percent = number("depth_error_percent");
+  c.has_sigma = read_six(rows, "sigma_total_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
+  return c;
+}
+
 void read_calibrations(const fs::path& folder, Session* session) {
   auto lines =
       open_part(folder / "calibrations.csv", "how the calibration changed is not known", session);
   if (!lines) return;
-  CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
-  std::size_t unreadable = 0;
-  while (rows.next()) {
-    if (session->calibrations.size() == kMaxCalibrations) {
-      leave_out("calibrations.csv", kMaxCalibrations, session);
-      break;
-    }
-    CalibrationRow c;
-    const auto stamp = rows.integer(rows.column("stamp_ns"));
-    const auto camera = rows.integer(rows.column("camera"));
-    if (!stamp || !camera || *camera < 1 || *camera >= kMaxCameras ||
-        !read_six(rows, "", &c.value)) {
-      ++unreadable;
-      continue;
-    }
-    c.stamp = Stamp(*stamp);
-    c.camera = static_cast<int>(*camera);
-    c.accepted = rows.text(rows.column("outcome")) == "accepted";
-    c.kept = rows.text(rows.column("outcome")) == "unchanged";
-    c.cause = rows.text(rows.column("cause")).substr(0, kLongestText);
-    c.reason = rows.text(rows.column("reason")).substr(0, kLongestText);
-    c.frames = rows.integer(rows.column("frames")).value_or(0);
-    c.latency_frames = rows.number(rows.column("latency_frames")).value_or(kNone);
-    c.decided = std::isfinite(c.latency_frames);
-    c.held_out_before_px = rows.number(rows.column("held_out_before_px")).value_or(kNone);
-    c.held_out_after_px = rows.number(rows.column("held_out_after_px")).value_or(kNone);
-    c.reference_depth_m = rows.number(rows.column("reference_depth_m")).value_or(kNone);
-    c.depth_sigma_percent = rows.number(rows.column("depth_sigma_percent")).value_or(kNone);
-    c.depth_error_percent = rows.number(rows.column("depth_error_percent")).value_or(kNone);
-    c.has_sigma = read_six(rows, "sigma_total_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
-    session->calibrations.push_back(std::move(c));
-  }
-  report_damage("calibrations.csv", *lines, rows.torn_rows() + unreadable, 0, session);
+  CsvRows rows(&*lines);
+  const auto next = [&rows](std::optional<CalibrationRow>* row) {
+    if (!rows.next()) return false;
+    *row = read_calibration_row(rows);
+    return true;
+  };
+  read_rows("calibrations.csv", kMaxCalibrations, *lines, next, &session->calibrations, session);
 }
 
 std::optional<Event> parse_event(std::string_view line) {
@@ -393,17 +425,13 @@ std::optional<Event> parse_event(std::string_view line) {
 void read_events(const fs::path& folder, Session* session) {
   auto lines = open_part(folder / "events.jsonl", "the events of the run are unknown", session);
   if (!lines) return;
-  std::size_t damaged = 0;
-  for (std::string_view line; lines->next(&line);) {
-    if (session->events.size() == kMaxEvents) {
-      ++session->events_dropped;
-    } else if (auto event = parse_event(line)) {
-      session->events.push_back(std::move(*event));
-    } else {
-      ++damaged;
-    }
-  }
-  report_damage("events.jsonl", *lines, damaged, 0, session);
+  const auto next = [&lines](std::optional<Event>* event) {
+    std::string_view line;
+    if (!lines->next(&line)) return false;
+    *event = parse_event(line);
+    return true;
+  };
+  read_rows("events.jsonl", kMaxEvents, *lines, next, &session->events, session);
 }
 
 void read_summary(const fs::path& folder, Session* session) {
@@ -474,7 +502,7 @@ bool is_live(const Session& session) {
          session.summary["time"].is_object();
 }
 
-Session read_session(const fs::path& folder, std::size_t max_frames) {
+Session read_session(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
     throw InputError(folder.string() +
@@ -487,13 +515,12 @@ Session read_session(const fs::path& folder, std::size_t max_frames) {
   Session session;
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);
-  if (!read_poses(folder, max_frames, &session) || session.frames.empty())
-    frames_from_trajectory(folder, max_frames, &session);
+  if (!read_poses(folder, &session) || session.frames.empty())
+    frames_from_trajectory(folder, &session);
   // Where there was nothing to compare with there is no such file.
   if (fs::exists(folder / "reference.tum", error) || number_at(session.summary, "metrics.ate_m"))
-    session.reference = read_trajectory_part(folder, "reference.tum",
-                                             "there is nothing to compare the trajectory with",
-                                             max_frames, &session);
+    session.reference = read_trajectory_part(
+        folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
   read_events(folder, &session);

@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -18,62 +16,6 @@
 #include "core/types/stamped_pose.hpp"
 
 namespace vergence::app::report {
-
-/// The lines of a file one after the other as Lines gives those of a text, whatever the file's
-/// length. What follows the last line's end is left out: a killed writer leaves it, and a number
-/// cut in the middle looks like another one.
-///
-/// Memory  The longest line; one beyond kLongestLine is passed over.
-/// Errors  The constructor throws InputError: not there, no file, not readable.
-class FileLines {
- public:
-  static constexpr std::size_t kLongestLine = std::size_t{1} << 20U;  // bytes
-
-  explicit FileLines(const std::filesystem::path& file);
-  /// False at the end. The view holds until the next call.
-  [[nodiscard]] bool next(std::string_view* line);
-  /// At the end: the file does not end with a line's end.
-  [[nodiscard]] bool torn() const noexcept { return torn_; }
-  /// At the end: the rest could not be read.
-  [[nodiscard]] bool failed() const noexcept { return in_.bad(); }
-
- private:
-  std::ifstream in_;
-  std::string line_{};
-  bool begun_ = false, torn_ = false;
-};
-
-/// Rows of a table whose first line names the columns, commas between, nothing quoted: what the
-/// recorder writes.
-///
-/// Ownership  Fields are views into the line last given.
-/// Errors     A row with another number of fields than the head is passed over and counted.
-class CsvRows {
- public:
-  /// Gives the next line; false at the end.
-  using NextLine = std::function<bool(std::string_view*)>;
-  explicit CsvRows(NextLine next_line);
-  /// Position of a column by its name; nothing when the table lacks it.
-  [[nodiscard]] std::optional<std::size_t> column(std::string_view name) const noexcept;
-  /// False at the end.
-  [[nodiscard]] bool next();
-
-  /// Field of the last row; empty if the column does not exist.
-  [[nodiscard]] std::string_view text(std::optional<std::size_t> column) const noexcept;
-  /// Nothing: empty, or not one finite number.
-  [[nodiscard]] std::optional<double> number(std::optional<std::size_t> column) const noexcept;
-  [[nodiscard]] std::optional<std::int64_t> integer(
-      std::optional<std::size_t> column) const noexcept;
-
-  [[nodiscard]] std::size_t torn_rows() const noexcept { return torn_; }
-
- private:
-  static constexpr std::size_t kMaxColumns = 256;
-  NextLine next_line_;
-  std::vector<std::string> names_;
-  std::vector<std::string_view> fields_;
-  std::size_t torn_ = 0;
-};
 
 inline constexpr double kNone =
     std::numeric_limits<double>::quiet_NaN();  // a number that is not there
@@ -131,8 +73,7 @@ struct Session {
   std::vector<StampedPose> reference{};  // reference.tum
   std::vector<CalibrationRow> calibrations{};
   std::vector<Event> events{};
-  std::size_t events_dropped = 0;  // beyond kMaxEvents
-  nlohmann::json summary{};        // null when it is missing or no JSON
+  nlohmann::json summary{};  // null when it is missing or no JSON
   std::optional<CalibrationFile> calibration{};
   std::vector<std::string> missing{};   // messages
   std::vector<std::string> left_out{};  // the same of files that are longer than is read
@@ -154,8 +95,7 @@ inline constexpr std::size_t kLongestText =
 
 /// Reads what is there, line by line: no file is held in memory. Errors  InputError: `folder` is no
 /// folder, or none of a session's files is in it.
-[[nodiscard]] Session read_session(const std::filesystem::path& folder,
-                                   std::size_t max_frames = kMaxFrames);
+[[nodiscard]] Session read_session(const std::filesystem::path& folder);
 
 /// It was recorded from devices; else it is a replay, or nobody knows.
 [[nodiscard]] bool is_live(const Session& session);

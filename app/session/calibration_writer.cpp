@@ -1,7 +1,5 @@
 #include "app/session/calibration_writer.hpp"
 
-#include <pthread.h>
-
 #include <cstring>
 #include <string_view>
 #include <utility>
@@ -17,23 +15,20 @@ constexpr std::size_t kPending = std::size_t{1} << 18;  // bytes: some 300 lines
 }  // namespace
 
 CalibrationWriter::CalibrationWriter(Options options)
-    : options_(std::move(options)), lines_(options_.session / "calibrations.csv", kPending) {
+    : options_(std::move(options)),
+      lines_(options_.session / "calibrations.csv", kPending),
+      thread_(options_.when_full) {
   totals_.attempts.reserve(kMaxAttempts);
   lines_.append(std::string(kCalibrationsHeader) + "\n");
-  thread_ = std::thread([this] { work(); });
+  thread_.start(
+      "vergence-state", [this] { (void)lines_.flush(); },
+      [this](const Item* item) {
+        if (item != nullptr) take(*item);
+      });
 }
 
 void CalibrationWriter::post(const Item& item) noexcept {
-  for (;;) {
-    const WakeEvent::Ticket seen = freed_.ticket();
-    if (waiting_.push(item)) break;
-    if (!options_.wait_when_full) {
-      ++dropped_;
-      return;
-    }
-    freed_.wait(seen);
-  }
-  filled_.signal();
+  if (!thread_.post(item)) ++dropped_;
 }
 
 void CalibrationWriter::on_event(const EventRecord& event) noexcept {
@@ -44,30 +39,10 @@ void CalibrationWriter::on_calibration(const CalibrationRecord& calibration) noe
   post(calibration);
 }
 
-void CalibrationWriter::stop() noexcept {
-  if (!thread_.joinable()) return;
-  stop_.store(true, std::memory_order_release);
-  filled_.signal();
-  thread_.join();
-}
-
-void CalibrationWriter::work() {
-  (void)pthread_setname_np(pthread_self(), "vergence-state");
+void CalibrationWriter::take(const Item& item) {
+  std::visit([this](const auto& value) { write(value); }, item);
   (void)lines_.flush();
-  for (Item item;;) {
-    const WakeEvent::Ticket seen = filled_.ticket();
-    const bool stopping = stop_.load(std::memory_order_acquire);  // before the ring
-    if (waiting_.pop(&item)) {
-      freed_.signal();
-      std::visit([this](const auto& value) { write(value); }, item);
-      (void)lines_.flush();
-      lines_.write_back();
-    } else if (stopping) {
-      return;
-    } else {
-      filled_.wait(seen);
-    }
-  }
+  lines_.write_back();
 }
 
 void CalibrationWriter::write(const CalibrationRecord& c) {
@@ -131,7 +106,7 @@ void CalibrationWriter::write_session_file(const RigCalibration& rig) {
 }
 
 void CalibrationWriter::close(const RigCalibration* in_use, std::vector<std::string>* faults) {
-  stop();
+  thread_.stop();
   if (in_use != nullptr) write_session_file(*in_use);
   if (!fault_.empty()) faults->push_back(fault_);
   const bool good = lines_.close();

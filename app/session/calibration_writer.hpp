@@ -1,19 +1,17 @@
 #pragma once
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <thread>
 #include <variant>
 #include <vector>
 
 #include "app/config/calibration_file.hpp"
+#include "app/runtime/queue_thread.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
 #include "core/memory/ring.hpp"
-#include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
 
@@ -51,7 +49,7 @@ class CalibrationWriter final : public SessionObserver {
     std::filesystem::path session{};  // its folder
     CalibrationFile content{};        // names and serials, what the configuration says, the source
     std::optional<std::filesystem::path> state{};  // nothing: the next drive is not to know
-    bool wait_when_full = false;
+    WhenFull when_full = WhenFull::drop;
   };
   /// Outcome of writing the state file: the event `calibration_saved` or `calibration_save_failed`.
   struct Outcome {
@@ -60,7 +58,7 @@ class CalibrationWriter final : public SessionObserver {
   };
 
   explicit CalibrationWriter(Options options);
-  ~CalibrationWriter() override { stop(); }
+  ~CalibrationWriter() override { thread_.stop(); }
 
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
@@ -81,8 +79,7 @@ class CalibrationWriter final : public SessionObserver {
   using Item = std::variant<CalibrationRecord, Stamp>;  // a Stamp: what is in use is confirmed then
 
   void post(const Item& item) noexcept;
-  void stop() noexcept;
-  void work();
+  void take(const Item& item);
   void write(const CalibrationRecord& calibration);
   void write(Stamp confirmed);
   void keep(Stamp stamp, const RigCalibration& rig, bool found);
@@ -90,10 +87,7 @@ class CalibrationWriter final : public SessionObserver {
 
   const Options options_;
   LineFile lines_;
-  Ring<Item, kMaxWaiting> waiting_;
   Ring<Outcome, 2 * kMaxWaiting> outcomes_;
-  WakeEvent filled_, freed_;
-  std::atomic<bool> stop_{false};
   std::uint64_t dropped_ = 0;  // of the producer
 
   // Used by the writer's thread, and by the owner after joining it.
@@ -101,7 +95,7 @@ class CalibrationWriter final : public SessionObserver {
   std::optional<RigCalibration> unconfirmed_{};  // what the drive began with
   std::string fault_;                            // of calibration.yaml; empty: it is whole
   CalibrationTotals totals_{};
-  std::thread thread_;
+  QueueThread<Item, kMaxWaiting> thread_;
 };
 
 }  // namespace vergence::app

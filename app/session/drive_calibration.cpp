@@ -233,23 +233,15 @@ std::string describe(const DriveCalibration& found) {
   return text;
 }
 
-ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
+ExitCode calibrate_from_drive(ReplayRequest r, const std::filesystem::path& out) {
   const Configuration& c = r.configuration;
-  const CalibrationUse use{true, r.baseline.value_or(0)};
-  std::vector<std::string> remarks;
-  // Only intrinsics and baseline length are read: how its cameras sit need not be
-  // known.
-  const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
-  const StereoSequence sequence =
-      r.calibration
-          ? open_sequence(r.format, r.data, given_calibration(*r.calibration, use, &remarks), use,
-                          cameras, r.topics)
-          : open_sequence(r.format, r.data, std::nullopt, use, cameras, r.topics);
-  for (const std::string& message : remarks) std::cerr << "vergence: " << message << '\n';
+  // Only intrinsics and baseline length are read: how its cameras sit need not be known.
+  r.from_scratch = true;
+  const StereoSequence sequence = open_drive(r);
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration given = replayed_calibration(c, sequence, true);
   const SignalGuard signals;
-  Progress progress = Progress::on_stderr(r.quiet);
+  Progress progress = Progress::on_stderr(r.session.quiet);
   for (const std::string& message : sequence.remarks) progress.print("vergence: " + message);
   if (!sequence.assumptions.empty())
     progress.print(fmt::format("vergence: assumed: {}", fmt::join(sequence.assumptions, "; ")));
@@ -263,13 +255,13 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
   CalibrationFile written = given.file;
   written.rig = *found.rig;
   written.source = "drive";
-  write_calibration(r.out, written);
+  write_calibration(out, written);
   std::cout << describe(found);
   if (!found.verified)
     progress.print(
         "vergence: the depth is not known well enough: a longer drive with turns, past things near "
         "the road, would help");
-  progress.print(r.out.string() + ": written");
+  progress.print(out.string() + ": written");
   return found.verified ? ExitCode::done : ExitCode::not_usable;
 }
 

@@ -10,6 +10,7 @@
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/signals.hpp"
+#include "app/session/replay_session.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "core/calibration/agreement.hpp"
 #include "core/calibration/rig_solver.hpp"
@@ -63,27 +64,16 @@ struct DrivePass {
 /// how far the stretches agree.
 [[nodiscard]] std::string describe(const DriveCalibration& found);
 
-/// `vergence calibrate sequence`: an ordinary recorded drive instead of a target.
-struct DriveCalibrationRequest {
-  std::filesystem::path data;
-  SequenceFormat format = SequenceFormat::kitti;
-  BagTopics topics{};                      // of a bag
-  std::filesystem::path out;               // calibration.yaml to write
-  std::optional<std::string> calibration;  // lenses and length to begin with, of any program
-  std::optional<double> baseline;          // m: instead of the file's
-  Configuration configuration;
-  bool quiet = false;
-};
-
-/// Calibrates, writes the file and prints what was found on standard output.
-/// → done, not_usable (nothing was found, or the depth is not known well enough)
-/// Errors  InputError: data, calibration, a file that cannot be written.
+/// `vergence calibrate sequence`: from an ordinary recorded drive instead of a target; of its own
+/// or the given calibration lenses and length are read. Writes the file and prints what was found
+/// on standard output. → done, not_usable (nothing was found, or the depth is not known well
+/// enough) Errors  InputError: data, calibration, a file that cannot be written.
 ///
-///     DriveCalibrationRequest request;
+///     ReplayRequest request;
 ///     request.data = "MH_01_easy";
 ///     request.format = SequenceFormat::euroc;
-///     request.out = "calibration.yaml";
-///     const ExitCode code = calibrate_from_drive(request);
-[[nodiscard]] ExitCode calibrate_from_drive(const DriveCalibrationRequest& request);
+///     const ExitCode code = calibrate_from_drive(request, "calibration.yaml");
+[[nodiscard]] ExitCode calibrate_from_drive(ReplayRequest request,
+                                            const std::filesystem::path& out);
 
 }  // namespace vergence::app

@@ -111,7 +111,7 @@ constexpr double kMinHeld = 16;  // frames that wait: a replay waits for room
 /// Size of the estimator thread's queue, which holds images while the disk stalls.
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
   if (c.record.images == 0) return kSmall;
-  const double held = facts.when_full == Recorder::WhenFull::wait ? 0 : kDiskS * c.trigger.rate;
+  const double held = facts.when_full == WhenFull::wait ? 0 : kDiskS * c.trigger.rate;
   return kSmall + static_cast<std::size_t>(frame_bytes(facts) * std::max(held, kMinHeld));
 }
 
@@ -122,8 +122,7 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
   o.files.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
-  o.when_full = facts.when_full == Recorder::WhenFull::wait ? Recording::WhenFull::wait
-                                                            : Recording::WhenFull::drop;
+  o.when_full = facts.when_full;
   return o;
 }
 

@@ -60,7 +60,7 @@ struct SourceIns {
 struct SourceFacts {
   StartingCalibration begin{};
   Adoption adoption = Adoption::after_fixed_frames;
-  Recorder::WhenFull when_full = Recorder::WhenFull::wait;
+  WhenFull when_full = WhenFull::wait;     // the session's files fall behind
   std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
   std::uint64_t frames = 0;                // of the whole drive; 0 if unknown
   Stamp first{};                           // of the drive

@@ -11,13 +11,6 @@
 /// applied.
 namespace vergence::app {
 
-/// One reading on the session's clock (`sample.stamp`): a line of ins.csv. Plain, goes through a
-/// ring.
-struct InsRecord {
-  InsSample sample{};
-  InsQuality quality{};
-};
-
 /// Columns of a line, in this order. Degrees for places, m and m/s east-north-up, the attitude a
 /// Hamilton quaternion from the INS's body (forward, left, up) to east-north-up, sigmas in m, m/s,
 /// degrees, `status` the device's own word. Empty where the device told nothing. A position has

@@ -66,8 +66,9 @@ void LiveSource::make_acquisition() {
         starting_exposure(configuration_, 0), request_.fast);
   }
   if (!request_.fast) facts_.tie = ClockTie{o.tie_stamp, o.tie_host};
-  acquisition_ = std::make_unique<Acquisition>(
-      exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
+  o.frame_observer = exposure_.get();
+  acquisition_ =
+      std::make_unique<Acquisition>(devices_.cameras(), devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);
   // In real time the drive's start is known only when the devices are; the session's is now.
   facts_.first = request_.fast ? start_ : o.tie_stamp;
@@ -76,7 +77,7 @@ void LiveSource::make_acquisition() {
 void LiveSource::make_facts() {
   facts_.adoption = request_.fast ? Adoption::after_fixed_frames : Adoption::when_ready;
   if (!request_.fast) facts_.frame_interval = Duration::seconds(1.0 / configuration_.trigger.rate);
-  facts_.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
+  facts_.when_full = request_.fast ? WhenFull::wait : WhenFull::drop;
   facts_.frames = devices_.frames();
   if (devices_.ins() != nullptr)
     facts_.ins =
@@ -126,7 +127,7 @@ bool LiveSource::next(SourceItem* item) noexcept {
       *item = SourceFrame{frame->rig, 0};
       return true;
     }
-    if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
+    if (const auto* reading = std::get_if<InsRecord>(&in_hand_)) {
       const TimingMonitor::Message message = time_.of_reading(*reading);
       const Stamp stamp = reading->sample.stamp;
       in_hand_ = DeviceEvent{};
@@ -143,8 +144,8 @@ bool LiveSource::next(SourceItem* item) noexcept {
       *item = event_of(frame->rig.stamp, message);
       return true;
     }
-    if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
-      *item = InsRecord{reading->sample, reading->quality};
+    if (const auto* reading = std::get_if<InsRecord>(&in_hand_)) {
+      *item = *reading;
       return true;
     }
     const auto* event = std::get_if<DeviceEvent>(&in_hand_);

@@ -10,6 +10,7 @@
 
 #include "app/devices/rig_settings.hpp"
 #include "core/comparison/attitude_check.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app {
 
@@ -29,25 +30,22 @@ bool has_mount(const InsSettings& ins) {
          !std::all_of(ins.boresight_deg.begin(), ins.boresight_deg.end(), zero);
 }
 
-Duration usual_interval(const std::vector<RecordedReading>& readings) {
+Duration usual_interval(const std::vector<InsRecord>& readings) {
   std::vector<std::int64_t> ns;
   for (std::size_t i = 1; i < readings.size(); ++i)
     ns.push_back((readings[i].sample.stamp - readings[i - 1].sample.stamp).ns());
-  if (ns.empty()) return {};
-  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
-  std::nth_element(ns.begin(), middle, ns.end());
-  return Duration::nanoseconds(*middle);
+  return ns.empty() ? Duration{} : Duration::nanoseconds(median(std::span(ns)));
 }
 
 /// False: none is left.
 bool keep_around(const StereoSequence& sequence, std::size_t first, std::size_t count,
-                 std::vector<RecordedReading>* readings) {
+                 std::vector<InsRecord>* readings) {
   Stamp begin = sequence.pairs[first].stamp, end = begin;
   for (std::size_t i = first; i < first + count; ++i) {
     begin = std::min(begin, sequence.pairs[i].stamp);
     end = std::max(end, sequence.pairs[i].stamp);
   }
-  std::erase_if(*readings, [&](const RecordedReading& r) {
+  std::erase_if(*readings, [&](const InsRecord& r) {
     return r.sample.stamp < begin - kAround || r.sample.stamp > end + kAround;
   });
   return !readings->empty();
@@ -56,13 +54,12 @@ bool keep_around(const StereoSequence& sequence, std::size_t first, std::size_t 
 /// A recording's whole path is known before the first frame: an attitude that contradicts most
 /// of it is taken out from the beginning, and its heading is the course over ground. → how many
 /// readings
-std::size_t drop_contradicted(const ComparisonOptions& options,
-                              std::vector<RecordedReading>* readings) {
+std::size_t drop_contradicted(const ComparisonOptions& options, std::vector<InsRecord>* readings) {
   AttitudeCheck check;
   std::optional<LocalTangentPlane> plane;
   std::vector<std::optional<double>> courses;
   bool contradicted = false;
-  for (const RecordedReading& r : *readings) {
+  for (const InsRecord& r : *readings) {
     const InsSample& s = r.sample;
     const bool fixed = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d;
     if (fixed && s.attitude_valid && s.position.plausible()) {
@@ -197,7 +194,7 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
   facts_.first = sequence_.pairs[request.start].stamp;
   if (!ins_.readings.empty())
     facts_.ins = SourceIns{ins_.options, InsSource::recording, ins_.mount_source,
-                           ins_.readings.capacity() * sizeof(RecordedReading)};
+                           ins_.readings.capacity() * sizeof(InsRecord)};
   for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
     for (const std::string& message : *remarks)
       facts_.remarks.push_back({message, "data", !request.session.quiet});
@@ -235,10 +232,10 @@ bool RecordedSource::next(SourceItem* item) noexcept {
   }
   // Readings go before the first frame that is not older; those after the last frame at the end.
   if (next_reading_ < ins_.readings.size()) {
-    const RecordedReading& reading = ins_.readings[next_reading_];
+    const InsRecord& reading = ins_.readings[next_reading_];
     if (ended_ || reading.sample.stamp <= pair_.stamp) {
       ++next_reading_;
-      *item = InsRecord{reading.sample, reading.quality};
+      *item = reading;
       return true;
     }
   }

@@ -18,8 +18,7 @@ namespace vergence::app {
 
 /// The INS of a drive that is replayed, and how it is compared.
 struct ReplayedIns {
-  std::vector<RecordedReading>
-      readings{};  // around the frames that are replayed; empty: there is no INS
+  std::vector<InsRecord> readings{};  // around the frames that are replayed; empty: there is no INS
   ComparisonOptions options{};
   std::string mount_source{};
   std::vector<std::string> remarks{};  // messages

@@ -1,7 +1,5 @@
 #include "app/session/recorder.hpp"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -46,84 +44,46 @@ constexpr std::size_t kLongestLine = 2048;  // bytes: an event's message may be 
 }  // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
-    : options_(options), files_(std::make_unique<Files>(folder, options)), newest_(options.first) {
+    : options_(options),
+      files_(std::make_unique<Files>(folder, options)),
+      newest_(options.first),
+      thread_(options.when_full) {
   line_.reserve(kLongestLine);
   for (LineFile* file : files_->all) {
     memory_ += file->pending();
     file->append(files_->head(file));
   }
-  thread_ = std::thread([this] { work(); });
+  thread_.start(
+      "vergence-record", [this] { begin(); }, [this](const Record* record) { take(record); });
 }
 
-Recorder::~Recorder() { stop_and_join(); }
+Recorder::~Recorder() { thread_.stop(); }
 
-void Recorder::stop_and_join() noexcept {
-  if (!thread_.joinable()) return;
-  stop_.store(true, std::memory_order_release);
-  filled_.signal();
-  thread_.join();
+void Recorder::on_reading(const InsRecord& reading) noexcept {
+  if (!thread_.post(reading, kOfPoses)) ++dropped_readings_;
 }
 
-template <class Value, std::size_t N>
-bool Recorder::push(Queue<Value, N>* queue, const Value& value) noexcept {
-  for (;;) {
-    const WakeEvent::Ticket seen = freed_.ticket();
-    if (queue->ring.push(value)) break;
-    if (options_.when_full == WhenFull::drop) {
-      queue->dropped.fetch_add(1, std::memory_order_relaxed);
-      return false;
-    }
-    freed_.wait(seen);
-  }
-  queue->high_water = std::max(queue->high_water, queue->ring.size());
-  filled_.signal();
-  return true;
+void Recorder::post(const Record& record) noexcept {
+  if (!thread_.post(record)) ++dropped_records_;
 }
 
-void Recorder::post(const Record& record) noexcept { (void)push(&records_, record); }
-
-void Recorder::on_reading(const InsRecord& reading) noexcept { (void)push(&readings_, reading); }
-
-void Recorder::work() {
-  (void)pthread_setname_np(pthread_self(), "vergence-record");
-  using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::seconds kFlushInterval{1}, kWriteBack{2};
-  auto flushed = Clock::now(), written_back = flushed;
-  const auto hand_over = [&] {
-    flush();
-    flushed = Clock::now();
-    if (flushed - written_back < kWriteBack) return;
-    for (LineFile* file : files_->all) file->write_back();
-    written_back = flushed;
-  };
+void Recorder::begin() {
   flush();  // the heads of the tables
+  flushed_ = written_back_ = std::chrono::steady_clock::now();
   AllocationGuard::seal_thread();
-  for (;;) {
-    const WakeEvent::Ticket seen = filled_.ticket();
-    const bool stopping = stop_.load(
-        std::memory_order_acquire);  // before the ring: what was posted before is still found
-    if (take()) {
-      if (Clock::now() - flushed < kFlushInterval) continue;
-    } else if (stopping) {
-      break;
-    } else {
-      hand_over();
-      filled_.wait(seen);
-      continue;
-    }
-    hand_over();
-  }
 }
 
-/// The oldest record and the oldest reading, as far as there are any. False: there were none.
-bool Recorder::take() {
-  Record record;
-  InsRecord reading;
-  const bool one = records_.ring.pop(&record), other = readings_.ring.pop(&reading);
-  if (one || other) freed_.signal();
-  if (one) std::visit([this](const auto& r) { write(r); }, record);
-  if (other) write(reading);
-  return one || other;
+/// Null: nothing waits, so that lines go to the files at once; else once a second.
+void Recorder::take(const Record* record) {
+  constexpr std::chrono::seconds kFlushAtLeast{1}, kWriteBack{2};
+  if (record != nullptr) std::visit([this](const auto& r) { write(r); }, *record);
+  const auto now = std::chrono::steady_clock::now();
+  if (record != nullptr && now - flushed_ < kFlushAtLeast) return;
+  flush();
+  flushed_ = now;
+  if (now - written_back_ < kWriteBack) return;
+  for (LineFile* file : files_->all) file->write_back();
+  written_back_ = now;
 }
 
 void Recorder::write(const InsRecord& reading) {
@@ -248,7 +208,7 @@ void Recorder::read_back() {
 }
 
 std::unique_ptr<SessionTotals> Recorder::close() {
-  stop_and_join();
+  thread_.stop();
   SessionTotals& totals = totals_.totals();
   for (LineFile* file : files_->all) {
     const bool good = file->close();
@@ -263,9 +223,9 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   std::error_code ignored;
   if (!files_->has_reference) std::filesystem::remove(files_->reference.path(), ignored);
   if (options_.keep_trajectory) read_back();
-  totals.dropped_records = records_.dropped.load(std::memory_order_relaxed);
-  totals.dropped_readings = readings_.dropped.load(std::memory_order_relaxed);
-  totals.ring_high_water = records_.high_water;
+  totals.dropped_records = dropped_records_;
+  totals.dropped_readings = dropped_readings_;
+  totals.ring_high_water = thread_.high_water();
   return std::make_unique<SessionTotals>(std::move(totals));
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -8,16 +7,15 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <thread>
 #include <variant>
 #include <vector>
 
+#include "app/runtime/queue_thread.hpp"
 #include "app/session/ins_file.hpp"
 #include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
 #include "core/memory/ring.hpp"
-#include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
 
@@ -40,14 +38,13 @@ class LineFile;
 /// Memory   Fixed, whatever the length of the drive; with keep_trajectory close() reads the
 ///          trajectories back from their files.
 /// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
-///          Readings have a ring of their own: they never push out a pose.
+///          Readings leave room for poses and events.
 /// Errors   The constructor throws InputError. When the disk takes no more: an error and an event
 ///          `disk_full`; lines wait as LineFile says, and are written again every kRetry to the
 ///          files that were opened at the start. An event `disk_recovered` when all was taken, with
 ///          the number of lines lost. A file that lacks lines is a fault of the totals.
 class Recorder final : public SessionObserver {
  public:
-  enum class WhenFull : std::uint8_t { wait, drop };
   struct Options {
     WhenFull when_full = WhenFull::wait;
     bool keep_trajectory = true;
@@ -77,22 +74,12 @@ class Recorder final : public SessionObserver {
 
  private:
   static constexpr std::chrono::seconds kRetry{3};  // between two attempts to write
-  static constexpr std::size_t kRing = 128;         // records: seconds of frames with their events
-  static constexpr std::size_t kReadings = 1024;    // 2.5 s of the fastest INS
+  static constexpr std::size_t kRing = 1024;    // records: 2 s of the fastest INS and its frames
+  static constexpr std::size_t kOfPoses = 128;  // of these, that readings leave free
 
-  using Record = std::variant<FrameReport, EventRecord>;
-  /// Queue of values for the recorder's thread.
-  template <class Value, std::size_t N>
-  struct Queue {
-    Ring<Value, N> ring{};
-    std::atomic<std::uint64_t> dropped{0};
-    std::size_t high_water = 0;  // the producer's
-  };
-  /// False: dropped.
-  template <class Value, std::size_t N>
-  bool push(Queue<Value, N>* queue, const Value& value) noexcept;
-  void work();
-  bool take();
+  using Record = std::variant<FrameReport, EventRecord, InsRecord>;
+  void begin();
+  void take(const Record* record);
   void post(const Record& record) noexcept;
   void write(const FrameReport& report);
   void write(const EventRecord& event);
@@ -101,7 +88,6 @@ class Recorder final : public SessionObserver {
   void pretend(Stamp stamp);
   void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
-  void stop_and_join() noexcept;
   using ErrorMessage = std::array<char, 512>;  // ends with 0, cut at the array's end
   template <class... Arguments>
   void report_error(const char* format, const Arguments&... arguments) noexcept;
@@ -117,13 +103,11 @@ class Recorder final : public SessionObserver {
   bool disk_full_ = false, pretended_ = false;
   std::chrono::steady_clock::time_point retry_due_{};  // while disk_full_
 
-  Queue<Record, kRing> records_;
-  Queue<InsRecord, kReadings> readings_;
-  WakeEvent filled_, freed_;
-  std::atomic<bool> stop_{false};
-  Ring<ErrorMessage, 16> error_messages_;  // full: the newest are lost
-  std::vector<std::string> errors_;        // of close()
-  std::thread thread_;
+  std::chrono::steady_clock::time_point flushed_{}, written_back_{};
+  Ring<ErrorMessage, 16> error_messages_;                     // full: the newest are lost
+  std::vector<std::string> errors_;                           // of close()
+  std::uint64_t dropped_records_ = 0, dropped_readings_ = 0;  // of the producer
+  QueueThread<Record, kRing> thread_;
 };
 
 }  // namespace vergence::app

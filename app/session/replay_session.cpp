@@ -18,7 +18,7 @@ namespace {
 /// none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
   if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
-      is_bag(request.format) || request.format == SequenceFormat::session)
+      is_bag(request.format))
     return {};  // their layouts have no truth
   const bool plain = request.format == SequenceFormat::folder;
   std::error_code ignored;
@@ -26,7 +26,7 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
     return read_tum(request.data / "truth.tum");
   if (plain && !std::filesystem::exists(request.data / "poses.txt", ignored)) return {};
   const auto files =
-      plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt", {}})
+      plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt"})
             : find_truth(request.data);
   if (!files) return {};
   if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
@@ -34,28 +34,6 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
   times.reserve(sequence.pairs.size());
   for (const StereoPair& pair : sequence.pairs) times.push_back(pair.stamp);
   return read_kitti(files->poses, times);
-}
-
-/// The drive, with the calibration that the user names, if any; remarks are said.
-StereoSequence open_drive(const ReplayRequest& request) {
-  const CalibrationUse use{request.from_scratch || request.known, request.baseline.value_or(0)};
-  const std::array cameras{request.configuration.kitti_raw.left,
-                           request.configuration.kitti_raw.right};
-  std::vector<std::string> remarks;
-  StereoSequence sequence;
-  if (request.known)
-    sequence = open_sequence(request.format, request.data, given_calibration(*request.known), use,
-                             cameras, request.topics);
-  else if (request.calibration)
-    sequence = open_sequence(request.format, request.data,
-                             given_calibration(*request.calibration, use, &remarks), use, cameras,
-                             request.topics);
-  else
-    sequence =
-        open_sequence(request.format, request.data, std::nullopt, use, cameras, request.topics);
-  if (!request.session.quiet)
-    for (const std::string& message : remarks) fmt::print(stderr, "vergence: {}\n", message);
-  return sequence;
 }
 
 /// Replaces the initial calibration by one from the sequence itself; where nothing is found
@@ -140,6 +118,20 @@ ExitCode replay_recording(const ReplayRequest& request) {
 
 }  // namespace
 
+StereoSequence open_drive(const ReplayRequest& request) {
+  std::vector<std::string> remarks;
+  SequenceOptions o;
+  o.use = {request.from_scratch || request.known, request.baseline.value_or(0)};
+  o.cameras = {request.configuration.kitti_raw.left, request.configuration.kitti_raw.right};
+  o.topics = request.topics;
+  if (request.known) o.calibration = given_calibration(*request.known);
+  if (request.calibration) o.calibration = given_calibration(*request.calibration, o.use, &remarks);
+  StereoSequence sequence = open_sequence(request.format, request.data, o);
+  if (!request.session.quiet)
+    for (const std::string& message : remarks) fmt::print(stderr, "vergence: {}\n", message);
+  return sequence;
+}
+
 std::vector<std::string> recorded_settings(const std::filesystem::path& session) {
   // Settings that affect poses; those of the simulated rig and the recording stay as recorded.
   constexpr std::array kept{"odometry.",        "calibration.",       "monitor.", "comparison.",
@@ -155,7 +147,7 @@ std::vector<std::string> recorded_settings(const std::filesystem::path& session)
 
 ExitCode run_replay(const ReplayRequest& request) {
   if (request.format == SequenceFormat::session && !request.calibrate_first && !request.known)
-    return replay_recording(request);
+    return replay_recording(request);  // with these open_drive() says how else
   StereoSequence sequence = open_drive(request);
   if (request.start >= sequence.pairs.size())
     throw InputError(

@@ -29,6 +29,10 @@ struct ReplayRequest {
   Configuration configuration;
 };
 
+/// The drive of a request, with the calibration that the user names, if any. What a calibration's
+/// format did not carry over is said on stderr. InputError: as open_sequence().
+[[nodiscard]] StereoSequence open_drive(const ReplayRequest& request);
+
 /// KEY=VALUE of the configuration that a recorded session was driven with, as far as poses depend
 /// on them. InputError: as RecordedSession::open().
 [[nodiscard]] std::vector<std::string> recorded_settings(const std::filesystem::path& session);

@@ -190,9 +190,8 @@ void SessionRunner::open_files() {
   to_record.ins = loop_.comparison() != nullptr;
   to_record.disk_full = facts_.disk_full;
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
-  calibrations_ = std::make_unique<CalibrationWriter>(
-      CalibrationWriter::Options{request_.out, facts_.begin.file, facts_.begin.state,
-                                 facts_.when_full == Recorder::WhenFull::wait});
+  calibrations_ = std::make_unique<CalibrationWriter>(CalibrationWriter::Options{
+      request_.out, facts_.begin.file, facts_.begin.state, facts_.when_full});
   observers_ = {recorder_.get(), calibrations_.get()};
   observers_.insert(observers_.end(), request_.observers.begin(), request_.observers.end());
   if (configuration_.record.any()) {

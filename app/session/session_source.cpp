@@ -45,7 +45,7 @@ SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSessi
   facts.first = session.frames()[first].given.stamp;
   if (d.ins && !session.readings().empty())
     facts.ins = SourceIns{comparison_options(request.configuration), InsSource::recording,
-                          d.mount_source, session.readings().capacity() * sizeof(RecordedReading)};
+                          d.mount_source, session.readings().capacity() * sizeof(InsRecord)};
   for (const std::string& message : session.remarks())
     facts.remarks.push_back({message, "data", !request.session.quiet});
   if (as_then && !session.complete())
@@ -116,8 +116,7 @@ bool SessionSource::next(SourceItem* item) noexcept {
                                : end_ == session_.frames().size() ? session_.readings().size()
                                                                   : next_reading_;
   if (facts_.ins && next_reading_ < readings) {
-    const RecordedReading& reading = session_.readings()[next_reading_++];
-    *item = InsRecord{reading.sample, reading.quality};
+    *item = session_.readings()[next_reading_++];
     return true;
   }
   if (!frames_left) return false;

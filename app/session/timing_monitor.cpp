@@ -102,7 +102,7 @@ TimingMonitor::Message TimingMonitor::of_set(const SyncedSet& set) noexcept {
                  verifies_pairing(mode_) ? "; one image is used alone" : "");
 }
 
-TimingMonitor::Message TimingMonitor::of_reading(const AcquiredReading& reading) noexcept {
+TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexcept {
   constexpr int kMany = 3;  // satellites: one more or less is not worth a word
   const InsQuality& q = reading.quality;
   const int count = q.satellites;
@@ -125,7 +125,7 @@ TimingMonitor::Message TimingMonitor::of_reading(const AcquiredReading& reading)
                                   : ", filter not valid");
 }
 
-TimingMonitor::Message TimingMonitor::of_utc(const AcquiredReading& reading) noexcept {
+TimingMonitor::Message TimingMonitor::of_utc(const InsRecord& reading) noexcept {
   constexpr double kStep = 0.1;  // s: a clock that was set
   if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
   const double ahead =

@@ -30,7 +30,7 @@ class TimingMonitor {
   [[nodiscard]] Message of_set(const SyncedSet& set) noexcept;
   /// A reading: tells when what the receiver and the filter say has changed, and of the
   /// session's stamps against UTC.
-  [[nodiscard]] Message of_reading(const AcquiredReading& reading) noexcept;
+  [[nodiscard]] Message of_reading(const InsRecord& reading) noexcept;
 
   /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,
   /// meaningless in virtual time.
@@ -41,7 +41,7 @@ class TimingMonitor {
                                             const DriveDevices& devices) const;
 
  private:
-  [[nodiscard]] Message of_utc(const AcquiredReading& reading) noexcept;
+  [[nodiscard]] Message of_utc(const InsRecord& reading) noexcept;
 
   SyncMode mode_;
   bool virtual_;

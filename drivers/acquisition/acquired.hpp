@@ -18,12 +18,6 @@ struct AcquiredFrame {
   SyncedSet set{};  // the slots, and what the synchroniser knows of them
 };
 
-/// A reading of the INS, its stamp and the stamp's error bound mapped from the device's clock.
-struct AcquiredReading {
-  InsSample sample{};
-  InsQuality quality{};
-};
-
 /// Something that happened to a device.
 struct DeviceEvent {
   enum class Kind : std::uint8_t {
@@ -40,6 +34,15 @@ struct DeviceEvent {
   double seconds = 0;  // verified: since the first frame that was not
 };
 
+/// Receives every whole frame of a camera when it is taken, before it is paired.
+///
+/// Threads  The acquisition's; the call must not wait.
+class FrameObserver {
+ public:
+  virtual ~FrameObserver() = default;
+  virtual void on_frame(std::size_t camera, const Frame& frame) noexcept = 0;
+};
+
 /// Receives the trigger board's pulses as they arrive, to record them.
 ///
 /// Threads  The acquisition's; the call must not wait.
@@ -51,11 +54,11 @@ class PulseObserver {
   virtual void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept = 0;
 };
 
-using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;
+using Acquired = std::variant<AcquiredFrame, InsRecord, DeviceEvent>;
 
 [[nodiscard]] inline Stamp stamp_of(const Acquired& item) noexcept {
   if (const auto* frame = std::get_if<AcquiredFrame>(&item)) return frame->rig.stamp;
-  if (const auto* reading = std::get_if<AcquiredReading>(&item)) return reading->sample.stamp;
+  if (const auto* reading = std::get_if<InsRecord>(&item)) return reading->sample.stamp;
   return std::get_if<DeviceEvent>(&item)->stamp;
 }
 

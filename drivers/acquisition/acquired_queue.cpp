@@ -10,7 +10,7 @@ void AcquiredQueue::push(const Item& item) noexcept {
     const WakeEvent::Ticket seen = freed_.ticket();
     if (ring_.push(item)) break;
     if (stopped_.load(std::memory_order_acquire)) return;
-    if (!wait_when_full_ && std::holds_alternative<AcquiredReading>(item)) {
+    if (!wait_when_full_ && std::holds_alternative<InsRecord>(item)) {
       dropped_readings_.fetch_add(1, std::memory_order_relaxed);
       return;
     }
@@ -43,7 +43,7 @@ bool AcquiredQueue::next(Acquired* out) noexcept {
       continue;
     }
     freed_.signal();
-    if (const auto* reading = std::get_if<AcquiredReading>(&item)) {
+    if (const auto* reading = std::get_if<InsRecord>(&item)) {
       *out = *reading;
       return true;
     }

@@ -33,7 +33,7 @@ class AcquiredQueue {
   struct Refused {
     SyncedSet set{};
   };
-  using Item = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent, Refused>;
+  using Item = std::variant<AcquiredFrame, InsRecord, DeviceEvent, Refused>;
 
   /// `cameras`: in the order of the rig; the vector outlives it.
   AcquiredQueue(const std::vector<CameraDevice*>& cameras, bool wait_when_full) noexcept

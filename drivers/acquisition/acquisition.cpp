@@ -126,7 +126,14 @@ void Acquisition::work() {
 
 void Acquisition::poll() {
   const bool always = options_.wait_when_full;
-  for (auto& head : heads_) head.poll(this, always);
+  for (std::size_t k = 0; k < heads_.size(); ++k) {
+    auto& head = heads_[k];
+    const bool held = head.held;
+    head.poll(this, always);
+    if (options_.frame_observer != nullptr && !held && head.held && !head.event &&
+        head.value.status == FrameStatus::complete)
+      options_.frame_observer->on_frame(k, head.value);
+  }
   poll_ins();
   board_head_.poll(this, always);
 }
@@ -216,7 +223,7 @@ void Acquisition::push_reading() {
   const InsReading& r = ins_head_.value;
   const MappedStamp at =
       r.mapped ? MappedStamp{r.host, r.host_error} : ins_clock_->map(r.measured, r.arrival);
-  AcquiredReading item{r.sample, r.quality};
+  InsRecord item{r.sample, r.quality};
   item.sample.stamp = stamp_of(at.host);
   item.sample.stamp_error = at.error;
   counters_.ins.observe(r.measured, at);

@@ -85,6 +85,7 @@ class Acquisition final : private Notifier {
     HostStamp tie_host{};  // … was this time of the host's clock
     Duration stamp_grid =
         Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
+    FrameObserver* frame_observer = nullptr;  // null: no one is told of single frames
     PulseObserver* pulse_observer = nullptr;  // set by start(); null: pulses are not recorded
   };
 

@@ -96,7 +96,7 @@ cv::Mat decode(const std::filesystem::path& file, int width, int height) {
 DecodedDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
   DecodedDrive d;
   d.sequence = app::open_sequence(excerpt.format, folder);
-  d.truth = app::read_trajectory(folder);
+  d.truth = app::read_trajectory_file(folder).poses;
   const auto start = std::chrono::steady_clock::now();
   for (const app::StereoPair& p : d.sequence.pairs) {
     std::array<cv::Mat, 2> images;

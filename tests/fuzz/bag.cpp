@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/bag_in_memory.hpp"
@@ -23,7 +24,7 @@ void check(const StereoSequence& s) {
     if (s.pairs[i].stamp <= s.pairs[i - 1].stamp) std::abort();
   for (std::size_t i = 1; i < s.ins->readings.size(); ++i)
     if (s.ins->readings[i].sample.stamp <= s.ins->readings[i - 1].sample.stamp) std::abort();
-  for (const RecordedReading& r : s.ins->readings)
+  for (const InsRecord& r : s.ins->readings)
     if (r.sample.fix != FixStatus::none && !r.sample.position.plausible()) std::abort();
   std::vector<std::uint8_t> out, work;
   for (const StereoPair& pair : s.pairs)

@@ -108,10 +108,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const auto folder = folders.root.path() / Folders::name(i);
   probe([&] { check(open_sequence(layout.format, folder)); });
-  probe([&] { check(open_sequence(layout.format, folder, std::nullopt, {true, 0.5})); });
+  probe([&] { check(open_sequence(layout.format, folder, {.use = {true, 0.5}})); });
   probe([&] { check(read_recorded_ins(layout.format, folder, {0, 1}, true)); });
-  probe([&] { check(read_trajectory(folder)); });
+  probe([&] { check(read_trajectory_file(folder).poses); });
   if (layout.format == SequenceFormat::folder)
-    probe([&] { check(read_trajectory(folder / "truth.tum")); });
+    probe([&] { check(read_trajectory_file(folder / "truth.tum").poses); });
   return 0;
 }

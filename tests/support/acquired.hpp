@@ -10,8 +10,8 @@ namespace vergence::test {
 [[nodiscard]] inline const AcquiredFrame* frame_of(const Acquired& item) {
   return std::get_if<AcquiredFrame>(&item);
 }
-[[nodiscard]] inline const AcquiredReading* reading_of(const Acquired& item) {
-  return std::get_if<AcquiredReading>(&item);
+[[nodiscard]] inline const InsRecord* reading_of(const Acquired& item) {
+  return std::get_if<InsRecord>(&item);
 }
 [[nodiscard]] inline const DeviceEvent* event_of(const Acquired& item) {
   return std::get_if<DeviceEvent>(&item);

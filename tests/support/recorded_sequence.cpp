@@ -43,7 +43,7 @@ std::optional<RecordedSequence> open_recorded(const std::string& name) {
   const auto folder = shared_data("data/" + name);
   if (!folder) return std::nullopt;
   RecordedSequence d{name, app::open_sequence(app::find_format(*folder).value(), *folder), {}};
-  if (app::find_truth(*folder)) d.truth = app::read_trajectory(*folder);
+  if (app::find_truth(*folder)) d.truth = app::read_trajectory_file(*folder).poses;
   return d;
 }
 

@@ -165,7 +165,7 @@ struct SessionWriter {
           out << fmt::format(",{:.6f}", scale * sigma * (k < 3 ? 1.0 : 2.0));
       out << fmt::format(",{:.3f},450,{:.3f},240,{:.3f},{:.3f},{:.3f},0", 450 + 100 * off,
                          318 + 900 * off, 300 * sigma, 300 * sigma, 900 * sigma);
-      out << fmt::format(",{:.6f},0,0,0,{:.6f},0,0,0,20,{:.4f},{:.4f},1,1\n", 2 * off, sigma,
+      out << fmt::format(",{:.6f},0,0,0,{:.6f},0,0,0,20,{:.4f},{:.4f},1\n", 2 * off, sigma,
                          500 * sigma, 300 * off);
     };
     row(0.08, "accepted", "from_scratch", "", 0.0006, 0.0009);

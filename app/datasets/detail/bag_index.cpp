@@ -16,6 +16,7 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/text_file.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app::detail {
 namespace {
@@ -196,11 +197,8 @@ class Indexer {
     std::int64_t usual = 0;
     constexpr std::int64_t kLongestDelay =
         10'000'000'000;  // ns: else the clocks are different ones
-    if (!delays.empty()) {
-      const auto middle = delays.begin() + static_cast<std::ptrdiff_t>(delays.size() / 2);
-      std::nth_element(delays.begin(), middle, delays.end());
-      if (std::abs(*middle) < kLongestDelay) usual = *middle;
-    }
+    if (!delays.empty()) usual = median(std::span(delays));
+    if (std::abs(usual) >= kLongestDelay) usual = 0;
     for (BagImage& image : topic->images) {
       if (image.image.stamp.ns() != 0 || image.log_time <= kLongestDelay) continue;
       image.image.stamp = Stamp(image.log_time - usual);

@@ -45,8 +45,8 @@ void set_attitude(const Eigen::Quaterniond& q, InsSample* s) {
   s->attitude_valid = true;
 }
 
-RecordedReading reading_of(const RosFix& fix, std::size_t number) {
-  RecordedReading r;
+InsRecord reading_of(const RosFix& fix, std::size_t number) {
+  InsRecord r;
   r.sample.number = number;
   r.sample.stamp = fix.stamp;
   r.sample.fix = fix.fix;
@@ -60,7 +60,7 @@ RecordedReading reading_of(const RosFix& fix, std::size_t number) {
 
 /// Orientation at the fix's time from those around it; *next: the first that is not before, of the
 /// fix before on entry. False: none is near.
-bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, RecordedReading* r) {
+bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, InsRecord* r) {
   const Stamp stamp = r->sample.stamp;
   while (*next < attitudes.size() && attitudes[*next].stamp < stamp) ++*next;
   if (*next == attitudes.size()) return false;
@@ -82,7 +82,7 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, R
 
 void print_without_fix(const std::string& name, RecordedIns* ins) {
   const auto without =
-      std::count_if(ins->readings.begin(), ins->readings.end(), [](const RecordedReading& r) {
+      std::count_if(ins->readings.begin(), ins->readings.end(), [](const InsRecord& r) {
         return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
       });
   if (without > 0)
@@ -97,7 +97,7 @@ RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
   ins.readings.reserve(fixes.size());
   std::size_t next = 0, without = 0;
   for (const RosFix& fix : fixes) {
-    RecordedReading& r = ins.readings.emplace_back(reading_of(fix, ins.readings.size()));
+    InsRecord& r = ins.readings.emplace_back(reading_of(fix, ins.readings.size()));
     if (!attitude_at(attitudes, &next, &r)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));

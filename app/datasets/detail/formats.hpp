@@ -26,8 +26,6 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag,
                                          bool given, const BagTopics& topics);
 
-[[nodiscard]] StereoSequence open_recorded_session(const std::filesystem::path& folder, bool given);
-
 /// The packets of oxts/ of a KITTI raw drive as INS samples (docs/datasets.md); what is missing,
 /// broken or out of order is left out and told. InputError: files that are not there, no packet
 /// that is whole, a calibration that is none.

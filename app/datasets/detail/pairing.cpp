@@ -1,4 +1,5 @@
 #include "app/datasets/detail/pairing.hpp"
+#include "core/math/robust.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -63,9 +64,7 @@ Duration usual_interval(std::span<const Stamp> stamps) {
   for (std::size_t i = 1; i < stamps.size(); ++i)
     if (stamps[i] > stamps[i - 1]) ns.push_back(apart(stamps[i], stamps[i - 1]));
   if (ns.empty()) return Duration::milliseconds(100);
-  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
-  std::nth_element(ns.begin(), middle, ns.end());
-  return Duration::nanoseconds(*middle);
+  return Duration::nanoseconds(median(std::span(ns)));
 }
 
 std::vector<std::array<std::size_t, 2>> pair_nearest(std::span<const Stamp> left,

@@ -24,7 +24,7 @@ OwnedImage decode(const std::filesystem::path& file, const Intrinsics& camera) {
 
 StereoDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
   const app::StereoSequence sequence = app::open_sequence(excerpt.format, folder);
-  const app::Trajectory truth = app::read_trajectory(folder);
+  const app::Trajectory truth = app::read_trajectory_file(folder).poses;
   StereoDrive drive;
   drive.rig = sequence.calibration;
   for (std::size_t i = 0; i < std::min(excerpt.frames, sequence.pairs.size()); ++i) {

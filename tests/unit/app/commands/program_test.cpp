@@ -43,7 +43,7 @@ TEST(Program, renamedWordsAreRefusedWithTheirNewName) {
   }
 }
 
-TEST(Program, AnUnknownCommandNamesTheNearest) {
+TEST(Program, unknownCommandNamesNearest) {
   const Outcome outcome = run_vergence("evalute a b");
   EXPECT_TRUE(refused_in_one_message(outcome));
   EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?"))
@@ -51,13 +51,13 @@ TEST(Program, AnUnknownCommandNamesTheNearest) {
   EXPECT_TRUE(refused_in_one_message(run_vergence("''")));
 }
 
-TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {
+TEST(Program, controlCodesOfArgumentsAreRemoved) {
   const Outcome outcome = run_vergence("\"$(printf 'a\\033[2Jb\\nc')\"");
   EXPECT_TRUE(refused_in_one_message(outcome));
   EXPECT_FALSE(contains(outcome.err, "\033"));
 }
 
-TEST(Program, AStackThatIsTooSmallIsSaidBeforeItOverflows) {
+TEST(Program, smallStackIsReportedBeforeOverflow) {
   const test::Outcome o = test::run_vergence("--version", "ulimit -S -s 64;");
   EXPECT_EQ(o.code, 2);
   EXPECT_NE(o.err.find("the stack is limited to 64 kB, and 1024 are needed: raise the limit"),
@@ -65,7 +65,7 @@ TEST(Program, AStackThatIsTooSmallIsSaidBeforeItOverflows) {
       << o.err;
 }
 
-TEST(Program, AStandardOutputThatTakesNothingIsAnError) {
+TEST(Program, unwritableStandardOutputIsAnError) {
   constexpr const char* kCommand = "'" VERGENCE_PROGRAM "' --help >/dev/full 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(kCommand)), 2);
 }

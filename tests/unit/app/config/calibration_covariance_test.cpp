@@ -57,7 +57,7 @@ void expect_same(const RigCovariance& a, const RigCovariance& b) {
     for (int j = 0; j <= i; ++j) EXPECT_EQ(a(i, j), b(i, j)) << i << " " << j;
 }
 
-TEST(CalibrationCovariance, RowsGoByCameraAndParameter) {
+TEST(CalibrationCovariance, rowsGoByCameraAndParameter) {
   const RigCalibration rig =
       parse_calibration(with_block("[left.k1, right.rx, right.k4, left.k3]",
                                    "[4e-4, 1e-6, 0, 0, 1e-6, 0, 0, 9e-4, 0, 1e-4]"),
@@ -72,7 +72,7 @@ TEST(CalibrationCovariance, RowsGoByCameraAndParameter) {
   EXPECT_FALSE(rig.covariance.known(extrinsic_row(1) + 1));
 }
 
-TEST(CalibrationCovariance, WhatIsWrittenReadsBackToTheSameDoublesAndStaysACovariance) {
+TEST(CalibrationCovariance, writtenCovarianceReadsBackExactly) {
   const CalibrationFile before = example();
   const std::string text = format_calibration(before);
   EXPECT_NE(text.find("parameters: [right.rx, right.tx, right.tz, left.k1, left.k3, right.fx, "
@@ -82,7 +82,7 @@ TEST(CalibrationCovariance, WhatIsWrittenReadsBackToTheSameDoublesAndStaysACovar
   EXPECT_EQ(format_calibration(parse_calibration(text, "c.yaml")), text);
 }
 
-TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
+TEST(CalibrationCovariance, wrongCovarianceIsRefusedWithReason) {
   const std::string two = "[right.rx, right.ry]";
   struct Row {
     std::string yaml, beginning, mentions = "";
@@ -120,7 +120,7 @@ TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
   }
 }
 
-TEST(CalibrationCovariance, FromScratchTheLensesStayAndThePlacesGo) {
+TEST(CalibrationCovariance, scratchKeepsLensesAndDropsPlaces) {
   const RigCalibration before = example().rig;
   RigCalibration rig = before;
   rig.inflation = 3;

@@ -41,7 +41,7 @@ std::string refusal(const std::string& yaml) {
   return test::refusal_of([&] { (void)parse_calibration(yaml, "c.yaml"); });
 }
 
-TEST(CalibrationFile, ReadsTheDocumentedForm) {
+TEST(CalibrationFile, documentedFormIsRead) {
   const CalibrationFile c = parse_calibration(kGood, "c.yaml");
   EXPECT_EQ(c.rig_name, "demo");
   EXPECT_EQ(c.names[1], "right");
@@ -105,7 +105,7 @@ CalibrationFile awkward() {
   return c;
 }
 
-TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
+TEST(CalibrationFile, writtenFileReadsBackExactly) {
   const test::TemporaryFolder folder;
   const CalibrationFile before = awkward();
   write_calibration(folder / "c.yaml", before);
@@ -152,7 +152,7 @@ const std::string kSize = "size: [1024, 768]", kLens = "[982, 983, 510, 380]",
                   kOfDistortion = "c.yaml:9: cameras.1.distortion",
                   kOfPlace = "c.yaml:10: cameras.1.T_camera_left";
 
-TEST(CalibrationPlausibility, WhatCannotBeIsRefusedWithItsPlace) {
+TEST(CalibrationPlausibility, impossibleValuesAreRefusedWithPlace) {
   const char *size = kOfSize.c_str(), *lens = kOfLens.c_str(), *distortion = kOfDistortion.c_str(),
              *place = kOfPlace.c_str(), *baseline = "c.yaml:2: rig.baseline";
   const std::string t = "-0.75, 0, 1, 0, 0.01", lengths = "baseline: 0.750702";
@@ -214,7 +214,7 @@ TEST(CalibrationPlausibility, WhatCannotBeIsRefusedWithItsPlace) {
 }
 
 /// No cut and no changed byte of a good file may do anything but be read or be refused.
-TEST(CalibrationFile, TornAndGarbledFilesNeverEscapeAsAnythingElse) {
+TEST(CalibrationFile, tornFilesGiveInputErrorsOnly) {
   Random random(11);
   for (std::size_t length = 0; length < kGood.size(); ++length)
     static_cast<void>(refusal(kGood.substr(0, length)));
@@ -243,7 +243,7 @@ TEST(CalibrationFile, fromScratchIntrinsicsAndALengthAreEnough) {
             Vec3(-0.6, 0, 0));
 }
 
-TEST(CalibrationFile, fromScratchNothingButTheLengthOfAnOldTransformIsRead) {
+TEST(CalibrationFile, scratchReadsOnlyLengthOfOldTransform) {
   // Turned by a right angle about z and 0.5 m long: no rig that would be taken as it is.
   const std::string old =
       std::string(kNewRig).replace(std::string(kNewRig).rfind('}'), 1,

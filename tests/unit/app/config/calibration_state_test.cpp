@@ -42,7 +42,7 @@ RigSettings rig(const std::string& name, const std::string& state_dir = "") {
   return r;
 }
 
-TEST(StateFile, LiesWhereTheKeyOrTheUsersEnvironmentSays) {
+TEST(StateFile, folderFollowsKeyOrEnvironment) {
   const Environment home("HOME", "/users/anna");
   {
     const Environment state("XDG_STATE_HOME", "/var/state");
@@ -59,7 +59,7 @@ TEST(StateFile, LiesWhereTheKeyOrTheUsersEnvironmentSays) {
   EXPECT_EQ(state_file(rig("van")), std::nullopt);
 }
 
-TEST(StateFile, ARigsNameNeverLeavesTheFolder) {
+TEST(StateFile, nameOfRigNeverLeavesFolder) {
   const Environment state("XDG_STATE_HOME", "/s");
   EXPECT_EQ(state_file(rig("../../etc")), "/s/vergence/_._.._etc/calibration_state.yaml");
   EXPECT_EQ(state_file(rig("..")), "/s/vergence/_./calibration_state.yaml");
@@ -89,7 +89,7 @@ CalibrationFile configured() {
   return file;
 }
 
-TEST(StateFile, OfAnotherRigOrConfigurationIsNotUsedAndTheSentenceSaysWhy) {
+TEST(StateFile, stateOfOtherRigIsRefusedWithReason) {
   const test::TemporaryFolder folder;
   const auto path = folder / "not/there/yet/calibration_state.yaml";
   const CalibrationState first = read_state(path, configured());
@@ -128,7 +128,7 @@ TEST(StateFile, OfAnotherRigOrConfigurationIsNotUsedAndTheSentenceSaysWhy) {
   }
 }
 
-TEST(StateFile, OnlyKeysThatACalibrationDependsOnAreCompared) {
+TEST(StateFile, onlyKeysOfCalibrationAreCompared) {
   const Configuration c = parse_configuration(
       "rig: {name: van, nominal: {baseline_m: 0.5}}\n"
       "cameras: [{serial: A, exposure_us: 500}, {intrinsics: [1, 2, 3, 4], offset: [8, 0]}]\n",
@@ -140,7 +140,7 @@ TEST(StateFile, OnlyKeysThatACalibrationDependsOnAreCompared) {
             "cameras.1.intrinsics.3 cameras.1.offset.0 rig.nominal.baseline_m ");
 }
 
-TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
+TEST(StateFile, damagedStateGivesMessageOnly) {
   const test::TemporaryFolder folder;
   folder.write("calibration_state.yaml", "version: 1\ncameras: [{name: left");
   const CalibrationState state = read_state(folder / "calibration_state.yaml", two_cameras());

@@ -22,7 +22,7 @@ std::string refusal(const std::string& yaml, const std::vector<std::string>& set
   return test::refusal_of([&] { (void)parse_configuration(yaml, "drive.yaml", set); });
 }
 
-TEST(Configuration, ReadsNestedAndDottedKeys) {
+TEST(Configuration, nestedAndDottedKeysAreRead) {
   const auto c = parse_configuration(
       "rig: {name: van}\nodometry:\n  features: 400\n  band_px: 3.5\nthreads: 1\n", "drive.yaml",
       {});
@@ -33,14 +33,14 @@ TEST(Configuration, ReadsNestedAndDottedKeys) {
   EXPECT_EQ(parse_configuration("odometry.features: 401", "drive.yaml", {}).odometry.features, 401);
 }
 
-TEST(Configuration, AnUnknownKeyNamesTheNearestFileAndLine) {
+TEST(Configuration, unknownKeyNamesNearestFileAndLine) {
   EXPECT_EQ(refusal("threads: 1\nodometry:\n  featurs: 3\n"),
             "drive.yaml:3: unknown key \"odometry.featurs\"; did you mean \"odometry.features\"?");
   EXPECT_EQ(refusal("", {"thread=1"}),
             "--set thread=1: unknown key \"thread\"; did you mean \"threads\"?");
 }
 
-TEST(Configuration, ListItemsAreNamedByNumber) {
+TEST(Configuration, listItemsAreNamedByNumber) {
   const auto c = parse_configuration("cameras: [{serial: a, size: [800, 600]}, {serial: b}]",
                                      "drive.yaml", {"cameras.1.serial=c"});
   EXPECT_EQ(c.cameras[0].serial, "a");
@@ -49,7 +49,7 @@ TEST(Configuration, ListItemsAreNamedByNumber) {
   EXPECT_EQ(c.cameras[1].serial, "c");
 }
 
-TEST(Configuration, AFaultIsALineOrAGroup) {
+TEST(Configuration, faultNamesLineOrGroup) {
   const auto c = parse_configuration(
       "faults: [{at: 42.0, kind: knock, camera: 1, pitch_deg: 0.2}, 'cover@3 camera=0']",
       "drive.yaml", {});
@@ -58,7 +58,7 @@ TEST(Configuration, AFaultIsALineOrAGroup) {
   EXPECT_EQ(refusal("faults: []"), "");
 }
 
-TEST(Configuration, WhatCannotBeIsRefusedWithItsPlace) {
+TEST(Configuration, impossibleValuesAreRefusedWithPlace) {
   const std::string long_name = "rig: {name: " + std::string(65, 'x') + "}";
   for (const auto& [yaml, mentions] : std::vector<std::pair<std::string, const char*>>{
            {"odometry:\n  features: many", "drive.yaml:2: odometry.features is \"many\""},
@@ -88,7 +88,7 @@ TEST(Configuration, WhatCannotBeIsRefusedWithItsPlace) {
     EXPECT_TRUE(test::mentions(refusal(yaml), mentions)) << yaml.substr(0, 80);
 }
 
-TEST(Configuration, AliasesThatUnfoldWithoutEndAreStopped) {
+TEST(Configuration, endlesslyUnfoldingAliasesAreStopped) {
   std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
   for (int i = 1; i < 9; ++i) {
     const std::string last = "*a" + std::to_string(i - 1);
@@ -99,7 +99,7 @@ TEST(Configuration, AliasesThatUnfoldWithoutEndAreStopped) {
   EXPECT_NE(refusal(bomb), "");
 }
 
-TEST(Configuration, FilesThatCannotBeReadAreNamed) {
+TEST(Configuration, unreadableFilesAreNamed) {
   const test::TemporaryFolder folder;
   const auto message = [](const std::filesystem::path& path) {
     return test::refusal_of([&] { (void)load_configuration(path, {}); });
@@ -115,7 +115,7 @@ TEST(Configuration, FilesThatCannotBeReadAreNamed) {
   EXPECT_EQ(load_configuration(folder.write("good.yaml", "threads: 1\n"), {}).threads, 1);
 }
 
-TEST(ConfigurationHash, IsOfTheValuesNotOfTheWriting) {
+TEST(ConfigurationHash, hashDependsOnValuesNotOnWriting) {
   const auto a = parse_configuration("odometry: {band_px: 2.50}\nthreads: 1", "a.yaml", {});
   const auto b =
       parse_configuration("threads: 1 # one\nodometry:\n    band_px: 25e-1\n", "b.yaml", {});
@@ -124,7 +124,7 @@ TEST(ConfigurationHash, IsOfTheValuesNotOfTheWriting) {
   EXPECT_NE(configuration_hash(a), configuration_hash(Configuration{}));
 }
 
-TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
+TEST(Configuration, listOfRecordSwitchesItsWordsOn) {
   EXPECT_FALSE(Configuration{}.record.any());
   const auto c = parse_configuration("record: [poses, images]\n", "drive.yaml", {});
   EXPECT_EQ(c.record.poses, 1);
@@ -151,7 +151,7 @@ TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {
   EXPECT_THROW((void)parse_configuration("odometry: {preset: tiny}", "c.yaml", {}), InputError);
 }
 
-TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
+TEST(Configuration, strayBracketOrCommaIsRefused) {
   // yaml-cpp 0.7 reads empty documents there for ever.
   for (const char* text : {",a: 1}", "  ,k: 2]x", "\n, 72], m", "threads: 1\n...\n,a: 1}"}) {
     const std::string message = refusal(text);
@@ -162,7 +162,7 @@ TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
       << refusal("\n,a: 1}");
 }
 
-TEST(CameraOptionKeys, AreTypedByTheDriversTable) {
+TEST(CameraOptionKeys, typesFollowTheDriversTable) {
   const Configuration c = parse_configuration(R"(
 cameras:
   - {driver: gige, options: {packet_size: 9000, ptp: yes, feature.BlackLevel: 3}}
@@ -183,7 +183,7 @@ cameras:
       << canonical_text(c);
 }
 
-TEST(CameraOptionKeys, WhatCannotBeIsRefusedWithItsPlaceAndWhatThereIs) {
+TEST(CameraOptionKeys, impossibleOptionsNamePlaceAndChoices) {
   const auto said = [](const std::string& options) {
     return refusal("cameras:\n  - {driver: gige, options: " + options + "}\n");
   };

@@ -51,7 +51,7 @@ KeyValue value_at(const Key& key, double x) {
   return x;
 }
 
-TEST(Schema, EveryRowsRangeIsEnforcedAtBothEnds) {
+TEST(Schema, everyRangeIsEnforcedAtBothEnds) {
   int rows = 0;
   for (const Group& group : schema())
     for (const Key& key : group.keys) {
@@ -73,9 +73,10 @@ TEST(Schema, EveryRowsRangeIsEnforcedAtBothEnds) {
   EXPECT_GE(rows, 19);
 }
 
-TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
+TEST(Schema, everyKeyChangesItsOwnValueOnly) {
   for (const Group& group : schema())
     for (const Key& key : group.keys) {
+      if (key.words.size() == 1) continue;  // there is no other value
       SCOPED_TRACE(key.name);
       Configuration changed;
       const bool options = key.name.ends_with(".options");
@@ -97,7 +98,7 @@ TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
     }
 }
 
-TEST(Schema, TheDocumentIsWrittenFromTheTable) {
+TEST(Schema, documentIsWrittenFromTheTable) {
   EXPECT_EQ(file_text("docs/configuration.md"), configuration_document())
       << "write it again: ninja -C build docs";
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 
+#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
@@ -66,7 +67,7 @@ class Bag : public ::testing::TestWithParam<BagKind> {
   [[nodiscard]] StereoSequence open(const BagTopics& topics = {}) {
     writer_->finish();
     folder_.write("drive/drive_0" + GetParam().ending(), writer_->bytes());
-    return open_sequence(format(), folder_ / "drive", std::nullopt, {}, {0, 1}, topics);
+    return open_sequence(format(), folder_ / "drive", {.topics = topics});
   }
   [[nodiscard]] std::string refusal(const BagTopics& topics = {}) {
     return test::refusal_of([&] { (void)open(topics); });

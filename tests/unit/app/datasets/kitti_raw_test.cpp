@@ -90,7 +90,7 @@ void write_drive(const test::TemporaryFolder& f) {
 }
 
 StereoSequence open(const test::TemporaryFolder& f, const std::array<int, 2>& cameras = {0, 1}) {
-  return open_sequence(SequenceFormat::kitti_raw, f / kDrive, std::nullopt, {}, cameras);
+  return open_sequence(SequenceFormat::kitti_raw, f / kDrive, {.cameras = cameras});
 }
 RecordedIns ins(const test::TemporaryFolder& f) {
   return read_recorded_ins(SequenceFormat::kitti_raw, f / kDrive, {0, 1}, true);

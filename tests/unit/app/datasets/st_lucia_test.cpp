@@ -79,7 +79,11 @@ class StLuciaImages : public testing::Test {
     write_calibration(calibration_, calibration);
   }
   [[nodiscard]] StereoSequence open() const {
-    return open_sequence(SequenceFormat::st_lucia, folder_.path(), calibration_);
+    SequenceOptions options;
+    options.calibration = {calibration_.string(), [this](const StereoSequence&) {
+                             return read_calibration(calibration_);
+                           }};
+    return open_sequence(SequenceFormat::st_lucia, folder_.path(), options);
   }
 
   test::TemporaryFolder folder_;

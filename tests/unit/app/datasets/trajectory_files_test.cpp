@@ -161,19 +161,19 @@ TEST(Kitti, posesHaveTheTimesBesideThemOrNone) {
   const auto poses = folder.write("poses/06.txt", first + "0 -1 0 4 1 0 0 5 0 0 1 6\n");
   EXPECT_FALSE(read_trajectory_file(poses).timed);
   EXPECT_EQ(read_trajectory_file(poses).rows, 2U);
-  EXPECT_TRUE(
-      mentions(refusal_of([&] { (void)read_trajectory(poses); }), "put the sequence's times.txt"));
   folder.write("sequences/06/times.txt", "12.5\n1.26e+01\n");
   for (const auto& path : {poses, folder / "sequences/06", folder / "sequences/06/"}) {
-    const Trajectory t = read_trajectory(path);
+    const Trajectory t = read_trajectory_file(path).poses;
     ASSERT_EQ(t.size(), 2U) << path;
     EXPECT_EQ(t[1].stamp.ns(), 12600000000) << path;
     EXPECT_LT((t[1].T_world_body * Vec3(1, 0, 0) - Vec3(4, 6, 6)).norm(), 1e-15);
   }
   folder.write("sequences/06/times.txt", "0\n1\n2\n");
-  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory(poses); }), "has 2 poses, but "));
+  EXPECT_TRUE(
+      mentions(refusal_of([&] { (void)read_trajectory_file(poses); }), "has 2 poses, but "));
   folder.write("sequences/06/times.txt", "0\nsoon\n");
-  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory(poses); }), "times.txt:2: `soon`"));
+  EXPECT_TRUE(
+      mentions(refusal_of([&] { (void)read_trajectory_file(poses); }), "times.txt:2: `soon`"));
   const std::vector<Stamp> times = {Stamp(30), Stamp(20)};
   EXPECT_EQ(read_kitti(poses, times).front().stamp, Stamp(20)) << "in the order of time";
   EXPECT_THROW((void)read_kitti(poses, std::span(times).first(1)), InputError);
@@ -188,12 +188,12 @@ TEST(Euroc, bringsTheBodyToTheLeftCamera) {
       "1403636584763555584,1,2,3,0,1,0,0,0.1,0.2,0.3,0,0,0,0,0,0\r\n"
       "1403636584768555584,1,2,3,0,1,0,0,0.1,0.2,0.3,0,0,0,0,0,0\r\n";
   const auto alone = folder.write("alone/gt.csv", text);
-  EXPECT_EQ(read_trajectory(alone)[0].T_world_body.t, Vec3(1, 2, 3)) << "of the body";
+  EXPECT_EQ(read_trajectory_file(alone).poses[0].T_world_body.t, Vec3(1, 2, 3)) << "of the body";
   EXPECT_TRUE(mentions(read_trajectory_file(alone).remarks.at(0), "cam0/sensor.yaml"));
   folder.write("mav0/cam0/sensor.yaml", kSensor);
   const auto csv = folder.write("mav0/state_groundtruth_estimate0/data.csv", text);
   for (const auto& path : {csv, folder.path(), folder / "mav0", folder / "mav0/"}) {
-    const Trajectory t = read_trajectory(path);
+    const Trajectory t = read_trajectory_file(path).poses;
     ASSERT_EQ(t.size(), 2U) << path;
     EXPECT_EQ(t[0].stamp.ns(), 1403636584763555584);
     // Camera origin at (0.1, 0.2, 0.3) of the body, y and z turned over by the body's attitude.
@@ -201,16 +201,16 @@ TEST(Euroc, bringsTheBodyToTheLeftCamera) {
     // The camera's x axis is the body's y axis, which points along −y of the world.
     EXPECT_LT((t[0].T_world_body.R.col(0) - Vec3(0, -1, 0)).norm(), 1e-15);
   }
-  const auto said = [&] { return refusal_of([&] { (void)read_trajectory(csv); }); };
+  const auto said = [&] { return refusal_of([&] { (void)read_trajectory_file(csv); }); };
   struct Case {
     const char *sensor, *said;
   };
   for (const Case& c :
        {Case{"rate_hz: 20\n", "sensor.yaml: has no T_BS"},
-        Case{"a: 1\nT_BS:\n  data: [1, 0, 0]\n", "sensor.yaml:3: T_BS data"},
+        Case{"a: 1\nT_BS:\n  data: [1, 0, 0]\n", "sensor.yaml:3: T_BS is not"},
         Case{"T_BS:\n  data: [1,0,0,0, 0,1,0,0, 0,0,1.01,0, 0,0,0,1]\n",
              "is not a rigid transform"},
-        Case{"a: [1\nb: 2\n", "is not YAML"}, Case{"just words\n", "is not a sensor.yaml"}}) {
+        Case{"a: [1\nb: 2\n", "is not YAML"}, Case{"just words\n", "sensor.yaml: has no T_BS"}}) {
     folder.write("mav0/cam0/sensor.yaml", c.sensor);
     EXPECT_TRUE(mentions(said(), c.said));
   }
@@ -255,11 +255,11 @@ TEST(TimesFile, isReadHoweverProgramsWriteIt) {
 
 TEST(Trajectory, aFolderStandsForItsTrajectoryOrIsRefused) {
   const test::TemporaryFolder folder;
-  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory(folder.path()); }),
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory_file(folder.path()); }),
                        "has no trajectory.tum, no poses.txt"));
   EXPECT_FALSE(find_truth(folder.path()).has_value());
   folder.write("trajectory.tum", kGoodLine);
-  EXPECT_EQ(read_trajectory(folder.path()).front().stamp.ns(), 1500000000);
+  EXPECT_EQ(read_trajectory_file(folder.path()).poses.front().stamp.ns(), 1500000000);
 }
 
 }  // namespace

@@ -13,17 +13,24 @@
 namespace vergence::app {
 namespace {
 
-CameraRequest request(const std::string& driver, const std::string& serial) {
-  return {"cameras.0",
-          driver,
-          serial,
-          ImageHalf::whole,
-          {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::software}};
+/// GigE cameras of 320 x 240 pixels with these serials.
+Configuration gige(const std::vector<std::string>& serials) {
+  Configuration c;
+  for (std::size_t k = 0; k < serials.size(); ++k) {
+    CameraSettings& s = c.cameras[k];
+    s.driver = "gige";
+    s.serial = serials[k];
+    s.width = 320, s.height = 240;
+    s.exposure_us = 2000;
+    s.trigger = CameraTrigger::software;
+  }
+  c.trigger.rate = 30;
+  return c;
 }
 
-std::string refusal(const std::vector<CameraRequest>& requests) {
+std::string refusal(const Configuration& c) {
   std::vector<std::string> remarks;
-  return test::refusal_of([&] { (void)open_cameras(requests, &remarks); });
+  return test::refusal_of([&] { (void)open_cameras(c, &remarks); });
 }
 
 test::GigeCameraOptions small(int k) {
@@ -36,11 +43,11 @@ test::GigeCameraOptions small(int k) {
   return o;
 }
 
-TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
+TEST(CameraDrivers, impossibleSizeIsRefusedWithTheCamerasName) {
   const test::GigeCamera simulator(small(0));
-  CameraRequest r = request("gige", small(0).address);
-  r.configuration.width = 640;
-  const std::string message = refusal({r});
+  Configuration c = gige({small(0).address});
+  c.cameras[0].width = 640;
+  const std::string message = refusal(c);
   EXPECT_NE(
       message.find(
           "cameras.0 (gige TABLE-0): Width 640 px is not possible: the camera offers 16 to 320 px"),
@@ -48,30 +55,28 @@ TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
       << message;
 }
 
-CameraRequest half(const std::string& key, ImageHalf which, const std::string& serial) {
-  CameraRequest r = request("gige", serial);
-  r.key = key;
-  r.half = which;
-  r.configuration.width = 160;
-  return r;
+/// Two entries for halves of images.
+Configuration halves(const std::array<ImageHalf, 2>& which,
+                     const std::vector<std::string>& serials) {
+  Configuration c = gige(serials);
+  for (std::size_t k = 0; k < 2; ++k) c.cameras[k].half = which[k], c.cameras[k].width = 160;
+  return c;
 }
 
-TEST(CameraDrivers, entriesThatContradictEachOtherAreRefused) {
-  const CameraRequest left = half("cameras.0", ImageHalf::left, "A");
-  CameraRequest other = half("cameras.1", ImageHalf::right, "A");
-  other.configuration.exposure = Duration::milliseconds(1);
-  EXPECT_TRUE(test::mentions(refusal({request("gige", "A"), request("gige", "A")}), "two entries"));
-  EXPECT_TRUE(test::mentions(refusal({left, half("cameras.1", ImageHalf::right, "B")}),
+TEST(CameraDrivers, contradictingEntriesAreRefused) {
+  EXPECT_TRUE(test::mentions(refusal(gige({"A", "A"})), "two entries"));
+  EXPECT_TRUE(test::mentions(refusal(halves({ImageHalf::left, ImageHalf::right}, {"A", "B"})),
                              "cameras.0.image_half is left, and no other entry is the right half"));
-  EXPECT_TRUE(test::mentions(refusal({left, other}), "cameras.0 and cameras.1 are halves"));
+  Configuration other = halves({ImageHalf::left, ImageHalf::right}, {"A", "A"});
+  other.cameras[1].exposure_us = 1000;
+  EXPECT_TRUE(test::mentions(refusal(other), "cameras.0 and cameras.1 are halves"));
 }
 
 TEST(CameraDrivers, twoHalvesAreOneCamera) {
   const test::GigeCamera simulator(small(3));
   std::vector<std::string> remarks;
-  const auto cameras = open_cameras({half("cameras.0", ImageHalf::right, small(3).address),
-                                     half("cameras.1", ImageHalf::left, small(3).address)},
-                                    &remarks);
+  const auto cameras = open_cameras(
+      halves({ImageHalf::right, ImageHalf::left}, {small(3).address, small(3).address}), &remarks);
   ASSERT_EQ(cameras.size(), 2U);
   EXPECT_NE(cameras[0].device->info().model.find("right half"), std::string::npos);
   EXPECT_NE(cameras[1].device->info().model.find("left half"), std::string::npos);
@@ -92,8 +97,7 @@ TEST(CameraDrivers, twoHalvesAreOneCamera) {
 TEST(SoftwareTrigger, everyCameraExposesAtEveryPulse) {
   const test::GigeCamera left(small(1)), right(small(2));
   std::vector<std::string> remarks;
-  const auto cameras = open_cameras(
-      {request("gige", small(1).address), request("gige", small(2).address)}, &remarks);
+  const auto cameras = open_cameras(gige({small(1).address, small(2).address}), &remarks);
   std::vector<CameraDevice*> devices{cameras[0].device.get(), cameras[1].device.get()};
   SoftwareTrigger trigger(devices);
   EXPECT_EQ(trigger.start(nullptr), DeviceStatus::bad_configuration);

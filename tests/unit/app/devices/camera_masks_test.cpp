@@ -36,7 +36,7 @@ std::string refusal(const std::filesystem::path& folder, const std::string& name
   return test::refusal_of([&] { const CameraMasks masks(c, small_rig()); });
 }
 
-TEST(CameraMasks, areReadFromPngAndPgmBesideTheConfiguration) {
+TEST(CameraMasks, pngAndPgmBesideConfigurationAreRead) {
   const TemporaryFolder folder;
   cv::Mat drawn(kHeight, kWidth, CV_8UC3, cv::Scalar(255, 255, 255));
   drawn.rowRange(50, 60).setTo(cv::Scalar(0, 0, 0));
@@ -58,7 +58,7 @@ TEST(CameraMasks, areReadFromPngAndPgmBesideTheConfiguration) {
   EXPECT_TRUE(views[2].empty());
 }
 
-TEST(CameraMasks, thatCannotBeUsedAreRefusedInASentence) {
+TEST(CameraMasks, unusableMasksAreRefused) {
   const TemporaryFolder folder;
   (void)folder.write("small.pgm", "P5 40 30 255\n" + std::string(40 * 30, '\1'));
   (void)folder.write("torn.pgm", pgm("P5 80 60 255\n").substr(0, 1000));

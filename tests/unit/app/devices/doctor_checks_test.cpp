@@ -192,7 +192,7 @@ const std::vector<Case>& cases() {
   return all;
 }
 
-TEST(Doctor, FindingsByMachine) {
+TEST(Doctor, findingsFollowTheMachine) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(c.name);
     FakeMachine f;
@@ -208,14 +208,14 @@ TEST(Doctor, FindingsByMachine) {
   }
 }
 
-TEST(Doctor, BareMachineHasNoProblem) {
+TEST(Doctor, bareMachineHasNoProblem) {
   const FakeMachine f;
   const auto findings = run_checks(f.context());
   EXPECT_LE(findings.size(), 3U);
   for (const Finding& finding : findings) EXPECT_EQ(finding.state, ok) << finding.check;
 }
 
-TEST(Doctor, LastingBufferIsReadAfterThePackagesOwn) {
+TEST(Doctor, lastingBufferFileSortsAfterPackagesOwn) {
   FakeMachine f;
   put_gige(f);
   f.file("/proc/sys/net/core/rmem_max", "212992\n");
@@ -229,7 +229,7 @@ TEST(Doctor, LastingBufferIsReadAfterThePackagesOwn) {
   EXPECT_GT(files, 0);
 }
 
-TEST(Doctor, EmptySerialTakesACameraThatNoEntryNames) {
+TEST(Doctor, emptySerialMatchesUnnamedCamera) {
   FakeMachine f;
   f.camera("v4l2", "A", "/dev/video0");
   f.camera("v4l2", "B", "/dev/video2");

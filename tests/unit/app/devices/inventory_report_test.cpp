@@ -14,7 +14,7 @@ namespace {
 
 using test::contains;
 
-TEST(DoctorReport, CommandsStayWholeAndDevicesCannotSteerTheTerminal) {
+TEST(DoctorReport, commandsStayWholeAndControlCodesAreRemoved) {
   const std::string command = "sudo sysctl -w net.core.rmem_max=10485760 # longer than the line";
   const std::vector<Finding> findings{
       {"receive_buffer", FindingState::problem, "too little \033[2J", {command}},
@@ -33,13 +33,13 @@ TEST(DoctorReport, CommandsStayWholeAndDevicesCannotSteerTheTerminal) {
   EXPECT_EQ(json["findings"][0]["fix"].at(0), command);
 }
 
-TEST(DevicesReport, DevicesCannotSteerTheTerminal) {
+TEST(DevicesReport, controlCodesOfDevicesAreRemoved) {
   Inventory i;
   i.ports = {test::port(0x0403, 0xD38B, "X\0337")};
   EXPECT_FALSE(contains(devices_text(i, {80, false}), "\033"));
 }
 
-TEST(DevicesReport, CameraLineIsYamlWhateverTheSerial) {
+TEST(DevicesReport, cameraLineIsYamlForAnySerial) {
   EXPECT_EQ(camera_line({"gige", "", "", "10.0.0.2"}), "{driver: gige, serial: \"10.0.0.2\"}");
   EXPECT_EQ(camera_line({"v4l2", "a\"b\\\n\xff", "", ""}),
             "{driver: v4l2, serial: \"a\\\"b\\\\\\n\\ufffd\"}");

@@ -15,7 +15,7 @@ namespace {
 
 using test::FakeMachine;
 
-TEST(Machine, ReadsNumbersAndNothingElse) {
+TEST(Machine, numbersAreReadAndOtherTextIsNone) {
   const FakeMachine f;
   f.file("/sys/good", "  42\n");
   f.file("/sys/negative", "-1\n");
@@ -32,7 +32,7 @@ TEST(Machine, ReadsNumbersAndNothingElse) {
     EXPECT_FALSE(f.machine.number(name)) << name;
 }
 
-TEST(Machine, ReadsLimitsAndCapabilities) {
+TEST(Machine, limitsAndCapabilitiesAreRead) {
   const FakeMachine f;
   f.file("/proc/self/status", "Name:\tx\nCapPrm:\t0000000000000000\nCapEff:\t0000000000003000\n");
   f.file("/proc/self/limits",
@@ -49,7 +49,7 @@ TEST(Machine, ReadsLimitsAndCapabilities) {
   EXPECT_FALSE(f.machine.limit("Max absent"));
 }
 
-TEST(Machine, RoomBehindAClosedFolderMayNotBeWritten) {
+TEST(Machine, roomBehindClosedFolderIsNotWritable) {
   const test::TemporaryFolder folder;
   (void)folder.write("closed/a/b/file", "");
   ASSERT_EQ(::chmod(folder.path().c_str(), 0755), 0);
@@ -68,7 +68,7 @@ TEST(Machine, RoomBehindAClosedFolderMayNotBeWritten) {
   EXPECT_EQ(WEXITSTATUS(status), 0) << "1: it may write; 2: unknown; 3: no other user here";
 }
 
-TEST(UsbDevices, ListsDevicesAndSkipsNonsense) {
+TEST(UsbDevices, devicesAreListedAndNonsenseIsSkipped) {
   const FakeMachine f;
   const auto usb = [&f](const std::string& port, const std::string& vendor) {
     const std::string at = "/sys/bus/usb/devices/" + port + "/";
@@ -99,7 +99,7 @@ TEST(UsbDevices, ListsDevicesAndSkipsNonsense) {
   EXPECT_EQ(all[1].number, 0);
 }
 
-TEST(SerialPorts, KindFollowsUsbIds) {
+TEST(SerialPorts, kindFollowsUsbIds) {
   EXPECT_EQ(serial_kind(0, 0), SerialKind::built_in);
   EXPECT_EQ(serial_kind(0x2639, 0x0017), SerialKind::ins);
   EXPECT_EQ(serial_kind(0x0403, 0xD38B), SerialKind::ins);
@@ -109,7 +109,7 @@ TEST(SerialPorts, KindFollowsUsbIds) {
   EXPECT_EQ(serial_kind(0x1234, 0x5678), SerialKind::unknown);
 }
 
-TEST(SerialPorts, AreNamedByNodeLinkOrSerial) {
+TEST(SerialPorts, portIsNamedByNodeLinkOrSerial) {
   const FakeMachine f;
   f.file("/dev/ttyUSB0", "");
   std::filesystem::create_symlink("ttyUSB0", f.folder / "dev/imu");

@@ -28,32 +28,28 @@ Refusal refusal_of(const std::function<void()>& open, std::string* message) {
   return Refusal::none;
 }
 
-TEST(MissingDevices, aCameraThatIsNotThereIsADeviceErrorOfEveryDriver) {
+TEST(MissingDevices, absentCameraIsADeviceErrorOfEveryDriver) {
   for (const auto& [driver, serial] :
        {std::pair("gige", "NO-SUCH-CAMERA"), std::pair("gige", "127.77.77.77"),
         std::pair("v4l2", "/dev/video99"), std::pair("v4l2", "NO-SUCH-CAMERA"),
         std::pair("iidc-usb", "00b09d0123456789"), std::pair("iidc-1394", "00b09d0123456789")}) {
-    const CameraRequest request{"cameras.0",
-                                driver,
-                                serial,
-                                ImageHalf::whole,
-                                {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::free}};
+    Configuration c;
+    c.cameras[0].driver = driver;
+    c.cameras[0].serial = serial;
     std::string message;
     std::vector<std::string> remarks;
-    EXPECT_EQ(refusal_of([&] { (void)open_cameras({request}, &remarks); }, &message),
-              Refusal::device)
+    EXPECT_EQ(refusal_of([&] { (void)open_cameras(c, &remarks); }, &message), Refusal::device)
         << message;
     EXPECT_NE(message.find("cameras.0"), std::string::npos) << message;
     EXPECT_NE(message.find(serial), std::string::npos) << message;
   }
 }
 
-TEST(MissingDevices, aPortThatIsNotThereIsADeviceErrorOfEveryIns) {
-  for (const std::string& driver : ins_driver_names()) {
-    InsRequest request;
+TEST(MissingDevices, absentInsPortIsADeviceErrorOfEveryDriver) {
+  for (const char* driver : {"xsens", "nmea", "ubx"}) {
+    InsSettings request;
     request.driver = driver;
     request.port = "/dev/ttyNotThere";
-    request.rate_hz = 100;
     std::string message;
     std::vector<std::string> remarks;
     EXPECT_EQ(refusal_of([&] { (void)open_ins(request, &remarks); }, &message), Refusal::device)
@@ -63,7 +59,7 @@ TEST(MissingDevices, aPortThatIsNotThereIsADeviceErrorOfEveryIns) {
   }
 }
 
-TEST(MissingDevices, aTriggerBoardThatIsNotThereIsADeviceError) {
+TEST(MissingDevices, absentTriggerBoardIsADeviceError) {
   TriggerSettings settings;
   settings.port = "/dev/ttyNotThere";
   TriggerConfiguration pulses;

@@ -74,7 +74,7 @@ TEST(RigSettings, intrinsicsErrorsHaveTheirSigmasAndTheirSeed) {
   EXPECT_NEAR(std::sqrt(focal / (2 * kSeeds)), 1e-3, 1e-3 * 5 / std::sqrt(2000.0));
 }
 
-TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
+TEST(RigSettings, renderedRigAndTruthRigHaveNoErrors) {
   const Configuration c =
       configured({"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1",
                   "mock.texture_detail=0", "mock.drive=still"});

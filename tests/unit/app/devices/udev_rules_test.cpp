@@ -37,7 +37,7 @@ UsbDevice usb(std::uint16_t vendor, const std::string& serial, std::vector<std::
   return d;
 }
 
-TEST(UdevRules, NameEveryDeviceByItsSerial) {
+TEST(UdevRules, everyDeviceIsNamedByItsSerial) {
   Inventory i;
   i.ports = {port(0x2639, 0x0300, "X07"), port(0x0403, 0x6001, "A1B2"), port(0x2341, 0x0043, "75")};
   i.usb = {usb(0x1E10, "15021234", {}), usb(0x046D, "CAM", {"video0", "video1"}),
@@ -58,7 +58,7 @@ TEST(UdevRules, NameEveryDeviceByItsSerial) {
   EXPECT_FALSE(contains(rules, "mouse"));
 }
 
-TEST(UdevRules, NamePortsOfARigByWhatTheConfigurationHasThere) {
+TEST(UdevRules, portsOfRigAreNamedByConfiguredDevice) {
   const test::FakeMachine f;
   Inventory i;
   i.ports = {port(0x0403, 0x6001, "A1"), port(0x0403, 0x6001, "B2"), port(0x0483, 0x5740, "C3")};
@@ -77,7 +77,7 @@ TEST(UdevRules, NamePortsOfARigByWhatTheConfigurationHasThere) {
   EXPECT_FALSE(contains(rules, "A1")) << rules;
 }
 
-TEST(UdevRules, CannotBeWrittenByADevice) {
+TEST(UdevRules, textOfDeviceCannotAddRules) {
   const std::string evil = "x\", RUN+=\"/bin/sh\n* ${env} $attr{x} %k ../../etc";
   Inventory i;
   i.ports = {port(0x0403, 0x6001, evil)};

@@ -74,7 +74,7 @@ Recording::Options options() {
   Recording::Options o;
   o.files.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}};
   o.queues = {4U << 20U};
-  o.when_full = Recording::WhenFull::wait;
+  o.when_full = WhenFull::wait;
   return o;
 }
 
@@ -132,7 +132,7 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
-  o.when_full = Recording::WhenFull::drop;
+  o.when_full = WhenFull::drop;
   o.files.disk = &disk;
   Recording recording(folder.path(), o);
   disk.stall_ms = 1000;  // the first chunk

@@ -80,7 +80,7 @@ struct Row {
   std::string advice = {};  // likewise
 };
 
-TEST(Assessment, GradeReasonAndAdviceByFinding) {
+TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
   const auto drift = [](double d) { return [d](Case& c) { c.analysis.drift = d; }; };
   const auto lost = [](std::size_t n) { return [n](Case& c) { c.frames_of(0, n); }; };
   const auto weak_by = [](const char* what) {
@@ -234,7 +234,7 @@ TEST(Assessment, GradeReasonAndAdviceByFinding) {
   }
 }
 
-TEST(Assessment, WorstReasonComesFirstAndTheFirstToGiveUpStands) {
+TEST(Assessment, worstReasonComesFirst) {
   Findings f;
   f.find(care, "first");
   f.find(bad, "worst");
@@ -249,7 +249,7 @@ TEST(Assessment, WorstReasonComesFirstAndTheFirstToGiveUpStands) {
   EXPECT_EQ(assess(Session{}, analyse(Session{})).grade, bad);
 }
 
-TEST(Assessment, EveryReasonOfAPoseHasAdvice) {
+TEST(Assessment, everyReasonOfPoseHasAdvice) {
   for (int i = 1; i <= static_cast<int>(Reason::pairing_ambiguous); ++i) {
     Case c;
     c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
@@ -280,7 +280,7 @@ Session degraded_drive(std::size_t frames, const char* reason, std::size_t lost 
   return s;
 }
 
-TEST(Usability, OfDrivesWithoutAnOkFrame) {
+TEST(Usability, driveWithoutOkFrameIsNotUsable) {
   struct Drive {
     Session session;
     bool usable;

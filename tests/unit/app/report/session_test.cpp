@@ -3,9 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <string_view>
+#include <string>
 
-#include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/session_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -28,44 +27,7 @@ Session with_poses(const std::string& text) {
   return read_session(folder.path());
 }
 
-std::vector<std::string> lines_of(const std::string& text, bool* torn) {
-  const test::TemporaryFolder folder;
-  FileLines lines(folder.write("lines", text));
-  std::vector<std::string> all;
-  for (std::string_view line; lines.next(&line);) all.emplace_back(line);
-  *torn = lines.torn();
-  EXPECT_FALSE(lines.failed());
-  return all;
-}
-
-TEST(FileLines, whatFollowsTheLastLineEndIsTorn) {
-  bool torn = false;
-  using All = std::vector<std::string>;
-  EXPECT_EQ(lines_of("\xEF\xBB\xBF a\r\n\n# no\nb\nc", &torn), (All{"a", "b"}));
-  EXPECT_TRUE(torn);
-  EXPECT_EQ(lines_of("a\n", &torn), All{"a"});
-  EXPECT_FALSE(torn);
-  EXPECT_EQ(lines_of("abc", &torn), All{});
-  EXPECT_TRUE(torn);
-  EXPECT_EQ(lines_of("", &torn), All{});
-  EXPECT_FALSE(torn);
-}
-
-TEST(CsvRows, columnsAreFoundByNameAndDamagedRowsAreCounted) {
-  Lines lines("a,b,c\n1,,x\n1,2\n3,4.5,y,z\n7,8,\n");
-  CsvRows rows([&lines](std::string_view* line) { return lines.next(line); });
-  ASSERT_TRUE(rows.next());
-  EXPECT_EQ(rows.integer(rows.column("a")), 1);
-  EXPECT_FALSE(rows.number(rows.column("b")));
-  EXPECT_EQ(rows.text(rows.column("c")), "x");
-  EXPECT_EQ(rows.text(rows.column("no such")), "");
-  ASSERT_TRUE(rows.next());
-  EXPECT_EQ(rows.number(rows.column("b")), 8.0);
-  EXPECT_FALSE(rows.next());
-  EXPECT_EQ(rows.torn_rows(), 2U);
-}
-
-TEST(ReadSession, aWholeOneHasNothingMissing) {
+TEST(ReadSession, wholeSessionHasNothingMissing) {
   const test::TemporaryFolder folder;
   test::SessionWriter writer;
   writer.frames = 400;
@@ -96,14 +58,14 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);
 }
 
-TEST(ReadSession, aFolderThatIsNoSessionIsRefused) {
+TEST(ReadSession, folderWithoutSessionIsRefused) {
   const test::TemporaryFolder folder;
   EXPECT_THROW((void)read_session(folder.path()), InputError);
   EXPECT_THROW((void)read_session(folder / "nowhere"), InputError);
   EXPECT_THROW((void)read_session(folder.write("file", "x")), InputError);
 }
 
-TEST(ReadSession, whatIsNotThereByDesignIsNotMissing) {
+TEST(ReadSession, filesAbsentByDesignAreNotMissing) {
   const test::TemporaryFolder folder;
   folder.write("poses.csv",
                std::string(kShortHead) +
@@ -119,7 +81,8 @@ TEST(ReadSession, whatIsNotThereByDesignIsNotMissing) {
 }
 
 TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
-  const Session s = with_poses(std::string(kShortHead) +
+  const Session s = with_poses("\xEF\xBB\xBF" + std::string(kShortHead) +
+                               "# no row\r\n\n"
                                "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n"
                                "garbage\n"
                                "1,x,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n"
@@ -137,7 +100,7 @@ TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
   EXPECT_FALSE(s.frames[3].posed) << "a quaternion of no length";
 }
 
-TEST(ReadSession, withoutPosesTheTrajectoryStandsIn) {
+TEST(ReadSession, trajectoryReplacesMissingPoses) {
   const test::TemporaryFolder folder;
   folder.write("trajectory.tum", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 1\n3.5 0 0 2 0 0 0");
   const Session s = read_session(folder.path());
@@ -145,6 +108,7 @@ TEST(ReadSession, withoutPosesTheTrajectoryStandsIn) {
   EXPECT_EQ(s.frames[0].stamp.ns(), 1'500'000'000);
   EXPECT_TRUE(s.frames[1].posed);
   EXPECT_FALSE(s.frames[1].status.has_value());
+  EXPECT_TRUE(mentions(s, "the last line is torn"));
 }
 
 }  // namespace

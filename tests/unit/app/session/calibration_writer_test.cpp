@@ -152,7 +152,7 @@ TEST(CalibrationWriter, postingAllocatesNothing) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   const test::TemporaryFolder folder;
-  CalibrationWriter writer({.session = folder.path(), .wait_when_full = true});
+  CalibrationWriter writer({.session = folder.path(), .when_full = WhenFull::wait});
   const CalibrationRecord record = found(false);
   const auto before = AllocationGuard::runtime_allocations();
   {

@@ -30,7 +30,7 @@ std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last)
   };
 }
 
-TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
+TEST(Recorder, brieflyFullDiskLosesNothing) {
   const test::TemporaryFolder folder;
   Recorder::Options options;
   options.disk_full = full_from_to(20, 40);
@@ -52,7 +52,7 @@ TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
   EXPECT_NE(errors[0].find("No space left on device"), std::string::npos) << errors[0];
 }
 
-TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
+TEST(Recorder, longFullDiskLosesWholeCountedLines) {
   const test::TemporaryFolder folder;
   constexpr std::uint64_t kFrames = 14'000;  // 170 bytes each in poses.csv: twice what memory holds
   Recorder::Options options;

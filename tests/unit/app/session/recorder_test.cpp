@@ -37,7 +37,7 @@ TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a/b/session"));
 }
 
-TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
+TEST(Recorder, stampsAreExactAndLostFramesHaveNoPose) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   FrameReport first = pose(0, PoseStatus::ok, 0);
@@ -117,7 +117,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
 TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   const test::TemporaryFolder folder;
   std::promise<void> posted;
-  Recorder::Options options{.when_full = Recorder::WhenFull::drop, .keep_trajectory = false};
+  Recorder::Options options{.when_full = WhenFull::drop, .keep_trajectory = false};
   // The recorder's thread hangs at the first pose until all are posted. A producer that waited for
   // it would do so until it is let go after all, and nothing would be dropped.
   options.disk_full = [all_posted = posted.get_future().share(), hung = false](Stamp) mutable {
@@ -125,7 +125,7 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
     return false;
   };
   Recorder recorder(folder.path(), options);
-  constexpr std::uint64_t kFrames = 1000;  // many times what may wait
+  constexpr std::uint64_t kFrames = 5000;  // several times what may wait
   for (std::uint64_t i = 0; i < kFrames; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
   posted.set_value();
   const auto totals = recorder.close();

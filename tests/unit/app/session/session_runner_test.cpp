@@ -117,7 +117,7 @@ class Notebook final : public SessionObserver {
   int images_ = 0;
 };
 
-TEST(SessionRunner, ObserversSeeFramePoseAndLineInTurnAndFramesGoBack) {
+TEST(SessionRunner, observersSeeFramePoseLineAndFramesAreReleased) {
   const test::TemporaryFolder folder;
   BlackSource source(4);
   Notebook first, second;

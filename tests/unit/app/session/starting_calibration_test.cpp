@@ -39,7 +39,7 @@ CalibrationFile found(const Configuration& c, double t_y) {
   return file;
 }
 
-TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfiguration) {
+TEST(StartingCalibration, scratchThenFileThenStateThenConfiguration) {
   const test::TemporaryFolder folder;
   const Configuration c = configuration(folder);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));

@@ -36,7 +36,7 @@ SummaryInput input() {
   return in;
 }
 
-TEST(Summary, countsFramesAndTimesAndHasNullWhereThereIsNoReference) {
+TEST(Summary, framesAreCountedAndMissingReferenceIsNull) {
   auto totals = std::make_unique<SessionTotals>();
   totals->read = 5, totals->ok = 3, totals->degraded = 1, totals->lost = 1;
   totals->estimate.add(8);
@@ -58,7 +58,7 @@ TEST(Summary, countsFramesAndTimesAndHasNullWhereThereIsNoReference) {
   EXPECT_TRUE(json["calibration"]["depth_error_percent"]["20"].is_null());
 }
 
-TEST(Summary, metricsOfAKnownScaleComeOutAndLongSegmentsOfAShortDriveAreNull) {
+TEST(Summary, knownScaleIsFoundAndShortDriveHasNoLongSegments) {
   // A bent path of about 80 m, the estimate 2 % too long: one scale explains all of it.
   std::vector<StampedPose> estimate, reference;
   for (int i = 0; i <= 160; ++i) {

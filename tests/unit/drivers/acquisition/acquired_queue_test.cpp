@@ -59,7 +59,7 @@ TEST(AcquiredQueue, lateConsumerSkipsOldImagesOnlyLive) {
 TEST(AcquiredQueue, fullQueueDropsOnlyReadingsLive) {
   Bench b;
   AcquiredQueue queue(b.cameras, false);
-  for (int i = 0; i < 300; ++i) queue.push(AcquiredReading{});
+  for (int i = 0; i < 300; ++i) queue.push(InsRecord{});
   const std::uint64_t dropped = queue.dropped_readings();
   EXPECT_EQ(dropped, 300U - queue.high_water());
   std::thread producer([&] {

@@ -106,7 +106,7 @@ TEST(Acquisition, everyPulseAndReadingComesOnceInOrder) {
   Bench b({});
   const auto items = b.drive();
   ASSERT_EQ(count<AcquiredFrame>(items), 81);
-  EXPECT_GE(count<AcquiredReading>(items), 480);
+  EXPECT_GE(count<InsRecord>(items), 480);
   std::uint64_t number = 0, reading = 0;
   for (const Acquired& item : items) {
     if (const AcquiredFrame* frame = frame_of(item)) {
