@@ -177,7 +177,7 @@ struct BundleResult {
   Mat6 pose_covariance = Mat6::Zero();  // H⁻¹ (inverse_sigma taken as true) with all else that is
                                         // free marginalised, of R ← Exp(φ) R, t ← Exp(φ) t + τ
 
-  /// The parameters are at a minimum, as far as the tolerances say.
+  /// The parameters are at a minimum, to within the tolerances.
   [[nodiscard]] bool converged() const noexcept {
     return termination <= BundleTermination::small_cost_change;
   }
@@ -223,7 +223,7 @@ struct BundleWorkspace;
 /// Memory     memory_needed() bytes of the arena at construction, nothing in solve().
 /// Time       One pass over the observations a step; bounded by max_steps. Deterministic on one
 ///            machine; between SIMD targets results agree to the rounding of sums.
-/// Errors     solve() never throws and never leaves a NaN; the status says what was changed. The
+/// Errors     solve() never throws and never leaves a NaN; the status states what was changed. The
 ///            constructor throws std::length_error if the arena is too small and
 ///            std::invalid_argument for impossible capacities.
 /// Source     Warren, McKinnon, Upcroft, ICRA 2013, with the corrected order of transforms (METHOD

@@ -20,7 +20,7 @@ constexpr int kScatterFrames = 20;    // that the mean square is reckoned over, 
 constexpr double kGoesBack = 0.5;  // of the shift: more taken back by the next frame is no change
 constexpr int kUnmeasured = 2;     // frames without enough tracks after it: it was a change
 constexpr int kMaxSkipped = 3;     // frames, over which the same points are compared
-constexpr double kMinParallax = 1e-4;  // rad: further points say the same at any depth
+constexpr double kMinParallax = 1e-4;  // rad: farther points have the same disparity at any depth
 
 Vec3 ray(const Pinhole& k, const Vec2& pixel) noexcept {
   return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy, 1.0};

@@ -20,7 +20,7 @@ namespace vergence::calibration {
 /// Threads  measure() on the solver's, the others on the estimator's while no solve runs.
 class FocalCheck {
  public:
-  /// `enabled`: as the options say.
+  /// `enabled`: by the options.
   explicit FocalCheck(bool enabled) noexcept : enabled_(enabled) {}
 
   /// Call before a solve of `frames` frames; `full`: no solve has more of them. It measures if it
@@ -31,8 +31,8 @@ class FocalCheck {
     if (measures_) measured_frames_ = frames;
   }
   /// After `solved`, the solve of the solver's log that `request` asked for;
-  /// begins with its result. Frames before the log's do not go in: what they say of the rig was
-  /// said with the focal length believed.
+  /// begins with its result. Frames before the log's are not used: their posterior assumes the
+  /// focal length.
   void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& solved) noexcept;
   /// The solve is over, and its frames count. `full`: no solve has more of them.
   void take(bool full) noexcept;

@@ -195,7 +195,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
   const double before = std::log(kOtherBefore / (1 - kOtherBefore)),
                certain = std::log((1 - kErrorRate) / kErrorRate);
   Assessment a;
-  a.confirmed = true;
+  a.verified = true;
   bool sharper = true;  // every camera's depth is determined better than by the one in use
   double worst = 0;
   for (int k = 1; k < measured.cameras; ++k) {
@@ -210,8 +210,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     // weighted mean of both.
     const double weight = source == CalibrationOrigin::this_drive ? 1.0 : m * m / (m * m + s * s);
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
-    a.confirmed =
-        a.confirmed && s > 0 && odds - before > certain && off <= o.max_depth_error_percent;
+    a.verified = a.verified && s > 0 && odds - before > certain && off <= o.max_depth_error_percent;
     const bool contradicted = difference > o.max_depth_error_percent && odds - before < -certain;
     const double least = source == CalibrationOrigin::this_drive ? m : kShareOfCurrent * m;
     sharper = sharper && s < least;

@@ -61,7 +61,7 @@ struct Assessment {
   bool worse = false;
   /// True if the rig is the one of the calibration in use, and its depths are within the tolerated
   /// error.
-  bool confirmed = false;
+  bool verified = false;
   /// True if the rig is certainly another one.
   bool contradicted = false;
 };

@@ -57,7 +57,7 @@ double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept {
   double best = 0;
   for (int k = 1; k < rig.cameras; ++k) {
     const double error = depth_error_percent(rig, k, depth_m);
-    // Zero says that no direction is seen by both, or that nothing is known of the pair.
+    // Zero: no direction is seen by both, or the pair has no covariance.
     if (error > 0 && (best == 0 || error < best)) best = error;
   }
   return best;

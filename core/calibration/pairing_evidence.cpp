@@ -18,7 +18,7 @@ constexpr double kPointsOfAFrame = 5;
 // rig that stands. Without it the sum would wander up to any bound.
 constexpr double kReference = 0.25;
 constexpr double kFollow = 0.1;  // of the usual width, a frame
-// A wrong claim once in a million times (Wald 1945): three frames at least.
+// A wrong decision once in a million times (Wald 1945): three frames at least.
 constexpr double kDecided = 13.8;
 
 Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {

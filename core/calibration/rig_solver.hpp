@@ -33,7 +33,7 @@ struct RigSolveRequest {
   bool from_rig = false;  // begin with T_camera_left of `rig`; false: with those of the logged
                           // frame that fits best
   const RigCalibration* known =
-      nullptr;  // what earlier frames told, with its covariance; null: nothing
+      nullptr;  // posterior of earlier frames with its covariance; null: none
   const RigCalibration* given = nullptr;  // whose lenses and sigmas are the priors where nothing is
                                           // known; null: those of `rig`
 };

@@ -18,7 +18,7 @@ constexpr int kMinTies = 10;            // points that tie a frame to those befo
 // over the one by clusters (docs/calibration.md).
 constexpr int kCells = 6;
 constexpr double kSharedErrors = 3.5;
-constexpr double kUsualInflation = 6;  // of a calibration that does not say its own
+constexpr double kUsualInflation = 6;  // of a calibration that does not state its own
 
 }  // namespace
 

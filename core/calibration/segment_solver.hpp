@@ -15,8 +15,8 @@ namespace vergence::calibration {
 class SegmentSolver {
  public:
   enum class Kind : std::uint8_t {
-    alone,   // independent of each other, so that they can be compared
-    joined,  // each begins with what those before it told: the last one is the drive's
+    alone,   // each is independent of the others, so that they can be compared
+    joined,  // each has the posterior of the one before as its prior: the last one is of all frames
   };
   SegmentSolver(Kind kind, const RigCalibration& given, const RigCalibration& start,
                 std::size_t frames, const CalibrationOptions& options,

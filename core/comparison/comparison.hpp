@@ -28,8 +28,8 @@ struct ComparisonOptions {
   double height_sigma_m = 5.0;
   double tilt_sigma_rad = 0.0087;  // half a degree
   /// Sigma of the INS's heading including the mounting, for the alignment;
-  /// 0: the heading is the positions' alone, as it must be where the mount is not known to a
-  /// degree.
+  /// 0: the heading is the positions' alone, as it must be where the INS-to-camera rotation is not
+  /// known to a degree.
   double heading_sigma_rad = 0;
   /// Two samples farther apart than this are not interpolated between.
   Duration max_gap = Duration::milliseconds(100);
@@ -89,7 +89,7 @@ struct ComparedPose {
   Vec3 error_enu = Vec3::Zero();  // m, ours − INS
   double error_yaw = 0;           // rad, in (−π, π], counter-clockwise from above positive
   /// Ours / INS over the newest scale_stretch_m that have both; 0: not yet that far. It and what
-  /// it says stand while the INS is away.
+  /// its values stay while the INS is disconnected.
   double path_ratio = 0;
   bool scale_disagrees = false;
 };
@@ -160,7 +160,7 @@ class Comparison {
  private:
   [[nodiscard]] bool ready(const PoseSample& pose) const noexcept;
   [[nodiscard]] EnuPose in_enu(const Transform& T_enu_left) const;
-  /// The pose is where the INS says: scale and alignment take it in.
+  /// The pose is at the INS position: scale and alignment take it in.
   void take(const ComparedPose& c, const InsHistory::Reference& reference) noexcept;
 
   const ComparisonOptions options_;

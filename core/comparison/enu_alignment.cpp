@@ -15,7 +15,7 @@ constexpr double kNoMount = 0.1;  // rad: no mount that was measured is off by s
 constexpr double kConverged =
     1e-9;  // rad and m: a thousandth of what any receiver or reader can tell
 
-/// Mean of what the attitudes say, then turned about up to the heading that the positions say,
+/// Mean of the attitudes' rotations, then rotated about up to the heading of the positions,
 /// whatever the INS's heading was.
 Mat3 start(std::span<const EnuAlignmentPair> pairs, const Vec3& middle_world,
            const Vec3& middle_enu) noexcept {
@@ -70,8 +70,8 @@ Normal normal_equations(std::span<const EnuAlignmentPair> pairs, const Mat3& R,
     out.H.topLeftCorner<3, 3>() += w_tilt * J_tilt.transpose() * J_tilt;
     out.g.head<3>() -= w_tilt * J_tilt.transpose() * up.head<2>();
 
-    // The rest of what the attitude says is a turn about up: r(φ) = turn − φ_z. A turn of many
-    // sigmas means that the mount is unknown.
+    // The rest of the attitude's rotation is a rotation about up: r(φ) = turn − φ_z. A turn of many
+    // sigmas is an unknown INS-to-camera rotation.
     const double turn = log_so3(p.R_enu_world * R.transpose()).z();
     if (!(p.heading_sigma > 0) || std::abs(turn) > kNoMount) continue;
     const double w_heading = 1.0 / (n * p.heading_sigma * p.heading_sigma);
@@ -108,7 +108,7 @@ EnuAlignmentStatus fit_enu_alignment(std::span<const EnuAlignmentPair> pairs, Du
     if (delta.norm() < kConverged) break;
   }
 
-  // Residuals larger than the sigmas say make the result worse by as much; smaller ones do not make
+  // Residuals larger than their sigmas make the result worse by as much; smaller ones do not make
   // it better: they share their error.
   const double excess = std::max(1.0, normal.weighted / (3.0 * n));
   const Mat6 covariance = excess * ldlt_inverse(normal.H);

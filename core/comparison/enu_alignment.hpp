@@ -44,7 +44,7 @@ enum class EnuAlignmentStatus : std::uint8_t {
 /// Least squares for T_enu_world on positions, with the INS's roll and pitch, and its heading where
 /// it has a sigma, as one more measurement.
 ///
-/// An INS's errors wander slowly: neighbouring samples repeat one another. `correlation` says for
+/// An INS's errors wander slowly: neighbouring samples repeat one another. `correlation` states for
 /// how long; n pairs over a time T count as 1 + T / correlation independent ones, the attitude as
 /// one. So the sigma is what 100 m with such a receiver can tell.
 /// Memory: none. Time: linear in the pairs, at most kAlignmentSteps passes. Not `ok`: *alignment as

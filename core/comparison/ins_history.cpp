@@ -15,9 +15,9 @@ constexpr double kFastest = 60.0;  // m/s: no vehicle that carries this rig
 constexpr Duration kBackForGood = Duration::seconds(1);
 constexpr int kMinBack = 3;  // samples: two stamps are a mistake as soon as a clock
 constexpr double kQuaternionLength = 0.1;
-constexpr double kHorizontal = 0.5;      // of a unit vector: less says little of a heading
+constexpr double kHorizontal = 0.5;      // of a unit vector: less does not determine a heading
 constexpr double kUnknownHeight = 1000;  // m: sigma of a height that is not measured
-constexpr double kLevelSigma = 0.05;  // rad: slopes and suspension, where no sensor measures tilt
+constexpr double kLevelSigma = 0.05;  // rad: slopes and suspension, without a measurement of tilt
 
 bool positive(double v) noexcept { return std::isfinite(v) && v > 0; }
 

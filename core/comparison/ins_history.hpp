@@ -96,7 +96,7 @@ class InsHistory {
   std::optional<double> yaw_;     // rad, the newest of a sample without attitude
   std::optional<double> height_;  // m, the newest that was measured
   AttitudeCheck attitude_check_;
-  std::optional<Leaps> leaps_;  // not yet popped
+  std::optional<Leaps> leaps_;  // not yet taken
 };
 
 }  // namespace vergence

@@ -94,7 +94,7 @@ std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
 }
 
 constexpr Duration kBlock = Duration::milliseconds(3'000);  // in which errors stay alike
-constexpr std::size_t kBlocks = 8;                          // fewer say nothing of their scatter
+constexpr std::size_t kBlocks = 8;                          // fewer do not determine their scatter
 
 /// Evidence of a block of the drive about the parameters.
 struct Block {

@@ -74,7 +74,7 @@ struct Mount {
   double residual_position = 0;  // m, of e_p
 };
 
-/// `nominal`: how the bodies are turned by the drawing; rotations are told against it, and it
+/// `nominal`: rotation by the drawing; rotations are reported relative to it, and it
 /// stands where the drive tells none. Stamps ascend (precondition). Memory: the heap; not for the
 /// real-time path. Time: linear in the moments, kMountRounds rounds. Not `ok`: *mount untouched.
 [[nodiscard]] MountStatus estimate_ins_extrinsics(std::span<const StampedPose> estimate,

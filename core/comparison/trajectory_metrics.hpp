@@ -16,7 +16,7 @@
 ///               axes; their worlds may differ by a rigid motion.
 /// Threads       Pure functions. Memory: the heap; this is not for the real-time path.
 /// Units         Metres, radians, ratios (1 is 100 %). Scale is reported, never applied but where
-///               an option says so.
+///               an option selects it.
 /// Errors        A status by value. A figure that does not exist (no segment of that length) is
 ///               NaN, never zero.
 /// Sources       Umeyama 1991 (alignment); Sturm et al. 2012 (ATE); the KITTI odometry devkit
@@ -108,7 +108,7 @@ enum class EvaluationStatus : std::uint8_t {
   no_motion,  // the matched positions of one of the two are all the same: nothing to align
 };
 
-/// Everything `evaluate` and summary.json say. Unless `status` is ok only the counts mean
+/// Everything that `evaluate` and summary.json report. Unless `status` is ok only the counts mean
 /// something.
 struct TrajectoryEvaluation {
   EvaluationStatus status = EvaluationStatus::no_match;

@@ -56,7 +56,7 @@ class BackgroundSolve {
   void finish() noexcept;
   /// Marks the running solve, if any, as outdated: its frames no longer describe the rig.
   void discard() noexcept { discarded_ = running_; }
-  /// True if the solve was discarded, or was started for another purpose than `seeking` says.
+  /// True if the solve was discarded, or was started for another purpose than `estimating` states.
   [[nodiscard]] bool outdated(bool estimating) const noexcept {
     return discarded_ || start_.for_new_rig != estimating;
   }

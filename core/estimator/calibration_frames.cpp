@@ -52,7 +52,7 @@ void CalibrationFrames::take(odometry::Odometry& odometry, const odometry::Frame
   f.stereo = outcome.stereo_inliers;
   log_.begin(f);
   for (MapPoint& p : odometry.map().points()) {
-    // A track is taken by what the left camera's pose says of it. Linked, the others' observations
+    // A track is taken if it agrees with the left camera's pose. Linked, the others' observations
     // are taken as they were found: the calibration in use must not choose its own witnesses.
     if (!p.followed() || !p.now.by(0)) continue;
     calibration::LoggedObservation s;

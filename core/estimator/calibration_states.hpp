@@ -7,8 +7,8 @@ namespace vergence {
 /// State of the calibration in use.
 enum class CalibrationState : std::uint8_t {
   none,        // there is none; one is sought
-  unverified,  // in use, and the drive has not confirmed it
-  verified,    // in use, and the drive has confirmed its depths to the tolerated error
+  unverified,  // in use, and not yet compared with an own measurement
+  verified,    // in use, and its depths are within the tolerated error
   suspect,     // the rig seems to have changed; another one is sought
 };
 
@@ -16,7 +16,7 @@ enum class CalibrationState : std::uint8_t {
 enum class CalibrationTrigger : std::uint8_t {
   adopted,           // what was sought is found
   adopted_verified,  // the same, by a drive that holds its depths to the tolerated error
-  confirmed,         // by the drive, while it was in use
+  verified,          // by a measurement, while it was in use
   contradicted,      // the same
   suspected,         // an alarm, or a recalibration was requested
   kept,              // what was sought is no better, or the images fit the one before again
@@ -34,7 +34,7 @@ inline constexpr std::array kCalibrationTransitions = {
                           CalibrationState::unverified},
     CalibrationTransition{CalibrationState::none, CalibrationTrigger::adopted_verified,
                           CalibrationState::verified},
-    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::confirmed,
+    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::verified,
                           CalibrationState::verified},
     CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::suspected,
                           CalibrationState::suspect},

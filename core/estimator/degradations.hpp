@@ -17,7 +17,7 @@ enum class Degradation : std::uint8_t {
   out_of_sync,    // a camera's images are of another instant
   late_image,     // a camera may be an exposure behind
   rig,            // something is wrong with the rig, or it is being recalibrated
-  calibration,    // the drive has not confirmed the calibration that poses stand on
+  calibration,    // the calibration that poses depend on is not verified
   dynamic_scene,  // points of this frame or the last ones do not move as one rigid scene
   window,         // the window still holds frames that were doubted
   motion,         // this motion is less certain than the drive's others

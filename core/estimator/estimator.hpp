@@ -136,7 +136,8 @@ class Estimator {
   /// The calibration in use; before there is one, the rig given, without T_camera_left.
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
   [[nodiscard]] bool calibrated() const noexcept;
-  /// True if the drive itself has confirmed the calibration in use to the tolerated depth error
+  /// True if depths of the calibration in use were measured to be within the tolerated error
+  /// (METHOD §6.4).
   [[nodiscard]] bool verified() const noexcept;
   /// The newest moving frames with their tracks; empty without `online`. Valid until the next
   /// process().

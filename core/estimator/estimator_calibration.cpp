@@ -14,7 +14,7 @@ constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken 
 std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now) noexcept {
   using K = calibration::MonitorResult::Kind;
   if (v.kind == K::collapse) return now;  // until now there were wrong matches only
-  // A rig that creeps is another one by and by.
+  // Of a drifting rig only the newest frames describe the present one.
   if (v.kind == K::drift) return std::max(v.onset_frame, now - std::min(now, kDriftFrames));
   return v.onset_frame;
 }
@@ -76,7 +76,7 @@ void Estimator::Parts::suspect_rig(CalibrationCause cause, std::uint64_t onset,
   start_estimation(cause, onset, frame);
 }
 
-/// Left and right hardly match with the calibration in use. One that the drive never confirmed was
+/// Left and right hardly match with the calibration in use. One that was never verified was
 /// not the rig's from the start; one that it did was knocked away.
 void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames) noexcept {
   const CalibrationCause cause =
@@ -120,8 +120,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
       calibrator.clear_frames();
     }
   }
-  // A rig out of step fits no calibration: what else the monitor says is of no use until that is
-  // over.
+  // Cameras out of sync fit no calibration: other results of the monitor are ignored meanwhile.
   if (degradations.stands(Degradation::out_of_sync)) return;
   if (v.kind == K::collapse) {
     give_up_calibration(frame,
@@ -204,7 +203,7 @@ void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Sta
     adopt(decision);
   }
   if (decision.verified && !contradicted) {
-    // The poses until now are confirmed, too: they stand on what is refined, at most.
+    // The calibration before a refinement is verified, too.
     degradations.strike(Degradation::calibration);
     verified_percent = decision.depth_sigma_percent;
     if (!decision.accepted) verified_by = decision.evidence;

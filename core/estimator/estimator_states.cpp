@@ -7,16 +7,16 @@
 namespace vergence {
 namespace {
 
-constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
-// Frames with good images that no scene can be made of with the calibration in use.
+constexpr int kLostAfter = 3;  // consecutive frames without a pose before the state is `lost`
+// Frames with good images from which no map can be made with the calibration in use.
 constexpr int kUnmatchedAfter = 15;
-// Moving frames after an image that came twice, before that camera is believed not to be an
-// exposure behind, where nothing watches the rig.
+// Moving frames after a repeated image until that camera counts as in sync, if the rig is not
+// monitored.
 constexpr int kLagShownAfter = 12;
 // Frames marked after the map was rebuilt.
 constexpr int kRestartedFrames = 10;
-// Frames for which a scene that moves is told of, the first one included: what drives past looks
-// like the scene for single frames.
+// Frames for which a dynamic scene is reported, the first one included: for single frames a passing
+// vehicle looks static.
 constexpr int kMovingFrames = 10;
 // Frames of a window, by the default of odometry.window_keyframes: at speed each is a keyframe.
 constexpr int kWindowFrames = 10;
@@ -92,8 +92,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
            "relocalised against the points of the window", 0);
 }
 
-/// The rig was not monitored during missed frames: the drive has to verify the calibration
-/// again.
+/// The rig was not monitored during the missed frames: the calibration must be verified again.
 void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
   calibrator.map_lost();
   if (options.online && !degradations.stands(Degradation::calibration))

@@ -238,12 +238,13 @@ void OnlineCalibrator::plan_search() noexcept {
   }
 }
 
-/// The claim in use is confirmed, or is no more: the monitor expects as much of it.
+/// Applies a verification or contradiction; the scatter that the monitor expects follows from it.
 void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_px) noexcept {
   const CalibrationState before = std::exchange(state_, after(state_, what));
   if (state_ == before) return;
   monitor_.watch(rig_, verified() && found());
-  // A claim that is confirmed keeps its lens, and what that leaves differs from place to place.
+  // A supplied calibration that is verified keeps its intrinsics, whose errors differ from place to
+  // place.
   if (verified() && !found())
     monitor_.expect_scatter(std::max(options_.monitor.verified_bias_px, misfit_px));
 }
@@ -271,16 +272,16 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
                             ? source_ == calibration::CalibrationOrigin::this_drive
                             : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
-    // One that the drive has confirmed is not given for one that it has not.
+    // A verified calibration is not replaced by one that would not be.
     const bool certain = a.sigma_percent <= options_.calibration.max_depth_error_percent;
     if (gate_ == Gate::open && verified() && !certain && !a.contradicted) gate_ = Gate::no_better;
     // Frames that contradict what was measured before them confirm nothing.
     d.verified = gate_ == Gate::open
                      ? certain
-                     : a.confirmed && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
+                     : a.verified && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
     d.verified = d.verified && !d.focal.contradicted;
     if (d.verified)
-      apply_assessment(CalibrationTrigger::confirmed, misfit_px(d));
+      apply_assessment(CalibrationTrigger::verified, misfit_px(d));
     else if (a.contradicted || d.focal.contradicted)
       apply_assessment(CalibrationTrigger::contradicted, misfit_px(d));
   }

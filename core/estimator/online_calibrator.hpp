@@ -94,18 +94,19 @@ class OnlineCalibrator {
   struct Search {
     CalibrationCause cause = CalibrationCause::from_scratch;
     std::uint64_t onset = 0, since = 0;  // frame numbers
-    bool change_believed = false;  // frames were left out for a change once: the rest are taken for
-                                   // one rig
-    int rejections = 0;            // for other reasons than a want of frames
+    /// Frames before a change were dropped once; the rest count as frames of one rig.
+    bool change_believed = false;
+    /// Rejections for other reasons than too few frames.
+    int rejections = 0;
   };
 
-  /// `misfit_px`: how far off the epipolar lines of the one in use are.
+  /// `misfit_px`: median distance of matches from the epipolar lines beyond their noise.
   void apply_assessment(CalibrationTrigger what, double misfit_px) noexcept;
-  /// The calibration in use was solved from images, this drive's or an earlier one's, and its
-  /// lenses with it: its epipolar lines hold better than those of a claim.
+  /// True if the calibration in use was solved from images, this drive's or an earlier one's, with
+  /// its intrinsics; its epipolar lines are more accurate than those of a supplied one.
   [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }
   [[nodiscard]] SolutionReview review() const noexcept;
-  /// `last`: no more frames come that could make it better.
+  /// `last`: no more frames follow.
   [[nodiscard]] std::optional<CalibrationDecision> evaluate(Stamp stamp, std::uint64_t number,
                                                             bool last) noexcept;
   [[nodiscard]] CalibrationDecision evaluate_estimate(Stamp stamp, std::uint64_t number) noexcept;
@@ -119,7 +120,7 @@ class OnlineCalibrator {
   RigCalibration rig_, nominal_;
   CalibrationState state_;
   calibration::CalibrationOrigin source_ = calibration::CalibrationOrigin::elsewhere;
-  std::optional<RigCalibration> refined_;  // what closed segments show, with the lenses free
+  std::optional<RigCalibration> refined_;  // posterior of the closed segments
   CalibrationFrames frames_;
   BackgroundSolve solve_;
   RigMonitor monitor_;

@@ -12,9 +12,8 @@ using calibration::MonitorResult;
 using odometry::MapPoint;
 
 constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
-// Sigmas of a reference that is not known: of rotation (rad), and of t in baselines. What is off
-// from the first frame is a calibration that does not fit, no knock; a change against what the
-// frames before have shown is one.
+// Sigmas of an unknown reference: of rotation (rad) and of t in baselines. An offset from the first
+// frame on is a calibration that does not fit; a change against the frames before is a knock.
 constexpr std::array kReference = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 // Sigmas of a calibration that was solved from images and is verified: the residual lens error in
 // one stretch. The solve's own sigmas cannot be used, because rotations and principal points are
@@ -22,13 +21,14 @@ constexpr std::array kReference = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 constexpr std::array kFound = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
                              // calibration in use
-// Frames after a new reference in which the monitor does not yet know how far matches spread: what
-// it says is a doubt, no verdict. So is half of the matches this far from their epipolar lines, in
-// px: those of the recorded drives stay below 0.3; it shows a knock in its first frame.
+// Frames after a new reference until the spread of matches is known: until then a result makes
+// poses `degraded` and does not raise a knock. The same holds for a median distance of matches from
+// their epipolar lines of kFarFromLines px, which shows a knock in its first frame; those of the
+// recorded drives stay below 0.3 px.
 constexpr int kGraceFrames = 5;
 constexpr double kFarFromLines = 0.5;
-// Times the distance in the frame before: matches of one that is spoilt lie so much farther off.
-// 2.5 rows of skew on `sand_rover` are 28 times (1.77 px of 0.06).
+// Ratio to the distance in the frame before from which an image counts as distorted: 2.5 rows of
+// skew on `sand_rover` give 28 (1.77 px after 0.06).
 constexpr double kSpoilt = 2;
 constexpr double kMovingSpeed = 0.5;  // m/s: slower, and neighbouring images are nearly the same
 
@@ -84,15 +84,15 @@ void RigMonitor::expect_scatter(double bias_px) noexcept {
   for (int k = 1; k < cameras_; ++k) camera(k).monitor.expect_scatter(bias_px);
 }
 
-void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
+void RigMonitor::watch(const RigCalibration& rig, bool solved_and_verified) noexcept {
   rig_ = rig;
-  confirmed_ = confirmed;
-  expect_scatter(confirmed ? options_.verified_bias_px : options_.unverified_bias_px);
+  solved_and_verified_ = solved_and_verified;
+  expect_scatter(solved_and_verified ? options_.verified_bias_px : options_.unverified_bias_px);
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
     w.pairing.reset();
     const Transform& T = transform(rig_, k);
-    set_monitor_reference(k, T, squares(confirmed ? kFound : kReference, T.t.norm()));
+    set_monitor_reference(k, T, squares(solved_and_verified ? kFound : kReference, T.t.norm()));
   }
 }
 
@@ -109,9 +109,9 @@ void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
 }
 
 void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
-                             bool confirmed) noexcept {
+                             bool solved_and_verified) noexcept {
   map_reset_pending_ = false;
-  watch(rig, confirmed);
+  watch(rig, solved_and_verified);
   map_renewed(map);
 }
 
@@ -220,9 +220,10 @@ MonitorResult RigMonitor::monitor_verdict(int k, const odometry::Odometry& odome
   MonitorResult v = w.monitor.update(f);
   if (w.grace > 0) {
     --w.grace;
-    // A claim that is off is no knock; nothing based on it is `ok`.
-    const bool suspect = confirmed_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
-                                        w.pairing.distance_px() > kFarFromLines);
+    // A new reference that is wrong is no knock; no pose based on it is `ok`.
+    const bool suspect =
+        solved_and_verified_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
+                                 w.pairing.distance_px() > kFarFromLines);
     v = MonitorResult{};
     v.undecided = suspect;
   }

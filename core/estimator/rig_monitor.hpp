@@ -26,7 +26,7 @@ struct RigAssessment {
 /// With the cameras linked, update() compares a posed frame with the reference calibration. While a
 /// calibration is estimated the cameras are not linked, and update_unlinked() looks for jumps only.
 ///
-///     monitor.watch(rig, confirmed);  // a calibration is in use, its scene is there
+///     monitor.watch(rig, solved_and_verified);  // a calibration is in use, its scene is there
 ///     const auto verdict = monitor.update(odometry, outcome, frame);  // each posed frame
 ///
 /// Threads one. Memory from the arena at construction. Errors: the constructor throws as Monitor's.
@@ -38,9 +38,9 @@ class RigMonitor {
   [[nodiscard]] static std::size_t memory_needed(const calibration::MonitorOptions& options,
                                                  int cameras, std::size_t capacity) noexcept;
 
-  /// Makes this calibration the reference. `confirmed`: the drive has confirmed it, so less scatter
-  /// is expected.
-  void watch(const RigCalibration& rig, bool confirmed) noexcept;
+  /// Makes this calibration the reference. `solved_and_verified`: it was solved from images and
+  /// is verified, so less scatter is expected.
+  void watch(const RigCalibration& rig, bool solved_and_verified) noexcept;
   /// Sets the scatter expected between stretches of the drive, px rms over the image.
   void expect_scatter(double bias_px) noexcept;
   /// Sets the calibration that the jump detectors compare with.
@@ -49,14 +49,15 @@ class RigMonitor {
   void expect_rebuilt_scene() noexcept { map_reset_pending_ = true; }
   [[nodiscard]] bool map_reset_pending() const noexcept { return map_reset_pending_; }
   /// Call when the scene of the adopted calibration was made; it is the reference from here on.
-  void map_rebuilt(const odometry::Map& map, const RigCalibration& rig, bool confirmed) noexcept;
+  void map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
+                   bool solved_and_verified) noexcept;
   /// Call when the scene was made anew with the same calibration: its points are compared from here
   /// on.
   void map_renewed(const odometry::Map& map) noexcept;
   /// Call when the cameras are unlinked because a calibration is estimated.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
-  /// Assesses a posed frame of linked cameras. `verified`: the drive has confirmed the reference.
+  /// Assesses a posed frame of linked cameras. `verified`: state of the reference.
   /// An unverified calibration has errors that differ from place to place; the monitor cannot tell
   /// them from a change of the rig, and the result is `undecided`.
   [[nodiscard]] RigAssessment update(const odometry::Odometry& odometry,
@@ -107,8 +108,8 @@ class RigMonitor {
   const int cameras_;
   std::array<std::optional<Watched>, kMaxCameras> watched_;  // [k] of camera k ≥ 1
   BoundedVector<calibration::StereoObservation> stereo_;
-  RigCalibration rig_{};    // the one watched
-  bool confirmed_ = false;  // by the drive
+  RigCalibration rig_{};  // the one watched
+  bool solved_and_verified_ = false;
   std::optional<Transform> T_left_world_before_;
   Stamp stamp_before_{};  // of the frame before
   bool map_reset_pending_ = false;

@@ -39,7 +39,7 @@ void SolutionReview::assess_next(CalibrationDecision* decision) const noexcept {
   decision->reference_depth_m = then.depth_m;
   decision->depth_sigma_percent = then.sigma_percent;
   // All distances are off by what the focal length is off by.
-  decision->verified = then.confirmed && !decision->focal.contradicted;
+  decision->verified = then.verified && !decision->focal.contradicted;
   if (context_.in_use != nullptr)
     decision->depth_error_percent = assess(*context_.in_use, context_.source).difference_percent;
 }

@@ -68,7 +68,7 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     float dx = (ixx * s.steep_x + ixy * s.steep_y) / gain;
     float dy = (ixy * s.steep_x + iyy * s.steep_y) / gain;
     const float length = std::sqrt(dx * dx + dy * dy);
-    constexpr float kMaxStep = 3.F;  // px of the level: beyond it the linear model says nothing
+    constexpr float kMaxStep = 3.F;  // px of the level: beyond it the linear model does not hold
     if (length > kMaxStep) {
       dx *= kMaxStep / length;
       dy *= kMaxStep / length;

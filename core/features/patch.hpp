@@ -17,7 +17,7 @@ inline constexpr int kWindowStride = 16;  // floats a row of the window in memor
 
 /// Appearance of a point where it was first seen: the pixels around it at several levels. Its
 /// anchor is the pixel (x, y) of level 0 it was cut at; at level l the patch's middle pixel is the
-/// anchor's nearest, and `offset` says where in that pixel the anchor lies, so that no level moves
+/// anchor's nearest, and `offset` is the anchor's place in that pixel, so that no level moves
 /// it.
 struct Patch {
   std::array<std::array<std::uint8_t, kPatchBytes>, kPatchLevels> pixels;

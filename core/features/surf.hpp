@@ -36,7 +36,7 @@ struct SurfOptions {
 enum class SurfStatus : std::uint8_t {
   ok,
   invalid_image,  // empty, or rows overlap
-  too_large,      // larger than the constructor was told
+  too_large,      // larger than given to the constructor
 };
 
 /// Speeded-up robust features: blobs by the determinant of a Hessian of boxes, sums of Haar

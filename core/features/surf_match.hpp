@@ -33,7 +33,7 @@ struct SurfMatchOptions {
 enum class SurfMatchStatus : std::uint8_t {
   ok,
   invalid_input,  // points without descriptors
-  capacity,       // more points than the constructor was told; nothing matched
+  capacity,       // more points than given to the constructor; nothing matched
 };
 
 /// Mutually best partners among blobs of the same sign.

@@ -16,8 +16,8 @@ struct EpipolarEvidence {
 ///
 /// True matches lie about their lines as noise makes them (half of a Gaussian, whose width is
 /// measured, at least `noise_px`), chance matches anywhere in the band that was searched. "Fits"
-/// says that half of the matches found are true ones. What has no match says nothing. Threads pure.
-/// Memory: orders `distances`.
+/// says that half of the matches found are true ones. Points without a match are not used. Threads
+/// pure. Memory: orders `distances`.
 [[nodiscard]] EpipolarEvidence weigh_epipolar_distances(std::span<float> distances, double band_px,
                                                         double noise_px) noexcept;
 

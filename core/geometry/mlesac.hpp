@@ -21,7 +21,7 @@ struct MlesacOptions {
 };
 
 struct MlesacPose {
-  /// There is a pose; whether its inliers suffice is the caller's to say. Not found where the input
+  /// There is a pose; the caller decides whether its inliers suffice. Not found where the input
   /// or the options cannot be, there are more points than the workspace holds, or without a prior
   /// no camera has three usable observations or no sample gave a pose.
   bool found = false;

@@ -54,7 +54,7 @@ class RigObservationTable {
   /// Intrinsics and transforms of the cameras; distortion is not read. Precondition: rig.cameras in
   /// 1 … kMaxCameras.
   void set_rig(const RigCalibration& rig) noexcept;
-  /// Adds a point without observations; its index is size() − 1 after this. False: full, nothing
+  /// A point that no camera sees yet; its index is size() − 1 after this. False: full, nothing
   /// changed.
   [[nodiscard]] bool push(const Vec3& p_world, double sigma_px) noexcept;
   /// The last point pushed is seen by `camera` at that undistorted pixel. Precondition: size() > 0,

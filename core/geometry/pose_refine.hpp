@@ -12,7 +12,7 @@ struct PoseRefineOptions {
   int max_steps = 10;  // solver steps a round, 1 … 10; four are usual
   double huber = 2.0;  // threshold in scaled sigmas, > 0
   double min_scale =
-      1.0;  // floor of the residual scale in given sigmas: a good frame is not believed beyond them
+      1.0;  // floor of the residual scale in given sigmas: a good frame does not make them smaller
   double inlier_chi2 = kChi2OfPixel;
   double gross_chi2 = 36.0;    // squared scaled sigmas: beyond it an observation does not count in
                                // the second round; > 0

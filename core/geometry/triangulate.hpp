@@ -25,7 +25,7 @@ enum class TriangulateStatus : std::uint8_t {
 
 struct TriangulateOptions {
   int max_steps = 5;            // Gauss–Newton; two or three are usual
-  double min_significance = 3;  // inverse depth over its sigma from which on a depth is believed
+  double min_significance = 3;  // inverse depth over its sigma from which on a depth is used
 };
 
 struct TriangulatedPoint {

@@ -8,7 +8,7 @@
 namespace vergence {
 
 /// Shared parts of the two vectors below: at most capacity() values of type T, never a heap. When
-/// full, push() refuses and says so. Storage has data() and size().
+/// full, push() refuses and returns false. Storage has data() and size().
 template <class T, class Storage>
 class VectorOn {
  public:

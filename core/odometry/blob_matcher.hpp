@@ -17,7 +17,7 @@ inline constexpr std::size_t kMaxBlobs =
     1500;  // of an image: about what a street shows above the default response
 
 /// SURF-64 across two images of which nothing is known: upright, mutually best. docs/benchmarks.md
-/// says how it compares with corners.
+/// compares it with corners.
 ///
 /// Threads  One caller.
 /// Memory   From the arena at construction. Of more than kMaxBlobs blobs the weakest are dropped.

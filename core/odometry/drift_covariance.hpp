@@ -4,7 +4,7 @@
 namespace vergence::odometry {
 
 inline constexpr double kLongestExtrapolation =
-    2.0;  // s that a motion is carried on for: a vehicle's speed says nothing about later
+    2.0;  // s that a motion is carried on for: later a vehicle's speed is unknown
 
 /// Covariance of one frame's motion, translation (m) first, then rotation (rad), about the left
 /// camera's axes.

@@ -33,7 +33,7 @@ struct StereoCount {
   int corners = 0;
   int matched = 0;              // in front of the rig
   int near = 0;                 // of these, with a disparity that measures depth
-  EpipolarEvidence evidence{};  // what their distances from the epipolar lines say
+  EpipolarEvidence evidence{};  // by their distances from the epipolar lines
 };
 
 /// A match between the left and another image found without knowing the rig: ideal pixels.

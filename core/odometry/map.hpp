@@ -63,7 +63,7 @@ struct MapPoint {
   std::uint8_t in_images =
       0;  // bit k: found in camera k's image now, whether that agrees with the pose or not
   bool across = false;          // another camera than `left` has seen it where it should be
-  bool logged = false;          // `logged_at` says where
+  bool logged = false;          // at `logged_at`
   Eigen::Vector2f logged_at{};  // raw pixel in `left` when the track log last took a frame
   std::array<Eigen::Vector2f, kMaxCameras> raw{};   // this frame's pixels as the image has them
   std::array<PointObservation, kMaxWindow> seen{};  // by keyframe slot

@@ -131,7 +131,7 @@ double Odometry::new_points(int min_corners, FrameOutcome* out) noexcept {
 void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
                             FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
-  // New points are made by the calibration, and without one they say nothing.
+  // New points are made by the calibration, and without one they cannot be made.
   out->moving = others_move_ || (link_ == Link::linked && new_points_.lost());
   const Reason of_images = weakness(images, rig_.cameras);
   if (of_images != Reason::none)

@@ -101,7 +101,7 @@ class Odometry {
   /// recomputed with the new calibration; if not, a new scene is made from that frame where
   /// possible.
   void link(const RigCalibration& rig) noexcept;
-  /// Call after process() of every frame: does what the outcome says is due, unless a link was
+  /// Call after process() of every frame: does what the outcome reports as due, unless a link was
   /// revoked since.
   void rebuild(FrameOutcome* out) noexcept;
   /// Unlinks the cameras from the next frame on; the scene stays.

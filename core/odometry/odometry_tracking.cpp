@@ -87,7 +87,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   clock.mark(Stage::track);
   fit = this->fit(coarse, false);
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
-  // One facade looks like the next: a place is believed again only if most of what should be seen
+  // One facade looks like the next: a place is recognised only if most of what should be seen
   // from there is.
   if (unreliable && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
     fit.found = false;

@@ -7,7 +7,7 @@ namespace vergence {
 /// for each field.
 struct OdometryOptions {
   int features = 400;         // tracked points per image aimed at, 50 … 1000
-  int init_features = 0;      // features that initialise an uncalibrated rig: 0
+  int init_features = 0;      // features that give the first transform of an uncalibrated rig: 0
                               // corners, 1 SURF-64 (docs/benchmarks.md)
   int pyramid_levels = 4;     // 2 … 6; each halves the image
   double band_px = 2.0;       // half width of the band about the epipolar line across, 0.5 … 5
@@ -25,7 +25,7 @@ struct OdometryOptions {
                                     // makes a new one, 0.005 … 0.3
   double keyframe_tracked = 0.8;  // share of the last keyframe's points still tracked below which a
                                   // new one is made, 0.1 … 1
-  int min_inliers = 20;           // points under which a pose is not believed (`lost`), 6 … 200
+  int min_inliers = 20;           // points below which a pose is not used (`lost`), 6 … 200
   int ok_inliers = 40;            // points under which it is `degraded: few_inliers`
   int mlesac_hypotheses = 100;    // at most, a frame, 10 … 1000
   std::uint64_t seed = 1;         // of the sampling; same seed, same poses

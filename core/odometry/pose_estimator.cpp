@@ -15,7 +15,7 @@ namespace {
 constexpr double kStereoShare =
     0.5;  // of the points found in two cameras, in which both must agree with the pose
 constexpr int kCameraHolds = 8;   // inliers for a camera to count as one that supports the pose
-constexpr int kCameraAlone = 12;  // inliers for a camera's own pose to be believed
+constexpr int kCameraAlone = 12;  // inliers for a camera's own pose to be used
 constexpr int kByChance = 4;      // matches to one that agrees: wrong ones agree by chance
 
 /// Zero where the observations hold no pose.

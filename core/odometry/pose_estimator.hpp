@@ -37,7 +37,7 @@ class PoseEstimator {
   /// From `start`; with `sample` by MLESAC first, else by refinement alone.
   [[nodiscard]] PoseFit fit_linked(const Map& map, const Transform& start, bool sample) noexcept;
   /// By the left camera's observations alone; the others' are judged by the pose that comes out.
-  /// Not found: the fit says so.
+  /// Not found: stated in the fit.
   [[nodiscard]] PoseFit fit_left(const Map& map, const Transform& start) noexcept;
   /// For a fit, the last one, of cameras that contradict each other: which is right the images do
   /// not say, but the left one is what the pose is of. Its own fit if that is good enough; else

@@ -134,7 +134,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
         fits = observations_.push(o);
       }
     }
-    // Seen from one place only, a point says nothing about poses.
+    // Seen from one place only, a point does not constrain poses.
     if (!fits || keyframes < 2 || observations_.size() - first < 2) {
       observations_.truncate(first);
       continue;

@@ -5,8 +5,8 @@
 
 namespace vergence {
 
-/// Non-owning view of an 8-bit grey image, row 0 on top. Bytes between `width` and `stride` are
-/// padding of any value.
+/// View of an 8-bit grey image, which it does not own, row 0 on top. Bytes between `width` and
+/// `stride` are padding of any value.
 ///
 /// Ownership  A view; the memory outlives it by contract of who hands it out (FramePool slot,
 ///            pyramid level).

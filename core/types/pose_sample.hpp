@@ -22,7 +22,7 @@ enum class State : std::uint8_t {
 /// Status of a pose.
 enum class PoseStatus : std::uint8_t {
   ok,        // use it
-  degraded,  // usable, `reason` says what is weak
+  degraded,  // usable, `reason` names what is weak
   lost,      // there is no pose: do not use
 };
 

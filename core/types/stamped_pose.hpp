@@ -5,7 +5,7 @@
 namespace vergence {
 
 /// Where a body was at a time. p_world = T_world_body * p_body, metres; what `world` and `body` are
-/// says who hands it over.
+/// states who hands it over.
 struct StampedPose {
   Stamp stamp{};
   Transform T_world_body{};

@@ -34,7 +34,7 @@ HWY_INLINE void transform(const double* R, const double* t, const V X[3], V out[
         hn::MulAdd(set(R[3 * r + 1]), X[1], hn::MulAdd(set(R[3 * r + 2]), X[2], set(t[r]))));
 }
 
-/// Results of a slot for its points. Aggregate-initialised: its default constructor, which no code
+/// Results of a slot for its points. Aggregate-initialised: its default constructor, which is not
 /// writes, would be compiled for the machine's least instruction set, and a vector's cannot be
 /// inlined there.
 struct Residual {

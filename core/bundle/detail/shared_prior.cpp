@@ -15,7 +15,7 @@ using Index = Eigen::Index;
 constexpr double kRidge =
     1e-9;  // of a unit variance: keeps what was written with few digits positive definite
 
-/// Rows of the published parameters that say something about one place in the layout: at most six,
+/// Rows of the published parameters that constrain one place in the layout: at most six,
 /// with their factors.
 struct Combination {
   int first = 0, count = 0;

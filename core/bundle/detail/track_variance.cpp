@@ -136,7 +136,7 @@ class Clusters {
       sums_[cluster] = s;
     any_[cluster] = true;
   }
-  /// A single cluster's gradient is zero at the minimum, whatever its errors: it says nothing.
+  /// A single cluster's gradient is zero at the minimum, whatever its errors: it is not used.
   [[nodiscard]] bool enough() const noexcept {
     return std::count(any_.begin(), any_.end(), true) > 1;
   }

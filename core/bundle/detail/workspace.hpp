@@ -14,7 +14,7 @@ inline constexpr int kBlock =
 inline constexpr int kYSize = kBlock * 3 * kBatch;  // doubles of one block of Y
 inline constexpr int kYTop = 3 * 3 * kBatch;        // of its first three rows
 inline constexpr int kFactorRows = 11;              // of PointFactor
-inline constexpr double kFar = 1e30;                // m: depth of a point without observations
+inline constexpr double kFar = 1e30;                // m: depth of a point that no camera sees
 inline constexpr int kPoseSums = 27;                // 21 of the symmetric 6×6, 6 of the gradient
 inline constexpr int kGroupLimit =
     16;  // batches multiplied together: one block of each, 18 kB, stays in the first-level cache

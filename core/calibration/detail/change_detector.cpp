@@ -14,7 +14,7 @@ constexpr double kFirstLife = 6.5, kGuessFrames = 30;
 constexpr double kSlowUpdate = 1.0 / 300, kFastUpdate = 1.0 / 10;  // a frame
 constexpr double kMinInflation = 0.3,
                  kMaxInflation =
-                     200;  // below: sigmas claimed far too large; above: not a spread any more
+                     200;  // below: stated sigmas are far too large; above: not a spread any more
 constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most,
                                       // else one frame blinds the monitor
 // Windows that are also held against what was seen before them: a knock smaller than the

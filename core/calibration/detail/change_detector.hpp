@@ -28,8 +28,8 @@ struct Decision {
   int frames = 0;  // measured since the onset
 };
 
-/// Evidence of the past moving frames in sliding windows, and the tests on it. It does not depend
-/// on images or tracks.
+/// Evidence of the past moving frames in sliding windows, and the tests on it. Independent of
+/// images and tracks.
 ///
 /// Memory  Fixed, in place (some 50 kB). Time: a few µs a frame; up to 0.1 ms while something is
 ///         over the threshold.

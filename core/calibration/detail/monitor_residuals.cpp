@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kStereoRounds =
     3;  // of reweighting: the scale falls from that of a knock to that of the noise in two
-constexpr double kMinScale = 0.1;  // of the sigma the observations claim
+constexpr double kMinScale = 0.1;  // of the observations' sigma
 // An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors
 // at kTukey.
 constexpr double kTukeySpread = 1.46;

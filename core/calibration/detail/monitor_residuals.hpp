@@ -34,7 +34,7 @@ class MonitorResiduals {
  public:
   void reset() noexcept;
   /// `follow`: remember what each track said, for spread_life. Off while the camera stands, where
-  /// tracks live for ever.
+  /// tracks do not end.
   [[nodiscard]] StereoResiduals stereo(const Reference& reference, const MonitorFrame& frame,
                                        int min_matches, bool follow) noexcept;
 

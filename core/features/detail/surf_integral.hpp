@@ -18,7 +18,7 @@ class IntegralImage {
   IntegralImage(int max_width, int max_height, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
-  /// Precondition: the picture is not larger than the constructor was told.
+  /// Precondition: the image is not larger than given to the constructor.
   void build(const ImageView& image) noexcept;
   void clear() noexcept { width_ = height_ = 0; }
 

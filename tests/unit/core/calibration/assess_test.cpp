@@ -43,7 +43,7 @@ TEST(Assessment, sameRigIsConfirmedWithASmallSigma) {
   EXPECT_EQ(a.depth_m, 20);
   EXPECT_LT(a.difference_percent, 1e-8);
   EXPECT_NEAR(a.sigma_percent, 0.267, 0.03);
-  EXPECT_TRUE(a.confirmed);
+  EXPECT_TRUE(a.verified);
   EXPECT_FALSE(a.contradicted);
   EXPECT_FALSE(a.better);
   EXPECT_FALSE(a.worse);
@@ -59,26 +59,26 @@ TEST(Assessment, wrongYawIsContradicted) {
     EXPECT_LT(a.log_odds, 0) << yaw;
     EXPECT_TRUE(a.contradicted) << yaw;
     EXPECT_TRUE(a.nearer) << yaw;
-    EXPECT_FALSE(a.confirmed) << yaw;
+    EXPECT_FALSE(a.verified) << yaw;
     EXPECT_FALSE(a.worse) << yaw;
   }
 }
 
 TEST(Assessment, onlyIndependentSourceAddsEvidence) {
   Measured sharp(1e-4);
-  EXPECT_TRUE(sharp.of({0, 0.5e-3, 0}).confirmed);   // 1.3 %
-  EXPECT_FALSE(sharp.of({0, 1.5e-3, 0}).confirmed);  // 4 %
+  EXPECT_TRUE(sharp.of({0, 0.5e-3, 0}).verified);   // 1.3 %
+  EXPECT_FALSE(sharp.of({0, 1.5e-3, 0}).verified);  // 4 %
   Measured blunt(0.6e-3);  // 1.6 %, and 1.6 % of difference: together more than 2 %
-  EXPECT_TRUE(blunt.of({0, 0.6e-3, 0}).confirmed);
+  EXPECT_TRUE(blunt.of({0, 0.6e-3, 0}).verified);
   blunt.source = CalibrationOrigin::this_drive;
-  EXPECT_FALSE(blunt.of({0, 0.6e-3, 0}).confirmed);
+  EXPECT_FALSE(blunt.of({0, 0.6e-3, 0}).verified);
 }
 
 TEST(Assessment, largeSigmaDecidesNothing) {
   for (const double yaw : {0.0, 1.5e-3, 5e-3}) {
     Measured m(10e-3);  // 27 %: no evidence about a rig that may be 15 mrad off
     const Assessment a = m.of({0, yaw, 0});
-    EXPECT_FALSE(a.confirmed) << yaw;
+    EXPECT_FALSE(a.verified) << yaw;
     EXPECT_FALSE(a.contradicted) << yaw;
     EXPECT_FALSE(a.nearer) << yaw;
   }

@@ -210,7 +210,7 @@ TEST(Gates, uncertainCameraHidesNoContradiction) {
     ASSERT_FALSE(assessed().contradicted);
     c.turn(&c.in_use, {0, 0.3, 0}, wrong);
     EXPECT_TRUE(assessed().contradicted) << wrong;
-    EXPECT_FALSE(assessed().confirmed);
+    EXPECT_FALSE(assessed().verified);
   }
 }
 

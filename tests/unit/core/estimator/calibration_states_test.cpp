@@ -16,7 +16,7 @@ namespace vergence {
 namespace {
 
 constexpr std::array kStateNames = {"none", "unverified", "verified", "suspect"};
-constexpr std::array kTriggerNames = {"adopted",      "adopted_verified", "confirmed",
+constexpr std::array kTriggerNames = {"adopted",      "adopted_verified", "verified",
                                       "contradicted", "suspected",        "kept"};
 constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "pair_found",
@@ -57,12 +57,12 @@ TEST(CalibrationStates, suspectAndVerifiedHaveTheirTriggersOnly) {
   using T = CalibrationTrigger;
   for (const CalibrationTransition& t : kCalibrationTransitions) {
     EXPECT_EQ(t.to == S::suspect, t.on == T::suspected);
-    EXPECT_EQ(t.to == S::verified, t.on == T::confirmed || t.on == T::adopted_verified);
+    EXPECT_EQ(t.to == S::verified, t.on == T::verified || t.on == T::adopted_verified);
     EXPECT_NE(t.to, S::none);
     EXPECT_EQ(after(t.from, t.on), t.to) << "a row hides another";
   }
   EXPECT_EQ(after(S::none, T::suspected), S::none);
-  EXPECT_EQ(after(S::suspect, T::confirmed), S::suspect);
+  EXPECT_EQ(after(S::suspect, T::verified), S::suspect);
 }
 
 TEST(CalibrationStates, readmeDiagramsMatchTheTables) {
