@@ -270,9 +270,17 @@ const char* reason(Gate gate) noexcept {
 
 double depth_excess(const RigCalibration& rig, const CalibrationOptions& o,
                     double pixel_sigma) noexcept {
+  RigCalibration used = rig;
+  // No number of frames reduces the uncertainty of intrinsics that are fixed.
+  if (o.intrinsics != IntrinsicsEstimation::full) {
+    used.covariance = {};
+    for (Mat6& C : used.covariance_total) C.setZero();
+    used.sigma_total = used.sigma_noise;
+  }
   double worst = 0;
   for (int k = 1; k < rig.cameras; ++k)
-    worst = std::max(worst, depth_error_percent(rig, k, reference_depth_m(rig, k, o, pixel_sigma)));
+    worst =
+        std::max(worst, depth_error_percent(used, k, reference_depth_m(rig, k, o, pixel_sigma)));
   return worst / o.usable_depth_percent;
 }
 

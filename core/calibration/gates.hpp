@@ -137,7 +137,8 @@ struct AcceptanceInput {
 [[nodiscard]] bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept;
 
 /// Ratio of the sigma of a depth measured with `rig`, at reference_depth_m() and with the worst of
-/// its further cameras, to usable_depth_percent; a solution with more than 1 is not adopted.
+/// its further cameras, to usable_depth_percent; a solution with more than 1 is not adopted. With
+/// fixed intrinsics it is the sigma by noise.
 [[nodiscard]] double depth_excess(const RigCalibration& rig, const CalibrationOptions& options,
                                   double pixel_sigma) noexcept;
 
