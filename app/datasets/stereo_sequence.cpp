@@ -37,9 +37,7 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::db3:
       return detail::open_bag(detail::BagFormat::sqlite, folder, given, o.topics);
     case SequenceFormat::session:
-      refuse(folder, 0,
-             "is a recorded session, which is replayed as it was recorded; for anything else write "
-             "it as a data set: vergence export SESSION --format folder --out DIR");
+      return detail::open_bag(detail::BagFormat::mcap, folder, given, o.topics);
   }
   refuse(folder, 0, "has no reader for its format");
 }

@@ -146,8 +146,9 @@ std::vector<std::string> recorded_settings(const std::filesystem::path& session)
 }
 
 ExitCode run_replay(const ReplayRequest& request) {
+  // With another calibration a recorded session is a sequence of images like any other.
   if (request.format == SequenceFormat::session && !request.calibrate_first && !request.known)
-    return replay_recording(request);  // with these open_drive() says how else
+    return replay_recording(request);
   StereoSequence sequence = open_drive(request);
   if (request.start >= sequence.pairs.size())
     throw InputError(

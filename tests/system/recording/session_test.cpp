@@ -169,6 +169,14 @@ TEST_F(RecordedDrive, recordingIsExportedToFolderAndEuroc) {
   EXPECT_FALSE(std::filesystem::exists(out("kitti")));
 }
 
+TEST_F(RecordedDrive, recordingIsCalibratedFromItsImages) {
+  const auto file = out("found.yaml");
+  const Outcome o =
+      run_vergence("calibrate sequence '" + session().string() + "' --out '" + file.string() + "'");
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_TRUE(std::filesystem::exists(file));
+}
+
 // In real time: images are dropped as this machine is busy, and the solver answers when it is done.
 TEST(Recorded, realTimeRunReplaysBitForBit) {
   const TemporaryFolder folder;
