@@ -1,5 +1,5 @@
 // camera_info holds a rectification: writing it is OpenCV's work, reading it is not
-// (app/datasets/ros_camera_info.cpp).
+// (app/datasets/ros_camera.cpp).
 #include <algorithm>
 
 #include <fmt/format.h>

@@ -581,8 +581,7 @@ Group calibration_options() {
                {"focal", calibration::IntrinsicsEstimation::focal},
                {"full", calibration::IntrinsicsEstimation::full}},
               "Intrinsics that are estimated with the extrinsics: none, the focal length of each "
-              "additional camera, or all of them where the data show that the initial ones are "
-              "off.")
+              "additional camera, or all of them.")
       .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%",
               "Prior sigma of a focal length.")
       .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px",
@@ -618,7 +617,8 @@ Group calibration_options() {
               "Predicted depth error at 20 m up to which the calibration is rated `good`.")
       .number(
           "usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
-          "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is `poor`.")
+          "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is `poor`. A "
+          "solution with a larger one at `reference_depth_m` is not adopted.")
       .also(Rows<Configuration>(
                 "calibration", "", [](auto& c) -> auto& { return c; })
                 .choice("online", &Configuration::online, {"off", "on"},

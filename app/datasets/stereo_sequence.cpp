@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <system_error>
 
+#include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/pairing.hpp"
+#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -15,6 +17,22 @@ namespace vergence::app {
 namespace {
 
 std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
+
+/// The recording of a session as a sequence of images, with the calibration that the session began
+/// with and its INS samples.
+StereoSequence open_session(const std::filesystem::path& folder, const SequenceOptions& o) {
+  StereoSequence sequence = detail::open_bag(detail::BagFormat::mcap, folder, true, o.topics);
+  const RecordedSession session = RecordedSession::open(folder);
+  if (!o.calibration) {
+    sequence.calibration =
+        parse_calibration(session.description().calibration, folder.string()).rig;
+    sequence.calibration_source = "the recording";
+  }
+  RecordedIns ins;
+  ins.readings = session.readings();
+  sequence.ins = std::make_shared<const RecordedIns>(std::move(ins));
+  return sequence;
+}
 
 StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder,
                               const SequenceOptions& o) {
@@ -37,7 +55,7 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::db3:
       return detail::open_bag(detail::BagFormat::sqlite, folder, given, o.topics);
     case SequenceFormat::session:
-      return detail::open_bag(detail::BagFormat::mcap, folder, given, o.topics);
+      return open_session(folder, o);
   }
   refuse(folder, 0, "has no reader for its format");
 }

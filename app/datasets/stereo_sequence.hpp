@@ -137,7 +137,8 @@ struct SequenceOptions {
 /// (docs/datasets.md); rosbag    paired by the nearest header.stamp, that of the left camera
 /// counts; CameraInfo beside
 ///           the images, and the INS.
-/// session   Refused: SessionSource replays it as it was recorded.
+/// session   A session's folder with drive.mcap (docs/session_files.md), as a sequence of images;
+///           SessionSource replays it as it was recorded.
 ///
 /// InputError (file, line, what): folders or files that are not there, no images, numbers of images
 /// and times that do not go together, times that are no numbers, times in another unit or running

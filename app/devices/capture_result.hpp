@@ -27,7 +27,7 @@ struct ImageStatistics {
 /// Precondition: not empty. Images of one row or column have no sharpness.
 [[nodiscard]] ImageStatistics image_statistics(const ImageView& image) noexcept;
 
-/// One thing that strikes the eye.
+/// A visible defect of an image.
 struct ImageIssue {
   /// True if the images are unusable, false if they could be better.
   bool unusable = false;

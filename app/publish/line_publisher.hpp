@@ -26,8 +26,9 @@ namespace vergence::app {
 /// Threads  on_…(): the estimator's, which pushes into rings, copies two images where a reader is
 ///          due, and wakes; no lock, no system call but the wake. Formatting, sending and requests:
 ///          a thread of its own, made by the constructor.
-/// Memory   Fixed for the estimator's part; two images from the first request for them on. Ring
-///          full: that line is not made, and counted.
+/// Memory   Fixed for the estimator's part; from the first request for images on, two pairs of them
+///          and one for each reader that requested them. Ring full: that line is left out and
+///          counted.
 /// Errors   The constructor throws std::system_error when no thread can be had.
 class LinePublisher final : public SessionObserver {
  public:

@@ -51,7 +51,8 @@ struct LineSocketCounters {
 /// Response to a request.
 struct LineResponse {
   std::string line{};  // line feed included
-  /// Positive: the reader gets images from now on, no more often than this, and no more lines.
+  /// Positive: the reader gets images from now on, one pair per interval on average and never two
+  /// within half of it, and no more lines.
   Duration image_interval{};
 };
 

@@ -109,6 +109,7 @@ void LivePage::on_enu_alignment(const EnuAlignment& alignment, const Geodetic& o
   push(&alignments_, {alignment, origin});
 }
 
+void LivePage::on_pose(const FrameReport& report) noexcept { push(&poses_, report); }
 void LivePage::on_report(const FrameReport& report) noexcept { push(&reports_, report); }
 void LivePage::on_event(const EventRecord& event) noexcept { push(&events_, event); }
 void LivePage::on_calibration(const CalibrationRecord& calibration) noexcept {
@@ -145,7 +146,8 @@ void LivePage::drain() {
   const bool ended = ended_.load(std::memory_order_acquire);
   for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
   for (PublishedEnuAlignment alignment; alignments_.pop(&alignment);) state_.add(alignment);
-  for (FrameReport report; reports_.pop(&report);) state_.add(report);
+  for (FrameReport pose; poses_.pop(&pose);) state_.add_pose(pose);
+  for (FrameReport report; reports_.pop(&report);) state_.add_report(report);
   for (EventRecord event; events_.pop(&event);) state_.add(event);
   if (ended) state_.end();
 }

@@ -45,8 +45,7 @@ inline constexpr int kThumbnailWidth = 480;
 ///          of its own, made by the constructor, that yields to the estimator's where a core is
 ///          short.
 /// Memory   Rings fixed; the images' memory with the first viewer. Ring full: frames are left out,
-/// totals
-///          stay true.
+///          totals stay true.
 /// Errors   The constructor throws InputError (HttpServer), std::system_error.
 class LivePage final : public SessionObserver {
  public:
@@ -65,6 +64,7 @@ class LivePage final : public SessionObserver {
   void on_frame(const RigFrame& frame) noexcept override { (void)images_.copy(frame); }
   void on_tracks(const calibration::TrackLog& tracks) noexcept override;
   void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override;
+  void on_pose(const FrameReport& report) noexcept override;
   void on_report(const FrameReport& report) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
@@ -87,6 +87,7 @@ class LivePage final : public SessionObserver {
   std::function<double()> line_age_ms_;
 
   // From the estimator's thread to the page's.
+  Ring<FrameReport, 64> poses_;
   Ring<FrameReport, 256> reports_;
   Ring<EventRecord, 64> events_;
   Ring<CalibrationRecord, 8> calibrations_;

@@ -31,15 +31,15 @@ json event_json(const EventRecord& event, Stamp first) {
 json camera_json(const RigCalibration& rig, std::size_t k) {
   const Transform& T = rig.T_camera_left[k];
   const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
-  json statistics = json::array();
+  json parameters = json::array();
   const auto& sigma = rig.sigma_total[k];
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
     const auto axis = static_cast<Eigen::Index>(i % 3);
-    statistics.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
+    parameters.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
                           sigma[i] > 0 ? rounded(2 * sigma[i] * unit, i < 3 ? 4 : 2) : nullptr});
   }
-  return {{"figures", statistics}};
+  return {{"parameters", parameters}};
 }
 
 // A status is old after this time without a frame, or after this many intervals between frames.
@@ -55,10 +55,14 @@ void LiveState::add_interval(HostStamp estimated) noexcept {
   interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
 }
 
-void LiveState::add(const FrameReport& report) {
+void LiveState::add_pose(const FrameReport& report) {
   if (newest_) add_interval(report.estimated);
   newest_ = report;
   estimate_.add(static_cast<double>(report.pose.estimate_ms));
+}
+
+void LiveState::add_report(const FrameReport& report) {
+  newest_report_ = report;
   const PoseStatus status = report.pose.status;
   if (status == PoseStatus::lost && !report.ins_valid) return;
   LiveTrail::Place place;
@@ -78,9 +82,9 @@ void LiveState::add(const EventRecord& event) {
   if (events_.size() == kEvents) events_.pop_front();
   events_.emplace_back(++version_, event);
   const std::string_view kind = event.kind;
-  const bool confirmed = kind == "calibration_verified";
-  if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed") {
-    confirmed_ = confirmed;
+  const bool verified = kind == "calibration_verified";
+  if (verified || kind == "calibration_contradicted" || kind == "rig_changed") {
+    verified_ = verified;
     calibration_version_ = version_;
   }
 }
@@ -92,7 +96,7 @@ void LiveState::add(const CalibrationRecord& calibration) {
   if (calibration.is_refinement) measured_ = calibration;
   if (!calibration.accepted) return;
   measured_.reset();
-  if (calibration.decided) confirmed_ = calibration.verified;
+  if (calibration.decided) verified_ = calibration.verified;
   in_use_ = calibration;
 }
 
@@ -136,14 +140,14 @@ json LiveState::frame_json(HostStamp now) const {
                      : json(nullptr)}};
   if (p.status != PoseStatus::lost)
     for (const double v : p.T_world_left.t) out["position_m"].push_back(rounded(v, 3));
-  if (f.compared) {
-    const auto e = f.error();
+  if (newest_report_ && newest_report_->compared) {
+    const auto e = newest_report_->error();
     out["ins"] = {{"across_m", rounded(std::hypot(e[0], e[1]), 2)},
                   {"up_m", rounded(e[2], 2)},
                   {"heading_deg", rounded(e[3], 2)}};
   }
-  if (f.placed) {
-    const EnuPose& ours = f.ours;
+  if (newest_report_ && newest_report_->placed) {
+    const EnuPose& ours = newest_report_->ours;
     out["enu"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
                   {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
                   {"height_m", rounded(ours.position.height_m, 2)},
@@ -158,7 +162,7 @@ json LiveState::calibration_json() const {
     if (*record)
       for (int k = 0; k < (*record)->calibration.cameras; ++k)
         out[key].push_back(camera_json((*record)->calibration, static_cast<std::size_t>(k)));
-  out["confirmed"] = confirmed_;
+  out["confirmed"] = verified_;
   if (in_use_) {
     out["cause"] = in_use_->cause_name();
     out["frames"] = in_use_->calibration.frames;

@@ -51,15 +51,17 @@ class LiveTrail {
 /// State of the live page, kept so that a late viewer sees the whole session. Every change has a
 /// version, so that a viewer gets what has changed since the version that it has.
 ///
-/// Not thread-safe. Memory  Bounded: the trail is thinned when it is full, of events and
-/// calibrations
-///          the newest stay.
+/// Not thread-safe. Memory is bounded: the trail is thinned when it is full, of events and
+/// calibrations the newest stay.
 class LiveState {
  public:
   static constexpr std::size_t kEvents = 60, kCalibrations = 30;
 
   void begin(const SessionStart& start) { start_ = start; }
-  void add(const FrameReport& report);
+  /// Adds a frame as soon as it has a pose: status, counts and times.
+  void add_pose(const FrameReport& report);
+  /// Adds the frame to the trail once it is compared with the INS.
+  void add_report(const FrameReport& report);
   void add(const EventRecord& event);
   void add(const CalibrationRecord& calibration);
   void add(const PublishedEnuAlignment& alignment);
@@ -80,14 +82,14 @@ class LiveState {
   double interval_s_ = 0;  // between frames, on the host's clock
   bool ended_ = false;
   TimeHistogram estimate_;
-  std::optional<FrameReport> newest_{};
+  std::optional<FrameReport> newest_{}, newest_report_{};
   LiveTrail trail_;
   std::uint64_t version_ = 1, calibration_version_ = 1, alignment_version_ = 0;
   std::deque<std::pair<std::uint64_t, EventRecord>> events_{};  // with the version of each
   std::deque<CalibrationRecord> calibrations_{};
   std::optional<CalibrationRecord> in_use_{};
   std::optional<CalibrationRecord> measured_{};  // by the drive, beside the one in use
-  bool confirmed_ = false;
+  bool verified_ = false;
   std::optional<PublishedEnuAlignment> alignment_{};
 };
 

@@ -77,6 +77,10 @@ void declare(CLI::App* app, Options* o) {
 }
 
 void finish(Options* o) {
+  // The pose stream serves no slower rate.
+  if (o->image_rate_hz > 0 && o->image_rate_hz < 0.01)
+    throw InputError(
+        fmt::format("--image-rate-hz {:g}: must be 0 or 0.01 to 200", o->image_rate_hz));
   std::string& space = o->bridge.name_space;
   if (!space.starts_with('/')) space.insert(0, "/");
   while (space.ends_with('/')) space.pop_back();

@@ -55,9 +55,8 @@ struct DrivePass {
                                                        const DriveWatcher& watch);
 
 /// Twice over the drive, with twice its features: from scratch, which gives the tracks their rig;
-/// then all of its frames in stretches, joined, and each by itself to be held against the next
-///. `given`: the drive's own calibration; of it lenses, sigmas and the baseline's
-/// length are read.
+/// then all of its frames in segments, joined, and each segment alone, to be compared with the
+/// next. `given`: the drive's own calibration; its intrinsics, sigmas and baseline length are read.
 [[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
                                                const StartingCalibration& given);
 

@@ -28,7 +28,7 @@ void print(const std::vector<std::string>& messages, Progress* progress) {
 
 DriveThreads::DriveThreads(const RealtimeSettings& settings)
     : realtime_(make_request(settings), system_) {
-  constexpr std::size_t kThreads = 64;  // more than a drive has: looking takes no heap then
+  constexpr std::size_t kThreads = 64;  // more than a drive has, so that polling does not allocate
   threads_.reserve(kThreads);
 }
 
@@ -36,8 +36,8 @@ void DriveThreads::lock_memory(Progress* progress) { print(realtime_.lock_memory
 
 void DriveThreads::poll(Progress* progress) {
   constexpr int kAtFirst = 20, kLater = 20;  // in the first second always, then once a second
-  const int poll = polls_++;
-  if (poll >= kAtFirst && poll % kLater != 0) return;
+  const int count = polls_++;
+  if (count >= kAtFirst && count % kLater != 0) return;
   process_threads(&threads_);
   for (const ProcessThread& thread : threads_)
     if (thread.ours()) ours_.insert(thread.name);

@@ -18,7 +18,7 @@ namespace {
 /// none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
   if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
-      is_bag(request.format))
+      is_bag(request.format) || request.format == SequenceFormat::session)
     return {};  // their layouts have no truth
   const bool plain = request.format == SequenceFormat::folder;
   std::error_code ignored;

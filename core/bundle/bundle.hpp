@@ -226,8 +226,8 @@ struct BundleWorkspace;
 /// Errors     solve() never throws and never leaves a NaN; the status states what was changed. The
 ///            constructor throws std::length_error if the arena is too small and
 ///            std::invalid_argument for impossible capacities.
-/// Source     Warren, McKinnon, Upcroft, ICRA 2013, with the corrected order of transforms (METHOD
-///            §1).
+/// Source     Warren, McKinnon, Upcroft, ICRA 2013, with the corrected order of transforms
+///            (core/README.md).
 class BundleAdjuster {
  public:
   BundleAdjuster(const BundleCapacities& capacities, Arena& arena);

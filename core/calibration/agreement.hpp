@@ -6,8 +6,8 @@
 
 namespace vergence::calibration {
 
-/// Normalised squared differences of two calibrations found from disjoint stretches of one drive
-///: 1 on average where their sigmas are true, and no truth is needed to see it.
+/// Normalised squared differences of two calibrations found from disjoint segments of one
+/// drive: 1 on average where their sigmas are true; no ground truth is needed.
 struct Agreement {
   static constexpr std::size_t kDepths = 4;
   static constexpr std::array<double, kDepths> kDepthM = {5, 10, 20, 50};

@@ -50,6 +50,7 @@ void FocalCheck::measure(RigSolver& solver, RigSolveRequest request,
 void FocalCheck::take(bool full) noexcept {
   if (!measures_ || solved_.measured_px <= 0) return;
   newest_ = solved_;
+  measured_frames_ = frames_;
   known_ = full && !newest_.contradicted;
 }
 

@@ -28,10 +28,10 @@ class FocalCheck {
   /// focal length as it was given: a lens keeps it.
   void begin_solve(std::size_t frames, bool full) noexcept {
     measures_ = enabled_ && !known_ && (full || frames >= 2 * measured_frames_);
-    if (measures_) measured_frames_ = frames;
+    frames_ = frames;
   }
-  /// After `solved`, the solve of the solver's log that `request` asked for;
-  /// begins with its result. Frames before the log's are not used: their posterior assumes the
+  /// Call after `solved`, the solve of the solver's log that `request` asked for; begins with its
+  /// result. Frames before the log's are not used: their posterior assumes the
   /// focal length.
   void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& solved) noexcept;
   /// The solve is over, and its frames count. `full`: no solve has more of them.
@@ -43,8 +43,8 @@ class FocalCheck {
 
  private:
   bool enabled_, measures_ = false;
-  bool known_ = false;  // by a full window, and as it was given
-  std::size_t measured_frames_ = 0;
+  bool known_ = false;                            // by a full window, and as it was given
+  std::size_t frames_ = 0, measured_frames_ = 0;  // of the running solve, of the newest result
   FocalMeasurement newest_{}, solved_{};
   double solve_ms_ = 0;
 };

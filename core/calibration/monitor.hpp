@@ -98,7 +98,7 @@ struct MonitorResult {
 ///     Arena arena(Monitor::memory_needed(options));
 ///     Monitor monitor(options, arena);
 ///     if (!monitor.set_reference(T_right_left, left, right, covariance)) return;
-///     const auto verdict = monitor.look(frame);  // each posed frame
+///     const auto verdict = monitor.update(frame);  // each posed frame
 ///     if (verdict.kind != MonitorResult::Kind::quiet) recalibrate(verdict.onset_frame);
 ///
 /// Memory   All of it from the arena in the constructor. update() allocates nothing.

@@ -7,7 +7,7 @@ namespace vergence::calibration {
 enum class IntrinsicsEstimation : std::uint8_t {
   fixed,  // none
   focal,  // the focal length of each additional camera, with its prior
-  full,   // also principal points and distortion, where the data show that the initial ones are off
+  full,   // also principal points of additional cameras and all distortion, with their priors
 };
 
 /// Options of `calibration:`; the configuration's schema has a row for each field.

@@ -53,7 +53,7 @@ double RigSolver::length_noise(const BundleResult& r) const noexcept {
 }
 
 void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexcept {
-  // Scale error of the path from uncertain intrinsics (METHOD's numbers, §3.3 and §5): half of the
+  // Scale error of the path from uncertain intrinsics: half of the
   // relative error of the focal lengths, and 0.31 % per mrad of error of the principal points.
   constexpr double kScaleByFocal = 0.5, kScaleByRadian = 3.1;
   RigCalibration& rig = s->rig;

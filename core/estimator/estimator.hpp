@@ -137,7 +137,7 @@ class Estimator {
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
   [[nodiscard]] bool calibrated() const noexcept;
   /// True if depths of the calibration in use were measured to be within the tolerated error
-  /// (METHOD §6.4).
+  ///.
   [[nodiscard]] bool verified() const noexcept;
   /// The newest moving frames with their tracks; empty without `online`. Valid until the next
   /// process().

@@ -132,7 +132,7 @@ void Estimator::Parts::check_motion(const odometry::FrameOutcome& out, const Mat
                     Reason::weak_geometry, last_number);
 }
 
-/// Enters the doubts that a posed frame gives rise to.
+/// Enters the degradations that a posed frame causes.
 void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
                                            Pairing pairing) noexcept {
   degradations.hold(Degradation::pairing, pairing == Pairing::contradicted,
@@ -147,9 +147,9 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
   if (out.moving && !degradations.any_up_to(Degradation::rig))
     degradations.enter(Degradation::dynamic_scene, Reason::dynamic_scene, last_number,
                        kMovingFrames);
-  // Errors of doubted frames stay in the window's keyframes and points; the window corrects them
+  // Errors of degraded frames stay in the window's keyframes and points; the window corrects them
   // over the next frames, whose motions are off by the corrections. So poses stay degraded for as
-  // many frames as were doubted, at most for a window's length.
+  // many frames as were degraded, at most for a window's length.
   if (out.relinked || out.restarted)
     degradations.strike(Degradation::window);
   else if (out.gap_s > 0 || out.renewed)
@@ -159,7 +159,7 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
                        std::min(degradations[Degradation::window].left + 2, kWindowFrames + 1));
 }
 
-/// Weakens or ends the doubts that a posed frame is evidence against.
+/// Weakens or ends the degradations that a posed frame is evidence against.
 void Estimator::Parts::weaken_degradations(const odometry::FrameOutcome& out,
                                            Stamp stamp) noexcept {
   for (const Degradation degradation :

@@ -258,14 +258,15 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
       camera(k).jumps.skip(step);
     MonitorResult v;
     if (!map_reset_pending_) v = monitor_verdict(k, odometry, outcome, frame, found, moving);
-    // A lag moves the epipolar lines, and with every change of speed the disparities.
+    // A lag moves the epipolar lines, and with every change of speed the disparities: while cameras
+    // may be out of sync, no change of the rig is reported.
+    const bool may_lag = pairing.suspected() || pairing.questioned();
     const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
-    if (pairing.suspected() || (pairing.questioned() && v.kind == Kind::collapse) ||
-        (!verified && change)) {
+    if (may_lag || (!verified && change)) {
+      v.undecided = v.undecided || v.kind != Kind::quiet || pairing.suspected();
       v.kind = Kind::quiet;
-      v.undecided = true;
     }
-    if (jump.confirmed && (pairing.suspected() || pairing.questioned())) {
+    if (jump.confirmed && may_lag) {
       v.undecided = true;
     } else if (jump.confirmed && v.kind < Kind::knock) {
       v.kind = Kind::knock;

@@ -84,7 +84,7 @@ class RigMonitor {
     calibration::Monitor monitor;
     calibration::DisparityJumpDetector jumps;
     calibration::PairingEvidence pairing;
-    int grace = 0;                   // frames whose verdict is no more than a doubt yet
+    int grace = 0;                   // frames whose result is at most `undecided`
     Transform T_camera_left_before;  // with the cameras unlinked
   };
 

@@ -17,7 +17,7 @@ enum class Trigger : std::uint8_t {
   requested,             // a recalibration was requested
   pose_lost,
   pose_found,               // with a calibration in use
-  pose_found_suspect,       // with one in use that is doubted
+  pose_found_suspect,       // with one in use that is suspect
   pose_found_uncalibrated,  // without one
 };
 

@@ -105,9 +105,9 @@ function showCalibration(c) {
   for (let k = 1; k < c.cameras.length; ++k) {
     const table = document.createElement("table");
     const text = ([value, sigma], i) => number(value, i < 3 ? 4 : 2) + (sigma === null ? "" : " ± " + number(sigma, i < 3 ? 4 : 2));
-    const measured = c.measured ? c.measured[k].figures : null;
+    const measured = c.measured ? c.measured[k].parameters : null;
     rows(table, [["", measured ? "in use" : "in use, ± 2 σ", ...(measured ? ["measured, ± 2 σ"] : [])],
-      ...c.cameras[k].figures.map((f, i) =>
+      ...c.cameras[k].parameters.map((f, i) =>
         [(c.cameras.length > 2 ? `camera ${k}: ` : "") + names[i], text(f, i), ...(measured ? [text(measured[i], i)] : [])])]);
     parts.push(table);
   }
@@ -213,7 +213,12 @@ function clearImage() {
 }
 
 async function showImages(message) {
+  const epoch = have.epoch;
   const bitmaps = await Promise.all(message.images.map(i => decode(i.jpeg)));
+  if (epoch !== have.epoch) {  // of a program that has been started again since
+    for (const bitmap of bitmaps) if (bitmap) bitmap.close();
+    return;
+  }
   clearImage();
   picture = {frame: message.frame, images: message.images.map((i, k) => ({width: i.width, height: i.height, bitmap: bitmaps[k]})),
              points: message.points.map(p => ({left: [p[0] / 10, p[1] / 10], right: p.length > 2 ? [p[2] / 10, p[3] / 10] : null}))};

@@ -17,7 +17,7 @@ namespace vergence {
 /// Without faults no motion is more than 1.6 times as uncertain as usual on the recorded drives,
 /// and 2.3 times on the rendered street (build/bench/covariance_bench). Cameras out of sync give
 /// more than 4 times, a tunnel 3 times from its third frame on
-/// (FaultPairs.anImageLateFromALostOneOnIsNotOk).
+/// (FaultPairs.imageLateAfterALostOneIsNotOk).
 ///
 /// Threads  One. Memory: none of the heap.
 class CovarianceBaseline {

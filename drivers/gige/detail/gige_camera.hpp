@@ -24,7 +24,7 @@ namespace vergence::gige {
 /// Threads  start(), stop(): the owner. stopping(): any. Memory: start()'s.
 /// Errors   start() throws where there is no thread. What `round` throws ends the program.
 ///
-///     watch_.start("vergence-watch", Duration::milliseconds(100), [this] { look(); });
+///     watch_.start("vergence-watch", Duration::milliseconds(100), [this] { poll(); });
 class PeriodicThread {
  public:
   ~PeriodicThread() { stop(); }

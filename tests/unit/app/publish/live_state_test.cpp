@@ -40,20 +40,25 @@ CalibrationRecord calibration(bool is_refinement, double x) {
   return c;
 }
 
+void add_frame(LiveState* state, const FrameReport& report) {
+  state->add_pose(report);
+  state->add_report(report);
+}
+
 TEST(LiveState, sendsChangesSinceAVersion) {
   LiveState state;
   SessionStart start;
   start.name = "a drive";
   start.frames = 100;
   state.begin(start);
-  state.add(at(0));
-  state.add(at(0.1));  // no step
+  add_frame(&state, at(0));
+  add_frame(&state, at(0.1));  // no step
   FrameReport report = at(1, PoseStatus::degraded);
   report.counts.read = 3, report.counts.ok = 2, report.counts.lost = 1;
   report.counts.path_m = 12.5;
   report.pose.frame = 41;
   report.pose.reason = Reason::few_inliers;
-  state.add(report);
+  add_frame(&state, report);
   state.add(event("mark", "a <b>mark</b> \xff"));
   const json first = state.since(0, kNow, -1);
   EXPECT_EQ(first["session"], "a drive");
@@ -66,7 +71,7 @@ TEST(LiveState, sendsChangesSinceAVersion) {
   EXPECT_EQ(first["trail"].size(), 2U);
   EXPECT_EQ(first["events"].size(), 1U);
   EXPECT_TRUE(first.contains("calibration"));
-  state.add(at(2));
+  add_frame(&state, at(2));
   const json second = state.since(first["version"], kNow, 3.25);
   EXPECT_EQ(second["trail"], json::parse("[[0.0,0.0,2.0,0]]"));
   EXPECT_EQ(second["trail_from"], 2);
@@ -82,7 +87,7 @@ TEST(LiveState, longTrailIsThinnedOverItsWholeLength) {
   std::size_t reported = 0;
   bool anew = false;
   for (int i = 0; i < 50'000; ++i) {
-    state.add(at(i));
+    add_frame(&state, at(i));
     if (i % 100 != 0) continue;
     const json update = state.since(version, kNow, -1);
     version = update["version"];
@@ -122,14 +127,14 @@ Map map_of(const LiveState& state) {
 TEST(LiveState, standingRigKeepsTrail) {
   LiveState state;
   double metres = 0;
-  for (int i = 0; i < 2000; ++i) state.add(at(metres += 0.5));
+  for (int i = 0; i < 2000; ++i) add_frame(&state, at(metres += 0.5));
   for (int i = 0; i < 36'000; ++i)
-    state.add(at(metres, i % 2 == 0 ? PoseStatus::ok : PoseStatus::degraded));
+    add_frame(&state, at(metres, i % 2 == 0 ? PoseStatus::ok : PoseStatus::degraded));
   Map map = map_of(state);
   EXPECT_EQ(map.places, 2000U);
   EXPECT_EQ(map.longest_m, 0.5);
   EXPECT_EQ(map.degraded, 1U) << "the worst of where it stood";
-  for (int i = 0; i < 2000; ++i) state.add(at(metres += 0.5));
+  for (int i = 0; i < 2000; ++i) add_frame(&state, at(metres += 0.5));
   map = map_of(state);
   EXPECT_LE(map.longest_m, 1.0);
   EXPECT_EQ(map.degraded, 1U);
@@ -143,7 +148,7 @@ FrameReport come(double seconds) {
 
 TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
   LiveState state;
-  for (int i = 0; i < 100; ++i) state.add(come(50 + 0.05 * i));
+  for (int i = 0; i < 100; ++i) add_frame(&state, come(50 + 0.05 * i));
   const auto now = [&](double seconds) {
     return state.since(0, HostStamp(Duration::seconds(seconds).ns()), -1)["now"];
   };
@@ -151,7 +156,7 @@ TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
   const json silent = now(67.95);
   EXPECT_TRUE(silent["silent"].get<bool>());
   EXPECT_EQ(silent["since_s"], 13.0);
-  state.add(come(68));
+  add_frame(&state, come(68));
   EXPECT_FALSE(now(68.5)["silent"].get<bool>());
   EXPECT_TRUE(now(69.5)["silent"].get<bool>()) << "an outage is no interval";
 }
@@ -171,16 +176,16 @@ TEST(LiveState, calibrationHasTwoSigmaAndMeasuredOne) {
   state.add(calibration(false, -0.75));
   json c = state.since(0, kNow, -1)["calibration"];
   EXPECT_FALSE(c["confirmed"].get<bool>());
-  EXPECT_EQ(c["cameras"][1]["figures"][3][0], -750.0);
-  EXPECT_TRUE(c["cameras"][1]["figures"][3][1].is_null()) << "given without a sigma";
+  EXPECT_EQ(c["cameras"][1]["parameters"][3][0], -750.0);
+  EXPECT_TRUE(c["cameras"][1]["parameters"][3][1].is_null()) << "given without a sigma";
   EXPECT_FALSE(c.contains("measured"));
   state.add(event("calibration_verified", ""));
   state.add(calibration(true, -0.751));
   c = state.since(0, kNow, -1)["calibration"];
   EXPECT_TRUE(c["confirmed"].get<bool>());
-  EXPECT_EQ(c["cameras"][1]["figures"][3][0], -750.0) << "what is in use stays";
-  EXPECT_EQ(c["measured"][1]["figures"][3][0], -751.0);
-  EXPECT_EQ(c["measured"][1]["figures"][3][1], 2.0);
+  EXPECT_EQ(c["cameras"][1]["parameters"][3][0], -750.0) << "what is in use stays";
+  EXPECT_EQ(c["measured"][1]["parameters"][3][0], -751.0);
+  EXPECT_EQ(c["measured"][1]["parameters"][3][1], 2.0);
 }
 
 }  // namespace
