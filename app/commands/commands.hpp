@@ -9,7 +9,7 @@
 /// leave the callback.
 namespace vergence::app {
 
-/// `words`: what the checkerboard tool is started with.
+/// `arguments`: command line of the checkerboard tool.
 void add_calibrate(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code);
 void add_devices(CLI::App& root, ExitCode* exit_code);
 void add_doctor(CLI::App& root, ExitCode* exit_code);

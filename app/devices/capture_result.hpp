@@ -34,16 +34,16 @@ struct ImageIssue {
   std::string message;
 };
 
-/// Exposure of each picture, and sharpness of each against the sharpest.
+/// Exposure of each image, and sharpness of each relative to the sharpest.
 [[nodiscard]] std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
                                                       std::span<const ImageStatistics> statistics);
 
-/// Returns whether two pictures are the same pixel for pixel, as one camera's would be if it were
+/// Returns true if two images are the same pixel for pixel, as one camera's would be if it were
 /// opened twice. Flat ones (a lens cap) are not called that.
 [[nodiscard]] bool are_identical(const ImageView& a, const ImageView& b) noexcept;
 
 /// The configuration of a capture, for which of the devices only the cameras and what triggers them
-/// are used: pictures need no position and the INS may be elsewhere, so it is left out, unless its
+/// are used: images need no position and the INS may be elsewhere, so it is left out, unless its
 /// SyncOut makes the pulses.
 [[nodiscard]] Configuration capture_configuration(const Configuration& configuration);
 

@@ -101,13 +101,12 @@ struct RecordingCounters {
 ///            the thread takes all that waits every 20 ms and writes it as a chunk when its oldest
 ///            message has waited 40 ms. So a process that is killed loses the last 100 ms at most.
 /// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, the next
-/// is
-///            drive_1.mcap. Every file begins with all schemas, channels and the preamble.
+///            is drive_1.mcap. Every file begins with all schemas, channels and the preamble.
 /// Threads    begin(), commit(): one thread a queue. pop_errors(), counters(): any, counters exact
-/// after close(). close(): the owner's, after the last commit(). Memory     All at construction;
-/// the writer's thread is sealed. Full       drop: begin() refuses, counted; what is bulky leaves
-/// room for the rest. wait:
-///            begin() waits for room (virtual time, replay).
+///            after close(). close(): the owner's, after the last commit().
+/// Memory     All at construction; the writer's thread is sealed.
+/// Full       drop: begin() refuses, counted; large messages leave room for the rest. wait: begin()
+///            waits for room (virtual time, replay).
 /// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). When
 ///            a write fails the data wait in their queue while there is room and the same file is
 ///            tried again every RecordingFiles::kRetry; messages by pop_errors().

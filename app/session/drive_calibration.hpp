@@ -71,10 +71,11 @@ struct DrivePass {
 /// how far the stretches agree.
 [[nodiscard]] std::string describe(const DriveCalibration& found);
 
-/// `vergence calibrate sequence`: from an ordinary recorded drive instead of a target; of its own
-/// or the given calibration lenses and length are read. Writes the file and prints what was found
-/// on standard output. → done, not_usable (nothing was found, or the depth is not known well
-/// enough) Errors  InputError: data, calibration, a file that cannot be written.
+/// `vergence calibrate sequence`: calibrates from an ordinary recorded sequence instead of a
+/// target. Of its own or the supplied calibration intrinsics and baseline length are read. Writes
+/// the file and prints the result on standard output. → done, not_usable (no calibration was found,
+/// or its depth is not known well enough) Errors  InputError: data, calibration, a file that cannot
+/// be written.
 ///
 ///     ReplayRequest request;
 ///     request.data = "MH_01_easy";

@@ -14,11 +14,12 @@ namespace vergence::app {
 /// and messages for the terminal.
 ///
 /// Threads  collect(), record_…(), log(): the estimator's, sealed. show(): the caller's. No
-/// synchronisation is needed after the estimator's thread has been joined. Memory   Fixed. If a
-/// ring is full, the newest report or message is dropped; every message also is in events.jsonl.
+///          synchronisation is needed after the estimator's thread has been joined.
+/// Memory   Fixed. If a ring is full, the newest report or message is dropped; every message also
+///          is in events.jsonl.
 class EventLog {
  public:
-  /// The output outlives the last note.
+  /// The output outlives the last call of collect() or log().
   void open(SessionOutput* output, Stamp first) noexcept;
 
   /// Call after process() or finish(): forwards its events and calibrations.

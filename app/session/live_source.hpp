@@ -85,8 +85,7 @@ class LiveSource final : public FrameSource {
 /// Drives: the cameras, INS and board of the configuration into a session folder (run_session()).
 ///
 /// Errors   InputError, DeviceError before the session folder is made, for all that can be known by
-/// then.
-///          Afterwards messages on stderr.
+///          then. Afterwards messages on stderr.
 /// → as run_session(); device_failed: a camera was gone at the end
 [[nodiscard]] ExitCode run_drive(const RunRequest& request);
 

@@ -23,7 +23,7 @@ class BackgroundSolve {
   struct Start {
     RigCalibration rig{};
     bool from_rig = false;     // begin with the transforms of `rig`
-    bool for_new_rig = false;  // a calibration is sought; false: what is in use is learnt beside it
+    bool for_new_rig = false;  // estimates a new calibration; false: refines the one in use
     const RigCalibration* prior = nullptr;  // what earlier frames have shown; copied
   };
   /// `given`: the calibration that the drive began with.

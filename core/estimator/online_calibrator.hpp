@@ -17,11 +17,11 @@ class SolutionReview;
 /// posed frames and acts on the decisions. The state of the calibration in use is one of the table
 /// in calibration_states.hpp; the states of the odometry belong to the estimator.
 ///
-/// There are two modes. *Seeking*: there is no calibration, or the one in use is suspect; the
+/// There are two modes. *Estimating*: there is no calibration, or the one in use is suspect; the
 /// frames since the onset are solved until a solution passes the gates. *Refining*: at all other
-/// times; the drive's own measurement, with the lenses free, confirms, contradicts or refines the
-/// calibration in use. A refinement solves repeatedly while its segment of frames grows; a full
-/// segment is closed, and its result is the prior of the next.
+/// times; the solution verifies, contradicts or refines the calibration in use. A refinement solves
+/// repeatedly while its segment of frames grows; a full segment is closed, and its result is the
+/// prior of the next.
 ///
 ///     calibrator.frames().take(odometry, out, frame);  // every posed frame
 ///     if (calibrator.can_solve()) calibrator.start_solve();

@@ -26,8 +26,7 @@ struct WindowOutcome {
 /// in each window, so that nothing is counted twice, and it never leaves the odometry.
 ///
 /// Memory  From the arena at construction. More observations than fit: the rest are left out of
-/// this
-///         adjustment.
+///         this adjustment.
 class WindowAdjuster {
  public:
   WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);

@@ -40,9 +40,9 @@ namespace vergence {
 /// One clock  Of a set paired by stamps of one bus or PTP clock the host's stamps must agree within
 ///            half an interval, else it is `ambiguous`; so is every set while a camera that is
 ///            there has a clock far from the others'.
-/// Limits A camera that hands out the image of one exposure under the stamp of the next is not
-/// detected here. Ownership  A slot that is `taken` comes out of next() in exactly one set; then it
-/// is the
+/// Limits     A camera that hands out the image of one exposure under the stamp of the next is not
+///            detected here.
+/// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the
 ///            caller's again.
 /// Not thread-safe. Memory: fixed, kOpen pulses. Constant time per call.
 /// Errors     Nothing throws. Frames that cannot be paired are reported by SyncResult and counted.

@@ -34,8 +34,7 @@ enum class PongStatus : std::uint8_t {
 ///          (kMoving).
 /// Not thread-safe. Fixed memory.
 /// Errors   PongStatus. kBackward answers in a row from an earlier time than before are a clock
-/// that
-///          was set: the fit begins again.
+///          that was set: the fit begins again.
 class BoardClock {
  public:
   static constexpr std::size_t kOpen =

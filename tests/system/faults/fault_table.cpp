@@ -73,7 +73,7 @@ const std::vector<Kind>& kinds() {
       {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0, {"no_image"}},
       {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0, {"no_image"}},
       {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0, {"/devices/clock_resets"}},
-      {"a bus in the way", "occluder", "", 5, {"few_inliers"}, 9},
+      {"a bus in the way", "occluder", "", 5, {"no_pose", "map_reset"}, 9},
       {"disk full", "disk_full", "", 3, {"disk_full", "disk_recovered"}},
       {"recalibration requested", "recalibrate", "", 0, {"rig_changed", "recalibrating"}, 6},
   };
