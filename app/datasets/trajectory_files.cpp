@@ -86,7 +86,7 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
   std::array<std::optional<std::size_t>, 3> position;
   std::array<std::optional<std::size_t>, 4> quaternion;  // x y z w
   std::optional<std::size_t> exact, seconds, nanoseconds, stamp;
-  const auto read_row = [](std::optional<std::size_t>* place, std::size_t i) {
+  const auto set_once = [](std::optional<std::size_t>* place, std::size_t i) {
     if (!*place) *place = i;
   };
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -94,17 +94,17 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
     if (word.empty()) continue;
     const std::size_t axis = std::string_view("xyzw").find(word.back());
     if (word.ends_with("nsec") || word.ends_with("nsecs") || word.ends_with("nanosec"))
-      read_row(&nanoseconds, i);
+      set_once(&nanoseconds, i);
     else if (word.ends_with("secs") || word.ends_with("sec"))
-      read_row(&seconds, i);
+      set_once(&seconds, i);
     else if (contains(word, {"headerstamp"}))
       exact = i;
     else if (contains(word, {"time", "stamp"}) || word == "t" || word == "ts")
-      read_row(&stamp, i);
+      set_once(&stamp, i);
     else if (axis < 4 && is_quaternion(word))
-      read_row(&quaternion[axis], i);
+      set_once(&quaternion[axis], i);
     else if (axis < 3 && is_position(word))
-      read_row(&position[axis], i);
+      set_once(&position[axis], i);
   }
   if (exact) stamp = exact;
   if (!stamp || nanoseconds) stamp = seconds ? seconds : stamp;
@@ -199,7 +199,7 @@ struct Sample {
   char separator = ' ';
 };
 
-Sample to_sample(std::string_view text) {
+Sample read_sample(std::string_view text) {
   constexpr std::size_t kRows = 1000;
   Sample s;
   TextTable table(text);
@@ -255,7 +255,7 @@ void sort_by_stamp(Trajectory* poses) {
 class Reader {
  public:
   Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
-      : file_(file), text_(text), options_(options), sample_(to_sample(text)) {
+      : file_(file), text_(text), options_(options), sample_(read_sample(text)) {
     TextTable table(text);
     if (!table.next()) refuse(file, 0, "has no pose in it: there is no row of numbers");
     columns_ = find_columns(file, sample_, table.line());
@@ -481,7 +481,7 @@ class Reader {
   TrajectoryFile out_;
 };
 
-fs::path folder_name(const fs::path& file) {
+fs::path parent_folder(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
@@ -507,7 +507,7 @@ void set_times(const fs::path& file, std::span<const Stamp> times, const std::st
 }
 
 void set_times_beside(const fs::path& file, TrajectoryFile* trajectory) {
-  const fs::path folder = folder_name(file);
+  const fs::path folder = parent_folder(file);
   const auto times_path = first_present(
       {folder / "times.txt", folder / ".." / "sequences" / file.stem() / "times.txt"});
   if (!times_path) return;
@@ -529,7 +529,7 @@ TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options)
   TrajectoryFile out = reader.read();
   if (!out.timed) set_times_beside(path, &out);
   if (!reader.euroc()) return out;
-  const fs::path folder = folder_name(path);
+  const fs::path folder = parent_folder(path);
   if (const auto sensor =
           first_present({folder / ".." / "cam0" / "sensor.yaml", folder / "cam0" / "sensor.yaml"}))
     bring_to_camera(*sensor, &out.poses);

@@ -73,9 +73,9 @@ void LinePublisher::on_reading(const InsRecord& reading) noexcept {
 
 void LinePublisher::on_event(const EventRecord& event) noexcept {
   const std::string_view kind = event.kind;
-  const bool confirmed = kind == "calibration_verified";
-  if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed")
-    verified_.store(confirmed, std::memory_order_relaxed);
+  const bool verified = kind == "calibration_verified";
+  if (verified || kind == "calibration_contradicted" || kind == "rig_changed")
+    verified_.store(verified, std::memory_order_relaxed);
 }
 
 void LinePublisher::work() noexcept {

@@ -162,7 +162,7 @@ json LiveState::calibration_json() const {
     if (*record)
       for (int k = 0; k < (*record)->calibration.cameras; ++k)
         out[key].push_back(camera_json((*record)->calibration, static_cast<std::size_t>(k)));
-  out["confirmed"] = verified_;
+  out["verified"] = verified_;
   if (in_use_) {
     out["cause"] = in_use_->cause_name();
     out["frames"] = in_use_->calibration.frames;

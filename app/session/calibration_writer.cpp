@@ -51,18 +51,18 @@ void CalibrationWriter::write(const CalibrationRecord& c) {
     lines_.append(line_);
   }
   if (!c.decided) {
-    unconfirmed_ = c.calibration;
+    unverified_ = c.calibration;
     write_session_file(c.calibration);
   } else if (totals_.add(c)) {
-    unconfirmed_.reset();
+    unverified_.reset();
     keep(c.stamp, c.calibration, true);
   }
 }
 
-void CalibrationWriter::write(Stamp confirmed) {
-  if (!unconfirmed_) return;
-  keep(confirmed, *unconfirmed_, false);
-  unconfirmed_.reset();
+void CalibrationWriter::write(Stamp verified) {
+  if (!unverified_) return;
+  keep(verified, *unverified_, false);
+  unverified_.reset();
 }
 
 void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found) {

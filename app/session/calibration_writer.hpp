@@ -33,8 +33,7 @@ inline constexpr const char* kCalibrationsHeader =
 
 /// Writes the calibrations of a session: a line of calibrations.csv for each, calibration.yaml with
 /// the one in use, and the state file that the next drive starts from. The state file gets a
-/// calibration that the drive has found, or the one that the drive began with once the drive has
-/// confirmed it.
+/// calibration that was estimated, or the initial one once it is verified.
 ///
 /// Threads  on_…(): one producer. next(): one consumer. The files are written on a thread of its
 ///          own (`vergence-state`), because YAML takes heap memory and a disk may stand still.
@@ -75,13 +74,14 @@ class CalibrationWriter final : public SessionObserver {
   [[nodiscard]] std::size_t memory() const noexcept { return sizeof *this + lines_.pending(); }
 
  private:
-  static constexpr std::size_t kMaxWaiting = 8;         // they come seconds apart
-  using Item = std::variant<CalibrationRecord, Stamp>;  // a Stamp: what is in use is confirmed then
+  static constexpr std::size_t kMaxWaiting = 8;  // they come seconds apart
+  using Item =
+      std::variant<CalibrationRecord, Stamp>;  // a Stamp: the calibration in use is verified then
 
   void post(const Item& item) noexcept;
   void take(const Item& item);
   void write(const CalibrationRecord& calibration);
-  void write(Stamp confirmed);
+  void write(Stamp verified);
   void keep(Stamp stamp, const RigCalibration& rig, bool found);
   void write_session_file(const RigCalibration& rig);
 
@@ -92,8 +92,8 @@ class CalibrationWriter final : public SessionObserver {
 
   // Used by the writer's thread, and by the owner after joining it.
   std::string line_;
-  std::optional<RigCalibration> unconfirmed_{};  // what the drive began with
-  std::string fault_;                            // of calibration.yaml; empty: it is whole
+  std::optional<RigCalibration> unverified_{};  // what the drive began with
+  std::string fault_;                           // of calibration.yaml; empty: it is whole
   CalibrationTotals totals_{};
   QueueThread<Item, kMaxWaiting> thread_;
 };

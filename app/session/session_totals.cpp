@@ -17,7 +17,7 @@ void TotalsBuilder::add(const FrameReport& report) {
   newest_ = p.stamp;
   newest_frame_ = p.frame;
   ++totals_.read;
-  match_confirmed();
+  match_verified();
   ++(p.status == PoseStatus::ok         ? totals_.ok
      : p.status == PoseStatus::degraded ? totals_.degraded
                                         : totals_.lost);
@@ -38,16 +38,16 @@ void TotalsBuilder::add(const FrameReport& report) {
 }
 
 /// An event comes before the pose of its frame, or after the last one.
-void TotalsBuilder::match_confirmed() {
-  if (totals_.confirmed == newest_ && !totals_.verified_frame && totals_.read > 0)
+void TotalsBuilder::match_verified() {
+  if (totals_.verified == newest_ && !totals_.verified_frame && totals_.read > 0)
     totals_.verified_frame = newest_frame_;
 }
 
 void TotalsBuilder::add(const EventRecord& e) {
   const std::string_view kind = e.kind;
-  if (kind == "calibration_verified" && !totals_.confirmed) {
-    totals_.confirmed = e.stamp;
-    match_confirmed();
+  if (kind == "calibration_verified" && !totals_.verified) {
+    totals_.verified = e.stamp;
+    match_verified();
   } else if (kind == "calibration_contradicted" && !totals_.contradicted) {
     const double* percent = std::get_if<double>(&e.fields[0].value);
     totals_.contradicted = {e.stamp, percent != nullptr ? *percent : 0.0};

@@ -114,7 +114,7 @@ struct SessionTotals : CalibrationTotals {
   TimeHistogram calibrating;
   std::array<TimeHistogram, kStages> stages;
   /// Stamp at which the calibration in use was first verified.
-  std::optional<Stamp> confirmed{};
+  std::optional<Stamp> verified{};
   /// Frame of that stamp.
   std::optional<std::uint64_t> verified_frame{};
   /// First contradiction of the calibration in use.
@@ -145,7 +145,7 @@ class TotalsBuilder {
   [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
 
  private:
-  void match_confirmed();
+  void match_verified();
 
   SessionTotals totals_{};
   std::optional<Vec3> last_position_{};

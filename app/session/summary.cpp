@@ -151,7 +151,7 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   json["online"] = input.online;
   json["verified"] = input.verified;
   json["verified_frame"] = totals.verified_frame ? Json(*totals.verified_frame) : Json();
-  json["verified_stamp_ns"] = totals.confirmed ? Json(totals.confirmed->ns()) : Json();
+  json["verified_stamp_ns"] = totals.verified ? Json(totals.verified->ns()) : Json();
   json["contradicted"] = totals.contradicted
                              ? Json{{"stamp_ns", totals.contradicted->stamp.ns()},
                                     {"depth_percent", totals.contradicted->depth_percent}}

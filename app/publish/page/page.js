@@ -98,7 +98,7 @@ function showEvents(list) {
 
 function showCalibration(c) {
   const words = c.cameras.length < 2 ? "none yet: drive past near objects"
-    : `${CAUSES[c.cause] || "found: " + (c.cause || "").replaceAll("_", " ")}, ${c.confirmed ? "verified" : "not verified yet"}`;
+    : `${CAUSES[c.cause] || "found: " + (c.cause || "").replaceAll("_", " ")}, ${c.verified ? "verified" : "not verified yet"}`;
   show("calibration_words", words + (c.depth ? ` · depth ±${number(2 * c.depth.sigma_percent, 1)} % at ${number(c.depth.at_m, 0)} m` : ""));
   const names = ["rotation x, °", "rotation y, °", "rotation z, °", "translation x, mm", "translation y, mm", "translation z, mm"];
   const parts = [];

@@ -175,14 +175,14 @@ TEST(LiveState, calibrationHasTwoSigmaAndMeasuredOne) {
   LiveState state;
   state.add(calibration(false, -0.75));
   json c = state.since(0, kNow, -1)["calibration"];
-  EXPECT_FALSE(c["confirmed"].get<bool>());
+  EXPECT_FALSE(c["verified"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["parameters"][3][0], -750.0);
   EXPECT_TRUE(c["cameras"][1]["parameters"][3][1].is_null()) << "given without a sigma";
   EXPECT_FALSE(c.contains("measured"));
   state.add(event("calibration_verified", ""));
   state.add(calibration(true, -0.751));
   c = state.since(0, kNow, -1)["calibration"];
-  EXPECT_TRUE(c["confirmed"].get<bool>());
+  EXPECT_TRUE(c["verified"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["parameters"][3][0], -750.0) << "what is in use stays";
   EXPECT_EQ(c["measured"][1]["parameters"][3][0], -751.0);
   EXPECT_EQ(c["measured"][1]["parameters"][3][1], 2.0);

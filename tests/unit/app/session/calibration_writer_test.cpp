@@ -74,7 +74,7 @@ CalibrationRecord found(bool accepted) {
   return CalibrationRecord{d};
 }
 
-EventRecord confirmed() {
+EventRecord verified() {
   EventRecord event;
   event.kind = "calibration_verified";
   return event;
@@ -93,7 +93,7 @@ TEST(CalibrationWriter, savesFoundOrVerifiedForNextDrive) {
     writer.on_calibration(begun());
     writer.on_calibration(found(false));
     if (finds) writer.on_calibration(found(true));
-    if (confirms) writer.on_event(confirmed());
+    if (confirms) writer.on_event(verified());
     EXPECT_EQ(close(&writer), std::vector<std::string>{});
     EXPECT_EQ(std::filesystem::exists(state) ? read_calibration(state).rig.frames : 0, frames);
     const CalibrationFile in_session = read_calibration(folder / "calibration.yaml");
