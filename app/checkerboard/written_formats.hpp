@@ -34,8 +34,8 @@ namespace vergence::app {
 namespace detail {
 /// Remarks what every one of these formats lacks; `serials`, `names`: the format lacks those, too.
 void remark_lost(const CalibrationFile& calibration, const char* format, Remarks* remarks);
-/// The same for a format of a pair, and remarks cameras beyond it. InputError: the two cameras
-/// differ in model or size.
+/// Checks a calibration for a format that holds one pair of cameras, and adds a remark about
+/// further cameras. InputError: the two cameras differ in model or size.
 void check_pair(const CalibrationFile& calibration, const char* format, Remarks* remarks);
 }  // namespace detail
 

@@ -642,7 +642,7 @@ Group monitor() {
       .number("verified_bias_px", &M::verified_bias_px, 0, 2, "px",
               "The same for a verified calibration, until the monitor has measured it.")
       .number("unverified_bias_px", &M::unverified_bias_px, 0, 5, "px",
-              "The same for an unverified calibration.")
+              "Expected value of that error with an unverified calibration.")
       .integer("min_matches", &M::min_matches, 12, 1000, "matches",
                "Frames with fewer stereo matches are not used.")
       .integer("short_window", &M::short_window, 1, 10, "frames",

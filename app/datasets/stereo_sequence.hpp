@@ -107,7 +107,7 @@ struct BagTopics {
 /// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
-/// What of a drive is opened, and with which calibration.
+/// Selects the part of a sequence that is opened, and its calibration.
 struct SequenceOptions {
   std::optional<GivenCalibration> calibration{};  // nothing: the data set's own
   CalibrationUse use{};              // what of the calibration is wanted, whichever it is

@@ -40,7 +40,7 @@ void check_cameras(const Configuration& configuration);
 /// bounds, for all alike.
 [[nodiscard]] ExposureSetting starting_exposure(const Configuration& configuration, std::size_t k);
 
-/// What camera k is asked for when it is opened; `sharing` is left at its default.
+/// Returns the settings with which camera k is opened; `sharing` is left at its default.
 [[nodiscard]] CameraConfiguration camera_configuration(const Configuration& configuration,
                                                        std::size_t k);
 

@@ -24,7 +24,7 @@ struct HttpRequest {
   std::string_view host{}, origin{};
   bool token_in_header = false;
   bool has_body = false;
-  // Of /state: what the viewer has already (LivePage).
+  // A request for /state names what the viewer already has (LivePage).
   std::string_view epoch{}, after{}, image{};
 };
 

@@ -275,7 +275,7 @@ DdsNode::~DdsNode() = default;
 void DdsNode::advertise(const std::string& topic, RosType type, bool latched) {
   dds::DataWriter*& writer = parts_->writers[topic];
   // Depths as ROS 2 has them: 10 by default, 100 of /tf, the last one of what is latched.
-  // Of images the last two.
+  // Two images are kept: each is large, and only the newest is of use.
   const int depth = latched ? 1 : type == RosType::tf ? 100 : type == RosType::image ? 2 : 10;
   if (writer != nullptr) return;
   writer =

@@ -13,8 +13,8 @@
 
 namespace vergence::app {
 
-/// What happens to the newest item when a queue is full: its producer waits (replay, virtual time),
-/// or it is dropped (live).
+/// Policy for the newest item when a queue is full: its producer waits (replay, virtual time), or
+/// it is dropped (live).
 enum class WhenFull : std::uint8_t { wait, drop };
 
 /// A bounded queue and the thread that takes from it, for producers that must never wait for a

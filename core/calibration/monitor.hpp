@@ -21,7 +21,7 @@ struct MonitorOptions {
   /// Expected value of that error until it is measured, for a calibration that was estimated from
   /// images and is verified, 0 … 2.
   double verified_bias_px = 0.12;
-  /// The same for an unverified calibration, 0 … 5.
+  /// Expected value of that error with an unverified calibration, 0 … 5.
   double unverified_bias_px = 0.3;
   /// Stereo matches below which a frame measures nothing (`needs_texture`), 12 … 1000.
   int min_matches = 30;

@@ -50,7 +50,8 @@ struct CalibrationOptions {
   double reference_depth_m = 20;
   /// Predicted depth error at 20 m up to which the rating is `good`, 0.01 … 100.
   double good_depth_percent = 2;
-  /// The same for `fair`; a solution with a larger sigma at the reference depth is not adopted.
+  /// Predicted depth error at 20 m up to which the rating is `fair`, 0.01 … 100; a solution with a
+  /// larger one at the reference depth is not adopted.
   double usable_depth_percent = 5;
 };
 

@@ -97,7 +97,7 @@ class Acquisition final : private Notifier {
     HostStamp tie_host{};  // … was this time of the host's clock
     Duration stamp_grid =
         Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
-    FrameObserver* frame_observer = nullptr;  // null: no one is told of single frames
+    FrameObserver* frame_observer = nullptr;  // null: frames are not observed
     PulseObserver* pulse_observer = nullptr;  // set by start(); null: pulses are not recorded
   };
 

@@ -96,7 +96,7 @@ class ClockRecord {
 /// Reports of pulses on the host's clock: what the driver has not mapped is mapped here, with a new
 /// fit for every boot.
 ///
-/// Not thread-safe. Memory: that of a ClockMapper. Errors: none; a reboot is told.
+/// Not thread-safe. Memory: that of a ClockMapper. Errors: none; a reboot is reported.
 class PulseMapper {
  public:
   struct Report {

@@ -113,7 +113,7 @@ void ShadowCamera::stop() {
   Frame frame;
   EXPECT_EQ(camera_.wait(Duration::milliseconds(5), &frame), DeviceStatus::stopped);
   camera_.stop();
-  EXPECT_EQ(notifier_.reported(), reported) << "told after stop() returned";
+  EXPECT_EQ(notifier_.reported(), reported) << "reported after stop() returned";
 }
 
 void ShadowCamera::trigger_if_asked() {

@@ -217,7 +217,8 @@ TEST(BoardTicks, rateChangeKeepsTicksOfEarlierStamps) {
   tick_init(&d, 84'000'000, 200, 0);
   const std::uint64_t second = 84'000'000 + 12'600;  // 150 ppm
   for (std::uint64_t k = 1; k < 4; ++k) EXPECT_TRUE(tick_pps(&d, k * second, k * second + 100));
-  const std::uint64_t edge = 4 * second, reported = edge + 42'000'000;  // told half a second later
+  const std::uint64_t edge = 4 * second,
+                      reported = edge + 42'000'000;  // reported half a second later
   const std::uint64_t between = edge + 40'000'000;
   const std::uint64_t tick = tick_of(&d, between), at_told = tick_of(&d, reported);
   EXPECT_TRUE(tick_pps(&d, edge, reported));
