@@ -6,10 +6,12 @@ namespace vergence {
 
 /// State of the calibration in use.
 enum class CalibrationState : std::uint8_t {
-  none,        // there is none; one is sought
-  unverified,  // in use, and not yet compared with an own measurement
-  verified,    // in use, and its depths are within the tolerated error
-  suspect,     // the rig seems to have changed; another one is sought
+  /// No calibration is in use; one is being estimated.
+  none,
+  /// In use, but not yet compared with an online estimate.
+  unverified,
+  verified,  // in use, and its depths are within the tolerated error
+  suspect,   // the rig seems to have changed; another one is sought
 };
 
 /// Event that changes the state of the calibration in use.
