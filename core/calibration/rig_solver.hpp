@@ -70,7 +70,7 @@ struct RigSolution {
 /// transforms shared by all frames. Sigmas are computed for noise alone and in total.
 ///
 ///     RigSolver solver(options, monitor, 2, features, arena);
-///     solver.log().begin(frame); // each posed frame and its observations
+///     solver.log().begin(frame);  // each posed frame and its observations
 ///     for (const LoggedObservation& seen : observations) solver.log().push(seen);
 ///     const RigSolution solution = solver.solve(rig);
 ///     if (solution.status == RigSolveStatus::ok) use(solution.rig, solution.rig.covariance);

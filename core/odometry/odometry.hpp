@@ -95,7 +95,7 @@ enum class Link : std::uint8_t {
 ///     odometry::Odometry odometry(options, rig, true, arena, runner);
 ///     odometry::FrameOutcome out = odometry.process(frame);
 ///     if (out.posed) use(out.T_left_world);
-///     odometry.rebuild(&out); // when this frame's tracks are no longer needed
+///     odometry.rebuild(&out);  // when this frame's tracks are no longer needed
 ///
 /// Frames     T_left_world; the world is the left camera of the first posed frame, also after a map
 ///            reset.
