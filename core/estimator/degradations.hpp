@@ -40,7 +40,7 @@ inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradatio
 ///
 ///     ledger.enter(Degradation::scene, Reason::map_reset, frame.number, 10);
 ///     if (const DegradationLedger::Entry* why = ledger.strongest(true)) use(why->reason);
-///     ledger.weaken(Degradation::scene); // one frame of evidence against it
+///     ledger.weaken(Degradation::scene);  // one frame of evidence against it
 ///
 /// Not thread-safe. Does not allocate.
 class DegradationLedger {

@@ -31,7 +31,7 @@ struct RigAssessment {
 /// With linked cameras, update() compares a posed frame with the reference calibration. While a
 /// calibration is estimated the cameras are not linked, and update_unlinked() only detects jumps.
 ///
-///     monitor.watch(rig, solved_and_verified); // when the map was built with it
+///     monitor.watch(rig, solved_and_verified);  // when the map was built with it
 ///     const auto verdict = monitor.update(odometry, outcome, frame);  // each posed frame
 ///
 /// Not thread-safe. Memory from the arena at construction. The constructor throws as Monitor's
