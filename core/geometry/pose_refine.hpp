@@ -24,9 +24,8 @@ struct PoseRefineOptions {
 };
 
 struct RefinedPose {
-  /// True if there is a pose. False if the input, start or options are invalid, there are too many
-  /// points for the workspace or fewer than three usable observations, or these do not determine
-  /// six degrees of freedom.
+  /// True if there is a pose. False if the input, start or options are invalid, the workspace is
+  /// too small, or the usable observations do not determine six degrees of freedom.
   bool usable = false;
   /// False if the pose was still changing; it is then the best so far.
   bool converged = false;
@@ -61,7 +60,7 @@ struct RefinedPose {
 ///
 /// If there are gross outliers then (gross_chi2), a second round continues without them: Huber's
 /// loss bounds an outlier's influence but never removes it. A wrong point 5 m away weighs as much
-/// as hundreds of right ones at 50 m: three of them move a pose by a decimetre.
+/// as hundreds of right ones at 50 m.
 ///
 /// Ownership  Workspace in the arena. flags() stay valid until the next refine().
 /// Threads    One caller per object. Memory: all at construction.

@@ -29,7 +29,6 @@ struct StereoMlesacOptions {
 struct StereoEstimate {
   /// See MlesacPose::found; needs at least five matches.
   bool found = false;
-  /// The estimate, with |t| = baseline.
   Transform T_right_left{};
   /// Σ JᵀJ/σ² over the inliers, for δ of moved_on_sphere().
   Mat5 information = Mat5::Zero();

@@ -12,7 +12,6 @@ namespace vergence {
 struct ThreePointSolutions {
   /// Number of solutions, 0 … 4.
   int count = 0;
-  /// Solutions, in no order.
   std::array<Transform, 4> T_camera_world{};
 };
 

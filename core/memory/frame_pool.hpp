@@ -45,7 +45,6 @@ class FramePool {
   [[nodiscard]] static constexpr std::size_t stride(int width) noexcept {
     return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine;
   }
-  /// Number of bytes that the arena must provide.
   [[nodiscard]] static constexpr std::size_t memory_needed(int width, int height,
                                                            std::size_t slots) noexcept {
     return slots * stride(width) * static_cast<std::size_t>(height);

@@ -45,7 +45,6 @@ struct PointObservation {
 
 /// Life cycle of a map point.
 enum class PointStage : std::uint8_t {
-  /// The slot is unused.
   free,
   /// The point is followed, but was not yet found often enough to constrain poses.
   candidate,
@@ -83,9 +82,7 @@ struct MapPoint {
   bool logged = false;
   /// Raw pixel in `left` when it was last logged.
   Eigen::Vector2f logged_at{};
-  /// Raw pixels in the current frame.
   std::array<Eigen::Vector2f, kMaxCameras> raw{};
-  /// Observations by keyframe slot.
   std::array<PointObservation, kMaxWindow> seen{};
 
   /// True if the position is accurate enough to constrain poses.

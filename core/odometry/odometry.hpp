@@ -116,8 +116,8 @@ class Odometry {
   [[nodiscard]] FrameOutcome process(const RigFrame& frame, Duration budget = {}) noexcept;
 
   /// Changes to this calibration, with linked cameras. The next frame is still posed with the old
-  /// one; its rebuild() then makes the change. If the cameras were linked the map is kept and
-  /// recomputed; if not, a new map is built from that frame if possible.
+  /// one; its rebuild() then makes the change, and recomputes the map, or builds a new one if the
+  /// cameras were not linked.
   void link(const RigCalibration& rig) noexcept;
   /// Call after process() of every frame: does what the outcome reports as due, unless a link was
   /// revoked since.

@@ -90,8 +90,7 @@ struct RigCalibration {
   std::array<std::array<double, 6>, kMaxCameras> sigma_noise{};
   /// Standard deviations including uncertain intrinsics.
   std::array<std::array<double, 6>, kMaxCameras> sigma_total{};
-  // Covariances including uncertain intrinsics; zero if unknown. Zero() is explicit because Eigen
-  // does not initialise a Mat6.
+  /// Covariances including uncertain intrinsics; zero if unknown, which Eigen does not default to.
   std::array<Mat6, kMaxCameras> covariance_total{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(),
                                                  Mat6::Zero()};
   /// Joint covariance of all parameters, from which depth errors follow; empty if unknown.
@@ -105,7 +104,6 @@ struct RigCalibration {
   Stamp found{};
   /// Number of rig frames that the calibration is based on.
   int frames = 0;
-  /// Root mean square residual of the solve.
   double reprojection_px = 0;
   /// Relative standard deviation of path lengths, by the noise of the tracks and usual errors of
   /// intrinsics, without baseline_sigma.

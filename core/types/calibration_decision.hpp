@@ -30,7 +30,6 @@ enum class CalibrationCause : std::uint8_t {
 
 /// Focal length measured online, compared with the configured one.
 struct FocalMeasurement {
-  /// Configured fx of the left camera.
   double configured_px = 0;
   /// Measured fx; 0 if not measured.
   double measured_px = 0;
@@ -72,7 +71,6 @@ struct CalibrationDecision {
   /// Evidence that the rig is that of the previous calibration or, with `contradicted`, another
   /// one.
   ChangeEvidence evidence;
-  /// Newest measurement of this run.
   FocalMeasurement focal{};
   ///
   double solve_ms = 0;

@@ -12,7 +12,6 @@ namespace vergence::calibration::detail {
 /// Maximum number of observations of a frame; further ones are left out.
 inline constexpr std::size_t kMaxObservations = 1024;
 
-/// The reference calibration with derived quantities.
 struct Reference {
   EpipolarGeometry epipolar{Transform{}};
   Pinhole left{}, right{};
