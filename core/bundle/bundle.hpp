@@ -65,6 +65,7 @@ struct BundleProblem {
   /// One flag per point, 1 if it is constant; if empty, none is.
   std::span<const std::uint8_t> point_constant;
   std::span<const BundleObservation> observations;
+
   /// Priors of free poses; may be empty.
   std::span<const BundlePosePrior> pose_priors;
   /// Output: |ε|² inverse_sigma² of each observation at the result; one per observation, or empty.
@@ -127,9 +128,11 @@ struct BundleOptions {
   /// Factor > 0 of the clusters' variance, for errors that tracks of one surface share but clusters
   /// do not show.
   double shared_errors = 1;
+
   BundleLoss loss = BundleLoss::none;
   /// Threshold of Huber's loss or scale of Cauchy's in sigmas, > 0.
   double loss_threshold = 2.0;
+
   /// Maximum number of solver steps, accepted or not, 1 … 1000.
   int max_steps = 30;
   /// Stops if a step changes the cost by less than this share, ≥ 0.
@@ -139,9 +142,10 @@ struct BundleOptions {
   /// Stops if the largest component of the reduced gradient, each over the root of its diagonal, is
   /// smaller, ≥ 0.
   double gradient_tolerance = 0;
-  /// Initial λ in (0, 1e6]: diagonals are multiplied by 1 + λ; λ changes tenfold after each success
-  /// or failure.
+  /// Initial λ in (0, 1e6], by which diagonals are multiplied as 1 + λ; λ is divided by 10 after a
+  /// success and multiplied by 10 after a failure.
   double initial_damping = 1e-4;
+
   /// Computes the covariances of θ_S (stereo_calibration).
   bool covariance = false;
   /// Computes BundleResult::pose_covariance of the free pose with the highest index; costs as much

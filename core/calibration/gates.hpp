@@ -46,10 +46,12 @@ struct Assessment {
   double sigma_percent = 0;
   /// Difference of the depths there, root mean square over the image.
   double difference_percent = 0;
+
   /// Log odds that the rig is the one of the calibration in use.
   double log_odds = 0;
   /// Evidence for that, or against it if log_odds is negative.
   ChangeEvidence evidence;
+
   /// True if the estimate's depths are significantly more accurate.
   bool nearer = false;
   /// True if the estimate should replace the calibration in use: it is nearer and fits held-out

@@ -79,6 +79,7 @@ struct MonitorResult {
   /// Largest statistic of all windows.
   double statistic = 0;
   double threshold = 0;
+
   /// Evidence for a knock or a drift.
   ChangeEvidence evidence;
   /// First frame of the changed rig after a knock, start of a drift, else `frame`.

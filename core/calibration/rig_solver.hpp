@@ -51,9 +51,11 @@ struct RigSolution {
   int tracks = 0;
   int observations = 0;
   int steps = 0;
+
   /// Number of tracks nearer than CalibrationOptions::near_baselines.
   int near = 0;
   double travelled_m = 0;
+
   /// Number of frames that a camera's images are late, else 0.
   int lag_frames = 0;
   /// Number of the first frame after the latest change of any camera during the frames used; 0 if

@@ -86,6 +86,7 @@ struct ComparedPose {
   bool placed = false;
   /// True if both are available, so that the errors are valid.
   bool compared = false;
+
   EnuPose ours{};
   /// The INS pose converted to the left camera at the frame's stamp.
   EnuPose reference{};
@@ -93,10 +94,12 @@ struct ComparedPose {
   double ins_position_sigma = 0;
   /// True if the INS measured its height; if not, error_enu.z() is 0.
   bool height_known = false;
+
   /// Difference estimate − INS, in m.
   Vec3 error_enu = Vec3::Zero();
   /// Yaw error in rad, in (−π, π], positive counter-clockwise seen from above.
   double error_yaw = 0;
+
   /// Ratio of the path lengths estimate / INS over the newest scale_stretch_m with both; 0 before.
   /// Keeps its value while the INS is disconnected.
   double path_ratio = 0;

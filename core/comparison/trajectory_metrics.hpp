@@ -23,7 +23,6 @@
 ///               (segments).
 namespace vergence {
 
-/// Selection of the reference pose for an estimated pose.
 enum class Association : std::uint8_t {
   /// Interpolates at the estimate's stamp: position linearly, rotation by slerp.
   interpolate,

@@ -27,6 +27,7 @@ struct MlesacPose {
   /// observations or no sample gave a pose.
   bool found = false;
   Transform T_left_world{};
+
   /// Number of points all of whose observations are usable and within T².
   int inliers = 0;
   int inlier_observations = 0;

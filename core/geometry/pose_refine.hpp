@@ -29,6 +29,7 @@ struct RefinedPose {
   bool usable = false;
   /// False if the pose was still changing; it is then the best so far.
   bool converged = false;
+
   /// Result; the start if nothing could be refined.
   Transform T_left_world{};
   /// Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m), X_left ← Exp(φ) X_left + τ.
@@ -38,10 +39,12 @@ struct RefinedPose {
   double rotation_sigma = 0;
   /// The same for the camera position, in metres; large values mean weak geometry.
   double translation_sigma = 0;
+
   /// Robust residual scale in input sigmas, ≥ min_scale.
   double scale = 1;
   /// Root mean square of the inliers' residuals, per coordinate.
   double rms_px = 0;
+
   /// Number of points with every usable observation below the χ² threshold.
   int inliers = 0;
   int inlier_observations = 0;

@@ -86,6 +86,7 @@ struct RigCalibration {
   int cameras = 0;
   std::array<Intrinsics, kMaxCameras> intrinsics{};
   std::array<Transform, kMaxCameras> T_camera_left{};
+
   /// Standard deviations rx ry rz (rad) tx ty tz (m) by noise; 0 if unknown.
   std::array<std::array<double, 6>, kMaxCameras> sigma_noise{};
   /// Standard deviations including uncertain intrinsics.
@@ -95,6 +96,7 @@ struct RigCalibration {
                                                  Mat6::Zero()};
   /// Joint covariance of all parameters, from which depth errors follow; empty if unknown.
   RigCovariance covariance{};
+
   /// Measured length |t| of camera 1's baseline, in metres.
   double baseline = 0;
   /// Standard deviation of the baseline, in metres; 0 if exact.

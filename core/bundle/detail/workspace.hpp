@@ -102,6 +102,7 @@ struct KernelJob {
   const double* jets = nullptr;
   /// [batch][3][kBatch], output of back_substitute().
   double* candidate = nullptr;
+
   /// [block][3][3][kBatch]: rows of τ of Y = O L⁻ᵀ with P = L Lᵀ. Those of φ are X_i × them and are
   /// kept for the current group only.
   double* y = nullptr;
@@ -112,6 +113,7 @@ struct KernelJob {
   double* y_shared = nullptr;
   /// [batch][kFactorRows][kBatch]: L⁻¹ (6), z = L⁻¹ e_P (3), minimum depth, 0.
   double* factors = nullptr;
+
   /// [pose][classes][kPoseSums][kBatch].
   double* sums = nullptr;
   /// [pose][camera][kIntrinsicsSize][6][kBatch]: Σ JᵀwB.
@@ -122,9 +124,11 @@ struct KernelJob {
   double* reduced = nullptr;
   /// [slot][kBatch], output of evaluate(); may be null.
   float* squared = nullptr;
+
   /// Number of cameras whose normal equations are summed separately.
   int classes = 1;
   std::uint8_t class_cameras[kMaxCameras] = {};
+
   SharedLayout shared;
   int free_poses = 0;
   BundleLoss loss = BundleLoss::none;

@@ -25,7 +25,7 @@ struct StereoResiduals {
   /// Ratio of the variance of g in this frame to that of white noise: mean over the five
   /// parameters.
   double spread_now = 0;
-  /// The same ratio with the correlation to earlier observations of the same tracks. Its sum over
+  /// This ratio with the correlation to earlier observations of the same tracks. Its sum over
   /// frames gives the variance of the summed gradient.
   double spread_life = 0;
 };
