@@ -91,7 +91,6 @@ struct EstimatorEvent {
   State to = State::initialising;
   const char* why = "";
   double value = 0;
-  /// Evidence for a measured change, verification or contradiction.
   ChangeEvidence evidence;
 };
 

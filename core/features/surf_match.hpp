@@ -73,7 +73,6 @@ class SurfMatcher {
   };
   void compare(const SurfView& left, const SurfView& right, const EpipolarBand* band) noexcept;
 
-  // Best partner of each point.
   std::span<Best> left_, right_;
 };
 

@@ -92,7 +92,6 @@ class FramePool {
   [[nodiscard]] int width() const noexcept { return width_; }
   [[nodiscard]] int height() const noexcept { return height_; }
   [[nodiscard]] std::size_t slots() const noexcept { return slots_; }
-  /// Number of free slots, for statistics.
   [[nodiscard]] std::size_t available() const noexcept { return free_.size(); }
 
  private:

@@ -63,7 +63,6 @@ class MonitorResiduals {
 
   std::size_t rows_ = 0;
   std::array<StereoRow, kMaxObservations> stereo_{};
-  // Buffer for medians.
   std::array<double, kMaxObservations> sizes_{};
   // Memory by track number; a newer track replaces one with the same low bits.
   std::array<Memory, 4096> memories_{};
