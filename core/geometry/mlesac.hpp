@@ -59,7 +59,8 @@ struct MlesacPose {
 /// Memory     All at construction.
 /// Precision  Scores in float about the points' mean (0.01 px for points within 100 times their
 ///            distance), flags in double.
-/// Errors     If no pose is found, it is the identity and meaningless.
+/// Errors     If no pose is found, it is the identity. Same input, options and random state: same
+///            result, on every instruction set.
 class RigMlesac {
  public:
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;

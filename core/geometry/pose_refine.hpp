@@ -55,8 +55,8 @@ struct RefinedPose {
 /// Refines the pose of a rig over all cameras' observations with fixed points: Levenberg–Marquardt
 /// on Huber-weighted pixels.
 ///
-///     min Σ_o ρ(|x_o − π_k(T_k T_left_world p)| / (σ_o s)),   s = max(min_scale, median |e|
-///     / 1.1774)
+///     min Σ_o ρ(|x_o − π_k(T_k T_left_world p)| / (σ_o s)),
+///     s = max(min_scale, median |e| / 1.1774)
 ///
 /// (1.1774 σ is the median length of a Gaussian vector of two coordinates.) s is computed at the
 /// start and again after the first steps, when a rough start no longer inflates it.
