@@ -23,10 +23,9 @@ enum class BundleConfiguration : std::uint8_t {
 
 /// One feature in one image. `x`, `y` are pixels of camera `camera` including its distortion.
 ///
-/// stereo_*: `pose` is the rig frame and `camera` the camera of the rig: X_camera =
+/// stereo_*: `pose` is the rig frame, `camera` the camera of the rig: X_camera =
 /// T_camera_left[camera] * T_left_world[pose] * X.
-/// parallel_monocular: `pose` is the image (left and right images of one rig frame have separate
-/// poses, `T_camera_world`), and `camera` only selects the intrinsics: X_camera =
+/// parallel_monocular: `pose` is the image, and `camera` only selects the intrinsics: X_camera =
 /// T_left_world[pose] * X.
 struct BundleObservation {
   std::uint32_t point = 0;
@@ -39,7 +38,7 @@ struct BundleObservation {
 };
 
 /// Prior of a pose: `information` (rotation, then translation) of the perturbation δ = (φ, τ) from
-/// the prior's transform to the pose: R = Exp(φ) R₀, t = Exp(φ) t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
+/// the prior to the pose: R = Exp(φ) R₀, t = Exp(φ) t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
 struct BundlePosePrior {
   std::uint16_t pose = 0;
   Transform T_left_world{};
@@ -66,6 +65,7 @@ struct BundleProblem {
   /// One flag per point, 1 if it is constant; if empty, none is.
   std::span<const std::uint8_t> point_constant;
   std::span<const BundleObservation> observations;
+
   /// Priors of free poses; may be empty.
   std::span<const BundlePosePrior> pose_priors;
   /// Output: |ε|² inverse_sigma² of each observation at the result; one per observation, or empty.
@@ -120,7 +120,6 @@ struct BundleOptions {
   BundleConfiguration configuration = BundleConfiguration::stereo_odometry;
   /// Constraint of each camera k ≥ 1 in stereo_calibration.
   std::array<BundleLengthConstraint, kMaxCameras> length{};
-  /// Read in stereo_calibration.
   std::array<BundleIntrinsics, kMaxCameras> intrinsics{};
   BundleSharedPrior shared_prior{};
   /// Clusters of the covariance: image cells, this many per side (0 … 8), and blocks of frames;
@@ -129,9 +128,11 @@ struct BundleOptions {
   /// Factor > 0 of the clusters' variance, for errors that tracks of one surface share but clusters
   /// do not show.
   double shared_errors = 1;
+
   BundleLoss loss = BundleLoss::none;
   /// Threshold of Huber's loss or scale of Cauchy's in sigmas, > 0.
   double loss_threshold = 2.0;
+
   /// Maximum number of solver steps, accepted or not, 1 … 1000.
   int max_steps = 30;
   /// Stops if a step changes the cost by less than this share, ≥ 0.
@@ -141,9 +142,10 @@ struct BundleOptions {
   /// Stops if the largest component of the reduced gradient, each over the root of its diagonal, is
   /// smaller, ≥ 0.
   double gradient_tolerance = 0;
-  /// Initial λ in (0, 1e6]: diagonals are multiplied by 1 + λ, and λ falls tenfold after a success
-  /// and grows tenfold after a failure.
+  /// Initial λ in (0, 1e6], by which diagonals are multiplied as 1 + λ; λ is divided by 10 after a
+  /// success and multiplied by 10 after a failure.
   double initial_damping = 1e-4;
+
   /// Computes the covariances of θ_S (stereo_calibration).
   bool covariance = false;
   /// Computes BundleResult::pose_covariance of the free pose with the highest index; costs as much
@@ -165,8 +167,8 @@ enum class BundleTermination : std::uint8_t {
   max_steps,
   /// No damping lowers the cost; the result is the best so far.
   diverged,
-  /// Options, sizes, indices, order or numbers are invalid, or a point is behind its camera at the
-  /// start; nothing was changed.
+  /// The problem or options are invalid, or a point is behind its camera at the start; nothing was
+  /// changed.
   invalid_input,
   /// The observations do not determine the parameters; unchanged if detected before the first step,
   /// else the best so far.
@@ -185,9 +187,7 @@ struct BundleResult {
   }
 
   BundleTermination termination = BundleTermination::invalid_input;
-  /// Number of steps tried.
   int steps = 0;
-  /// Number of steps accepted.
   int accepted = 0;
   /// ½ Σ ρ(|ε|²/σ²) plus priors.
   double final_cost = 0;
@@ -214,10 +214,9 @@ struct BundleResult {
   double inflation = 1;
 
   bool has_pose_covariance = false;
-  /// Index of the pose of pose_covariance.
   std::uint16_t pose = 0;
-  /// H⁻¹ with inverse_sigma taken as true, marginalised over all other free parameters, for R ←
-  /// Exp(φ) R, t ← Exp(φ) t + τ.
+  /// H⁻¹ with inverse_sigma taken as true, marginalised over all other parameters, for R ← Exp(φ)
+  /// R, t ← Exp(φ) t + τ.
   Mat6 pose_covariance = Mat6::Zero();
 
   /// True if the parameters are at a minimum within the tolerances.
@@ -267,7 +266,7 @@ struct BundleWorkspace;
 /// Threads    solve() by one thread at a time; adjusters are independent of each other.
 /// Memory     memory_needed() bytes of the arena at construction, nothing in solve().
 /// Time       One pass over the observations per step, at most max_steps. Deterministic on one
-///            machine; SIMD targets differ by the rounding of sums.
+///            machine; SIMD targets differ by rounding.
 /// Errors     solve() never throws and never returns NaN; the status states what was changed. The
 ///            constructor throws std::length_error if the arena is too small and
 ///            std::invalid_argument for invalid capacities.

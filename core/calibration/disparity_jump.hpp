@@ -31,12 +31,11 @@ struct DisparityJump {
 ///
 /// A track's point is triangulated in the previous frame, moved by the left camera's motion and
 /// projected again. The residual disparity is fitted robustly by a shift and by an error of the
-/// motion along the optical axis, which changes disparities in proportion to d/Z. A constant
-/// calibration error also leaves residuals in proportion to d/Z, which the fit absorbs, so the test
-/// works before the calibration is known. On recorded sequences 95 % of the shifts are below 0.26
-/// px; the largest is 0.68 px and reverts (build/bench/calibration_bench jumps). A rotation of 0.1°
-/// shifts KITTI's disparities by 1.25 px. The shift of a single distorted image reverts in the next
-/// frame and is not a change.
+/// motion along the optical axis, proportional to d/Z. A constant calibration error also has
+/// residuals proportional to d/Z, which the fit absorbs, so the test works before the calibration
+/// is known. On recorded sequences 95 % of the shifts are below 0.26 px, the largest is 0.68 px and
+/// reverts (build/bench/calibration_bench jumps); 0.1° shift KITTI's disparities by 1.25 px. The
+/// shift of a single distorted image reverts in the next frame.
 ///
 /// Memory   From the arena; tracks beyond `capacity` are left out.
 /// Threads  One caller. Time: linear, except for sorting the tracks.
@@ -66,9 +65,9 @@ class DisparityJumpDetector {
   /// Processes the next frame, with the motion of the left camera since the previous one.
   [[nodiscard]] DisparityJump next(std::uint64_t frame, std::span<const StereoObservation> stereo,
                                    const Transform& T_now_previous) noexcept;
-  /// Call instead of next() for a frame in which one of the two cameras showed nothing: the
-  /// following frame is compared with the last processed one. After too many skipped frames no
-  /// comparison is possible, and a suspected shift counts as a change.
+  /// Call instead of next() if one of the two cameras showed nothing: the next frame is compared
+  /// with the last processed one. After too many skipped frames no comparison is possible, and a
+  /// suspected shift counts as a change.
   void skip(const Transform& T_now_previous) noexcept;
 
  private:
@@ -101,7 +100,6 @@ class DisparityJumpDetector {
   std::span<StereoObservation> before_, now_;
   std::span<Row> rows_;
   std::span<double> scratch_;
-  // Number of elements of before_.
   std::size_t count_ = 0;
   // Motion over the frames skipped since before_.
   Transform T_now_before_{};

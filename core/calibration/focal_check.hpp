@@ -6,10 +6,10 @@ namespace vergence::calibration {
 
 /// Compares the configured focal length with the one that the images show.
 ///
-/// A relative error of the focal length scales all distances, and neither epipolar lines nor a
-/// solve with fixed intrinsics show it. A solve that frees every focal length within
-/// kFocalPriorSigma (RigSolveRequest::measure_focal_lengths) does: rotations show it, and so does
-/// the optical flow of straight motion with the known baseline.
+/// An error of the focal length scales all distances, and neither epipolar lines nor a solve with
+/// fixed intrinsics show it. A solve that frees every focal length within kFocalPriorSigma
+/// (RigSolveRequest::measure_focal_lengths) does, by rotations and by the optical flow of straight
+/// motion with the known baseline.
 ///
 /// `found`: such a solve. `given`: the initial calibration. Pure.
 [[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,

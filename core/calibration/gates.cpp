@@ -24,10 +24,10 @@ constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
 // Sigma in rad of the rotation that no epipolar line shows: for a calibration without sigmas that
 // is the rig's, and for one that is not. With the first, every published calibration of the seven
 // recorded sequences is verified (robustness_bench drives); the second is the size of a mounting
-// error. Both are chosen.
+// error.
 constexpr double kMakersTurn = 1e-3, kOtherTurn = 15e-3;
 // Prior probability that a supplied calibration is not the rig's, and rate of wrong decisions about
-// it in either direction. Both are chosen.
+// it; both are chosen.
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
 // Ratio of sigmas below which an estimate may replace a supplied calibration: it then has nine
 // times the information.
@@ -67,7 +67,6 @@ void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept 
     each(log.frame(i));
 }
 
-/// Median of frames' medians; px.
 HeldOut fit_of(std::span<double> medians) noexcept {
   HeldOut h;
   h.frames = static_cast<int>(medians.size());

@@ -12,7 +12,6 @@ namespace vergence::calibration {
 /// their epipolar lines.
 struct HeldOut {
   int frames = 0;
-  /// Median of the frames' medians.
   double median_px = 0;
 };
 
@@ -25,8 +24,8 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 
 /// Returns true if `better` fits those frames better than `worse` by more than chance: the mean
 /// over frames of the difference of medians exceeds `chance` of its standard errors. Also true if
-/// too few frames can be compared. With several additional cameras the gains are added, so that a
-/// knocked camera outweighs one that is determined slightly less well. Pure.
+/// too few frames can be compared. The gains of several cameras are added, so that a knocked one
+/// outweighs one that is determined slightly less well. Pure.
 inline constexpr double kChance = 2.0;
 /// Value of `chance` for a test that is repeated with every solve.
 inline constexpr double kRareChance = 3.0;
@@ -44,14 +43,15 @@ inline constexpr double kRareChance = 3.0;
 struct Assessment {
   /// Depth of the comparison, from reference_depth_m().
   double depth_m = 0;
-  /// Sigma of the estimate's depth there.
   double sigma_percent = 0;
   /// Difference of the depths there, root mean square over the image.
   double difference_percent = 0;
+
   /// Log odds that the rig is the one of the calibration in use.
   double log_odds = 0;
   /// Evidence for that, or against it if log_odds is negative.
   ChangeEvidence evidence;
+
   /// True if the estimate's depths are significantly more accurate.
   bool nearer = false;
   /// True if the estimate should replace the calibration in use: it is nearer and fits held-out

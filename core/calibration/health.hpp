@@ -7,7 +7,6 @@
 
 namespace vergence::calibration {
 
-/// Rating of a calibration by its depth error.
 enum class CalibrationRating : std::uint8_t { good, can_be_improved, recalibrate };
 /// Returns `good`, `fair` or `poor`.
 [[nodiscard]] std::string_view to_string(CalibrationRating) noexcept;

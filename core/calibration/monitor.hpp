@@ -37,9 +37,9 @@ struct MonitorOptions {
   int collapse_expected = 40;
 };
 
-/// A point seen by the left camera and camera k in one frame, in ideal pinhole pixels (without
-/// distortion) of each camera's own K. Its match was searched for in a band wide enough that the
-/// calibration in use did not determine it.
+/// A point seen by the left camera and camera k in one frame, in undistorted pixels of each
+/// camera's own K. Its match was searched for in a band wide enough not to depend on the
+/// calibration in use.
 struct StereoObservation {
   Vec2 left, right;
   /// Standard deviation of one coordinate, > 0. A common factor has no effect, because the spread
@@ -58,7 +58,6 @@ struct MonitorFrame {
   std::span<const StereoObservation> stereo;
   /// Number of matches that a good pair of images would give; 0 if either image is poor.
   int expected_stereo = 0;
-  /// Number of matches found.
   int found_stereo = 0;
 };
 
@@ -79,8 +78,8 @@ struct MonitorResult {
   bool undecided = false;
   /// Largest statistic of all windows.
   double statistic = 0;
-  /// Limit of `statistic`.
   double threshold = 0;
+
   /// Evidence for a knock or a drift.
   ChangeEvidence evidence;
   /// First frame of the changed rig after a knock, start of a drift, else `frame`.
@@ -98,15 +97,15 @@ struct MonitorResult {
 ///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²
 ///     statistic = gᵀ (A + A C A)⁻¹ g
 ///
-/// λ is the measured inflation: variance of the gradient with errors correlated along tracks, over
-/// the one of independent errors. b is MonitorOptions::bias_px or the measured scatter. C is the
-/// covariance of the reference. DisparityJumpDetector and solves detect a rotation about the axis
-/// that no epipolar line shows (yaw, for cameras side by side).
+/// λ is the measured inflation of the gradient's variance by errors correlated along tracks. b is
+/// MonitorOptions::bias_px or the measured scatter. C is the covariance of the reference.
+/// DisparityJumpDetector and solves detect the rotation that no epipolar line shows (yaw, for
+/// cameras side by side).
 ///
-/// Small knocks are found by a second test: the window is compared with the estimate of the two
-/// minutes before it, whose covariance is smaller than the reference's. Windows have a few to
-/// several hundred moving frames; the largest statistic counts. Frames of a standing rig are tested
-/// one by one against a higher threshold, because their errors repeat.
+/// A second test finds small knocks: it compares the window with the two minutes before it, whose
+/// covariance is smaller than the reference's. Windows have a few to several hundred moving frames;
+/// the largest statistic counts. Frames of a standing rig are tested one by one against a higher
+/// threshold, because their errors repeat.
 ///
 ///     Arena arena(Monitor::memory_needed(options));
 ///     Monitor monitor(options, arena);

@@ -9,16 +9,16 @@
 
 namespace vergence::calibration {
 
-/// Tests which images of two cameras are from the same instant: the left image and the camera's of
-/// one frame; the previous left image and the camera's, if the camera is a frame late; or the left
-/// image and the camera's previous one, if the left camera is late.
+/// Tests which images of two cameras are from the same instant: those of one frame, or the previous
+/// left image and the camera's (the camera is a frame late), or the other way round (the left
+/// camera is late).
 ///
 /// In the true pairing the points' distances from the epipolar lines have their usual spread w.
-/// With a and b the median distances in this frame's pairing and in the shifted one, the
-/// log-likelihood ratio of a point for the shifted pairing is ln(a / w) − (b²/w² − 1)/2. It is
-/// positive if only the shifted distances are usual, negative after a knock, when neither are, and
-/// zero at standstill. Exchanging a and b gives the ratio for this frame's pairing. Sums that never
-/// fall below zero are Page's test (E. S. Page, Biometrika 41, 1954).
+/// With median distances a in this frame's pairing and b in the shifted one, a point's
+/// log-likelihood ratio for the shifted pairing is ln(a / w) − (b²/w² − 1)/2: positive if only the
+/// shifted distances are usual, negative after a knock, zero at standstill. Exchanging a and b
+/// gives the ratio for this frame's pairing. Sums that never fall below zero are Page's test (E. S.
+/// Page, Biometrika 41, 1954).
 ///
 /// Memory   From the arena; points beyond `capacity` are left out.
 /// Threads  One caller. Time: linear, except for sorting the points.
@@ -57,10 +57,8 @@ class PairingEvidence {
  private:
   // Points of the previous frame, sorted by track.
   std::span<StereoObservation> before_;
-  // Number of elements of before_.
   std::size_t count_ = 0;
   std::span<float> now_, late_px_, early_px_;
-  // Frame number of before_.
   std::uint64_t frame_ = 0;
   double distance_px_ = 0, usual_px_ = 0;
   bool questioned_ = false;

@@ -26,8 +26,7 @@ enum class RigSolveStatus : std::uint8_t {
 inline constexpr double kFocalPriorSigma = 0.1;
 
 /// Start, prior and free parameters of a solve. `known` and `given` are read during solve() only.
-/// CalibrationOptions::intrinsics selects the intrinsics that are estimated with the transforms;
-/// with `full`, all of the additional cameras and the distortion of all cameras.
+/// CalibrationOptions::intrinsics selects the intrinsics that are estimated.
 struct RigSolveRequest {
   /// Cameras, intrinsics and baseline; with from_rig also T_camera_left.
   RigCalibration rig{};
@@ -47,21 +46,21 @@ struct RigSolution {
   RigSolveStatus status = RigSolveStatus::too_few_tracks;
   /// Result: transforms, sigmas, estimated intrinsics, frames, rms and scale_sigma.
   RigCalibration rig{};
-  /// Number of the newest frame used.
   std::uint64_t newest = 0;
   int frames = 0;
   int tracks = 0;
   int observations = 0;
   int steps = 0;
+
   /// Number of tracks nearer than CalibrationOptions::near_baselines.
   int near = 0;
   double travelled_m = 0;
+
   /// Number of frames that a camera's images are late, else 0.
   int lag_frames = 0;
   /// Number of the first frame after the latest change of any camera during the frames used; 0 if
   /// the rig did not change.
   std::uint64_t changed_at = 0;
-  /// Wall time of the solve.
   double solve_ms = 0;
 };
 
@@ -141,7 +140,6 @@ class RigSolver {
   std::size_t max_frames_;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
-  // Number of cameras.
   int count_ = 0;
   BoundedVector<Transform> poses_;
   // Per pose, 1 if it begins a piece that no track connects to earlier poses.

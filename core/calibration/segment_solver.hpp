@@ -8,10 +8,11 @@ namespace vergence::calibration {
 /// Splits the tracks of a run into stretches of `frames` moving frames and solves each when it is
 /// full.
 ///
-/// Ownership  `given`, whose lenses and sigmas are the priors, and `start`, where the first solve
-/// begins, are copied. Threads    One caller; solves happen in take() and end(), some hundred
-/// milliseconds each.
-///            Memory: from the arena.
+/// Ownership  `given`, whose intrinsics are the priors, and `start`, the initial values of the
+/// first
+///            solve, are copied.
+/// Threads    One caller; solves run in take() and end(), some hundred milliseconds each.
+/// Memory     From the arena.
 class SegmentSolver {
  public:
   enum class Kind : std::uint8_t {

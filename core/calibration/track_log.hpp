@@ -55,7 +55,6 @@ class TrackLog {
   void push(const LoggedObservation& observation) noexcept;
 
   void clear() noexcept { size_ = 0; }
-  /// Drops frames with a smaller number.
   void drop_before(std::uint64_t number) noexcept;
   /// Scales all poses about a point of the world, as the odometry scaled its world.
   void scale_about(const Vec3& centre, double factor) noexcept;
@@ -77,7 +76,6 @@ class TrackLog {
   }
 
   std::span<LoggedFrame> frames_;
-  // Storage with capacity_ observations per frame.
   std::span<LoggedObservation> observations_;
   std::size_t capacity_;
   std::size_t first_ = 0, size_ = 0;

@@ -3,7 +3,6 @@
 
 namespace vergence {
 
-/// Result of a projection.
 enum class ProjectStatus : std::uint8_t {
   ok,
   /// The depth is below kMinDepth, or NaN.

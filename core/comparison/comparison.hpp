@@ -45,10 +45,9 @@ struct ComparisonOptions {
   std::size_t ins_capacity = 8192;
 };
 
-/// Makes T_ins_left from the lever arm, the left camera's position in the INS body (forward, left,
-/// up; m), and the boresight, the rotation of the rig's forward-left-up axes relative to the INS's
-/// (roll, pitch, yaw, rad: R = Rz(yaw) Ry(pitch) Rx(roll)). With zero boresight both have the same
-/// orientation.
+/// Makes T_ins_left from the lever arm (the left camera's position in the INS body: forward, left,
+/// up; m) and the boresight (rotation of the rig's forward-left-up axes relative to the INS's:
+/// roll, pitch, yaw; rad; R = Rz(yaw) Ry(pitch) Rx(roll)).
 [[nodiscard]] Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept;
 
 /// Inverse of mount_of(): the boresight of a rotation. At a pitch of ±90° only the sum of roll and
@@ -87,6 +86,7 @@ struct ComparedPose {
   bool placed = false;
   /// True if both are available, so that the errors are valid.
   bool compared = false;
+
   EnuPose ours{};
   /// The INS pose converted to the left camera at the frame's stamp.
   EnuPose reference{};
@@ -94,10 +94,12 @@ struct ComparedPose {
   double ins_position_sigma = 0;
   /// True if the INS measured its height; if not, error_enu.z() is 0.
   bool height_known = false;
+
   /// Difference estimate − INS, in m.
   Vec3 error_enu = Vec3::Zero();
   /// Yaw error in rad, in (−π, π], positive counter-clockwise seen from above.
   double error_yaw = 0;
+
   /// Ratio of the path lengths estimate / INS over the newest scale_stretch_m with both; 0 before.
   /// Keeps its value while the INS is disconnected.
   double path_ratio = 0;
@@ -150,7 +152,6 @@ class Comparison {
   /// Not copyable, because its parts refer to each other.
   Comparison(const Comparison&) = delete;
   Comparison& operator=(const Comparison&) = delete;
-  /// Number of free bytes that the arena must have.
   [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
 
   /// Adds a sample. Samples that are not in order of their stamps are rejected and counted.

@@ -56,9 +56,8 @@ enum class EnuAlignmentStatus : std::uint8_t {
 /// a sigma.
 ///
 /// INS errors are correlated over the time `correlation`: n pairs over a time T count as 1 + T /
-/// correlation independent ones, and the attitude as one. So the sigma is realistic for that
-/// distance with such a receiver. Does not allocate. Time: linear in the pairs, at most
-/// kAlignmentSteps passes. If the result is not `ok`, *alignment is unchanged.
+/// correlation independent ones, and the attitude as one. Does not allocate. Time: linear in the
+/// pairs. If the result is not `ok`, *alignment is unchanged.
 [[nodiscard]] EnuAlignmentStatus fit_enu_alignment(std::span<const EnuAlignmentPair> pairs,
                                                    Duration correlation,
                                                    EnuAlignment* alignment) noexcept;

@@ -99,7 +99,6 @@ class InsHistory {
   LocalTangentPlane plane_{};
   bool has_origin_ = false;
   std::span<Reading> readings_;
-  // Numbers of the stored readings.
   std::uint64_t begin_ = 0, end_ = 0;
   Refused refused_{};
   // Last fix since the start or restart of the INS.

@@ -11,22 +11,20 @@
 /// Estimates the transform between the body of a reference (an INS) and of an estimate (the left
 /// camera) from a run: hand-eye calibration with a clock offset.
 ///
-/// Model     With T_ref_est = (R_m, l), the estimate's body in the reference's, and T_enu_world,
-/// the estimate's world on the earth:
+/// Model     With T_ref_est = (R_m, l) the estimate's body in the reference's, and T_enu_world the
+///           estimate's world on the earth:
 ///               R_enu_ref R_m        = Exp(e_R) R_enu_world R_world_est
 ///               p_enu_ref + R_enu_ref l = R_enu_world p_world_est + t + e_p
 ///               v_enu_ref + R_enu_ref (R_m ω × l) = R_enu_world v_world_est + e_v
-///           the estimate taken at the reference's stamp − `clock_offset`. A reference's errors
-///           wander: e of tilt, heading, horizontal and vertical place and velocity are each
-///           first-order Gauss–Markov, their correlation and size found from the residuals
-///           (feasible generalised least squares), so that a sigma tells what the drive can tell,
-///           not what its many samples seem to. Where the drive has blocks enough, a sigma is no
-///           smaller than what their scatter tells (cluster-robust covariance).
+///           with the estimate at the reference's stamp − `clock_offset`. Errors e of tilt,
+///           heading, horizontal and vertical position, and velocity are first-order Gauss–Markov
+///           processes whose correlation and size are estimated from the residuals (feasible
+///           generalised least squares). With enough blocks of the run, a sigma is at least that of
+///           their scatter (cluster-robust covariance).
 /// Sources   Wahba's problem for the start; Cochrane and Orcutt 1949 for the whitening; Bell and
 ///           McCaffrey 2002 for the blocks.
 namespace vergence {
 
-/// One sample of the reference.
 struct MountReference {
   Stamp stamp{};
   Transform T_enu_ref{};
@@ -36,15 +34,15 @@ struct MountReference {
 };
 
 struct MountOptions {
-  // Interval between compared moments, rounded to that of the samples.
+  /// Interval between compared moments, rounded to that of the samples.
   Duration step = Duration::milliseconds(500);
   /// Maximum gap of the estimate that is interpolated.
   Duration max_gap = Duration::milliseconds(200);
   /// Minimum correlation time of attitude and position errors, because a run is too short to
   /// measure it.
   Duration min_correlation = Duration::seconds(60);
-  // Maximum standard deviations of an observable parameter: in rad (two degrees, as accurate as a
-  // drawing) and in m.
+  /// Maximum standard deviations of an observable parameter: in rad (two degrees, as accurate as a
+  /// drawing) and in m.
   double rotation_sigma = 0.035;
   double lever_sigma = 0.5;
   Duration offset_sigma = Duration::milliseconds(30);
@@ -63,7 +61,6 @@ enum class MountStatus : std::uint8_t {
   ok,
   /// There are fewer than kMountMoments consecutive moments in common.
   too_few,
-  /// There was no motion.
   no_motion,
   /// There is no fit, or an implausible one: a clock offset of 0.3 s, or errors of 15 degrees.
   not_converged,

@@ -23,7 +23,6 @@
 ///               (segments).
 namespace vergence {
 
-/// Selection of the reference pose for an estimated pose.
 enum class Association : std::uint8_t {
   /// Interpolates at the estimate's stamp: position linearly, rotation by slerp.
   interpolate,
@@ -100,7 +99,6 @@ struct HeadingErrors {
 struct LengthError {
   /// Nominal length, in m.
   double length = 0;
-  /// Number of segments.
   std::size_t count = 0;
   /// Ratio to the nominal length.
   double translation = std::numeric_limits<double>::quiet_NaN();
@@ -110,7 +108,6 @@ struct LengthError {
 
 struct SegmentErrors {
   int step = 0;
-  /// In the order of the option.
   std::vector<LengthError> per_length;
   /// Number of segments of all lengths; 0 if the path is shorter than every length.
   std::size_t count = 0;
@@ -144,9 +141,7 @@ struct TrajectoryEvaluation {
   /// Ratio estimate / reference.
   double path_ratio = 0;
 
-  /// Alignment with scale 1.
   Alignment se3;
-  /// Alignment with free scale.
   Alignment sim3;
   /// Absolute trajectory errors, in m.
   ErrorStatistics ate_se3;

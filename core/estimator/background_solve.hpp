@@ -40,13 +40,10 @@ class BackgroundSolve {
 
   /// Precondition: !running().
   void start(const calibration::TrackLog& log, const Start& start) noexcept;
-  /// True from start() to close().
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] bool for_new_rig() const noexcept { return start_.for_new_rig; }
-  /// Call once per frame while running(). Returns true if the solver has finished and a decision
-  /// about its solutions is due at this frame. Waits for the solver with
-  /// Adoption::after_fixed_frames only; with Adoption::when_ready it returns false until the solver
-  /// has finished.
+  /// Call once per frame while running(). Returns true if the solver has finished and a decision is
+  /// due. Waits for the solver with Adoption::after_fixed_frames only.
   [[nodiscard]] bool next_frame() noexcept;
   /// Returns true at the last frame for a decision: the solution must be adopted or rejected.
   [[nodiscard]] bool last_turn() const noexcept;
@@ -55,7 +52,6 @@ class BackgroundSolve {
   /// Time that the last next_frame() waited for the solver, in ms; 0 with Adoption::when_ready.
   [[nodiscard]] float waited_ms() const noexcept { return waited_ms_; }
   void clear_waited() noexcept { waited_ms_ = 0; }
-  /// Waits for the task.
   void finish() noexcept;
   /// Marks a running solve as outdated, because its frames no longer describe the rig.
   void discard() noexcept { discarded_ = running_; }

@@ -34,9 +34,9 @@ enum class Degradation : std::uint8_t {
 };
 inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradation::motion) + 1;
 
-/// Ledger of the degradations that apply, each with its reason, its first frame, and the number of
-/// frames of evidence that ends it. A pose is `ok` while the ledger is empty; otherwise it is
-/// `degraded` for the strongest reason.
+/// The degradations that apply, each with its reason, first frame, and number of frames of evidence
+/// that ends it. A pose is `ok` while there are none, otherwise `degraded` for the strongest
+/// reason.
 ///
 ///     ledger.enter(Degradation::scene, Reason::map_reset, frame.number, 10);
 ///     if (const DegradationLedger::Entry* why = ledger.strongest(true)) use(why->reason);
@@ -51,7 +51,6 @@ class DegradationLedger {
   struct Entry {
     /// Reason::none if the degradation does not apply.
     Reason reason = Reason::none;
-    /// Number of the first degraded frame.
     std::uint64_t since = 0;
     /// Number of frames of evidence that end the degradation.
     int left = 0;

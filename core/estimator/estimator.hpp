@@ -19,11 +19,11 @@ namespace vergence {
 
 /// Origin of the calibration handed to the estimator.
 enum class CalibrationTrust : std::uint8_t {
-  /// The calibration is used from the first frame; poses are `degraded` until it is verified.
+  /// Used from the first frame; poses are `degraded` until it is verified.
   given,
-  /// The calibration comes from the last run's state file; it is handled like `given`.
+  /// From the last run's state file; handled like `given`.
   state_file,
-  /// The rig is calibrated from scratch; only its intrinsics and baseline length are used.
+  /// None: only intrinsics and baseline length of the rig are used.
   none,
 };
 
@@ -53,37 +53,36 @@ struct EstimatorOptions {
 
 /// Event of the estimator, written as a line of events.jsonl. `why` points to a constant.
 struct EstimatorEvent {
-  /// Kind of an event. `value` is 0 for kinds that do not state its meaning.
+  /// Kind of an event. Each comment describes `value`, which is 0 for other kinds.
   enum class Kind : std::uint8_t {
     state,
-    /// `value` is the duration of the gap, in seconds.
+    /// Duration of the gap, in s.
     map_reset,
-    /// `value` is the duration of the gap, in seconds.
+    /// Duration of the gap, in s.
     time_gap,
     relocalised,
-    /// `value` is how much older the frame is than the previous one, in seconds.
+    /// Time by which the frame is older than the previous one, in s.
     dropped,
-    /// `value` is the number of frames since the onset. Also recorded for a requested calibration.
+    /// Number of frames since the onset. Also recorded for a requested calibration.
     rig_changed,
-    /// `value` is the lag in frames; 0 if unknown.
+    /// Lag in frames; 0 if unknown.
     out_of_sync,
-    /// Follows out_of_sync.
     cameras_in_sync,
-    /// `value` is the depth's standard deviation, in percent.
+    /// Standard deviation of depths, in percent.
     calibration_verified,
-    /// `value` is the depth error of the calibration in use, in percent.
+    /// Depth error of the calibration in use, in percent.
     calibration_contradicted,
-    /// `value` is the measured focal length, in pixels.
+    /// Measured focal length, in px.
     focal_length_contradicted,
-    /// `value` is the number of frames in the solve.
+    /// Number of frames in the solve.
     calibration_accepted,
-    /// `value` is the number of frames in the solve.
+    /// Number of frames in the solve.
     calibration_rejected,
-    /// `value` is the share of map points that fit the accepted calibration, in percent.
+    /// Share of map points that fit the accepted calibration, in percent.
     calibration_taken_up,
-    /// `why` names what is missing.
+    /// None; `why` names what is missing.
     calibration_pending,
-    /// Tracking was lost, and the images fit an earlier calibration.
+    /// None; the images fit an earlier calibration after tracking was lost.
     calibration_resumed,
   };
   Kind kind = Kind::state;
@@ -92,7 +91,6 @@ struct EstimatorEvent {
   State to = State::initialising;
   const char* why = "";
   double value = 0;
-  /// Evidence for a measured change, verification or contradiction.
   ChangeEvidence evidence;
 };
 
@@ -119,7 +117,6 @@ struct EstimatorEvent {
 ///            process() never does.
 class Estimator {
  public:
-  /// Bytes that the arena must have free for these options and this rig.
   [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
                                                  const RigCalibration& rig);
 

@@ -16,7 +16,7 @@ std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now) noex
   using K = calibration::MonitorResult::Kind;
   // Until now there were only wrong matches.
   if (v.kind == K::collapse) return now;
-  // Of a drifting rig only the newest frames describe the present one.
+  // Only the newest frames describe a drifting rig.
   if (v.kind == K::drift) return std::max(v.onset_frame, now - std::min(now, kDriftFrames));
   return v.onset_frame;
 }

@@ -14,14 +14,12 @@ class SolutionReview;
 
 /// Calibrates the rig online: collects frames, monitors the calibration in use, runs solves in the
 /// background and decides on their solutions. The estimator passes posed frames and acts on the
-/// decisions. The state of the calibration in use follows the table in calibration_states.hpp; the
-/// states of the odometry belong to the estimator.
+/// decisions. calibration_states.hpp has the states of the calibration in use.
 ///
 /// There are two modes. *Estimating*: there is no calibration, or the one in use is suspect; the
-/// frames since the onset are solved until a solution passes the gates. *Refining*, at all other
-/// times: the solution verifies, contradicts or refines the calibration in use. Refinement solves
-/// repeatedly while its segment of frames grows; a full segment is closed, and its result is the
-/// prior of the next.
+/// frames since the onset are solved until a solution passes the gates. *Refining* otherwise:
+/// solutions verify, contradict or refine the calibration in use. They are from a growing segment
+/// of frames; a full one is closed, and its result is the prior of the next.
 ///
 ///     calibrator.frames().take(odometry, out, frame);  // every posed frame
 ///     if (calibrator.can_solve()) calibrator.start_solve();

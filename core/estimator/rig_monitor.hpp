@@ -14,7 +14,6 @@ struct RigAssessment {
   calibration::MonitorResult::Kind kind = calibration::MonitorResult::Kind::quiet;
   /// Number of the first frame of the change `kind`.
   std::uint64_t onset_frame = 0;
-  /// Evidence for `kind`.
   ChangeEvidence evidence;
   /// Number of frames that a camera's images are late; negative if early.
   int lag_frames = 0;
@@ -63,9 +62,8 @@ class RigMonitor {
   /// Call when the cameras are unlinked because a calibration is estimated.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
-  /// Assesses a posed frame of linked cameras. `verified`: state of the reference. The errors of an
-  /// unverified calibration vary over the image; the monitor cannot distinguish them from a change
-  /// of the rig, and the result is `undecided`.
+  /// Assesses a posed frame of linked cameras. `verified`: state of the reference. With an
+  /// unverified calibration, whose errors vary over the image, changes of the rig are `undecided`.
   [[nodiscard]] RigAssessment update(const odometry::Odometry& odometry,
                                      const odometry::FrameOutcome& outcome, const RigFrame& frame,
                                      bool verified) noexcept;
@@ -118,11 +116,9 @@ class RigMonitor {
   // Element k belongs to camera k ≥ 1; element 0 is empty.
   std::array<std::optional<Watched>, kMaxCameras> watched_;
   BoundedVector<calibration::StereoObservation> stereo_;
-  // The reference calibration.
   RigCalibration rig_{};
   bool solved_and_verified_ = false;
   std::optional<Transform> T_left_world_before_;
-  // Stamp of the previous frame.
   Stamp stamp_before_{};
   bool map_reset_pending_ = false;
 };

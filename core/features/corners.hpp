@@ -10,7 +10,6 @@ namespace vergence::features {
 
 /// A corner that can be followed.
 struct Corner {
-  /// Pixel of the image.
   float x = 0, y = 0;
   /// Smaller eigenvalue of the mean structure tensor over 7×7 px, in (grey levels / px)² (Shi &
   /// Tomasi 1994).

@@ -8,7 +8,6 @@ namespace vergence::features {
 /// Position of a left patch in another camera: its pixel for every inverse depth along the left
 /// ray.
 struct EpipolarCurve {
-  /// The other camera.
   const Camera* camera = nullptr;
   Transform T_camera_left{};
   /// Left ray (x, y, 1).

@@ -15,11 +15,10 @@ namespace {
 constexpr int kHalf = kPatchSide / 2;
 // Step in px of the level below which the alignment has settled, a tenth of its noise.
 constexpr float kSettled = 0.01F;
-// Minimum standard deviation of the window in grey levels. Rounding to whole grey levels has a
-// standard deviation of 1/√12 and a mean squared gradient of 1/24: the limits are twice the one and
-// six times the other.
+// Minimum standard deviation of the window in grey levels, twice that of rounding (1/√12).
 constexpr float kMinContrast = 0.6F;
-// Minimum smaller eigenvalue over the window's pixels, in grey levels² / px².
+// Minimum smaller eigenvalue over the window's pixels in grey levels² / px², six times the mean
+// squared gradient of rounding (1/24).
 constexpr float kMinHessian = 0.25F;
 
 struct LevelOutcome {

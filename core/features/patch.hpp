@@ -19,9 +19,8 @@ inline constexpr int kWindow = 12;
 inline constexpr int kWindowStride = 16;
 
 /// Appearance of a point where it was first seen: the pixels around it on several levels. Its
-/// anchor is the pixel (x, y) of level 0 at which it was cut. On level l the patch's middle pixel
-/// is the one nearest to the anchor, and `offset` is the anchor's position in that pixel, so that
-/// the anchor is the same on all levels.
+/// anchor is the pixel (x, y) of level 0 at which it was cut. On level l the middle pixel is the
+/// one nearest to the anchor, and `offset` is the anchor's position in it.
 struct Patch {
   std::array<std::array<std::uint8_t, kPatchBytes>, kPatchLevels> pixels;
   /// In px of the level, |·| ≤ 0.5.
@@ -48,7 +47,6 @@ enum class AlignStatus : std::uint8_t {
 
 struct AlignResult {
   AlignStatus status = AlignStatus::outside;
-  /// Pixel of level 0.
   Vec2 pixel{};
   /// Final normalised correlation of window and image, on the level of the last step.
   float zncc = 0;
@@ -63,7 +61,6 @@ struct AlignOptions {
   int coarsest = 2;
   /// Last level.
   int finest = 0;
-  /// Minimum final correlation.
   float min_zncc = 0.8F;
   /// Maximum distance from the prediction, in px of level 0.
   float max_shift = 20.F;

@@ -36,7 +36,6 @@ class Pyramid {
  private:
   int levels_ = 0;
   std::array<ImageView, kMaxPyramidLevels> views_{};
-  // Memory of levels ≥ 1.
   std::array<std::uint8_t*, kMaxPyramidLevels> storage_{};
   // One vertically filtered row, with margins.
   std::uint16_t* row_ = nullptr;

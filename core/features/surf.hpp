@@ -54,9 +54,8 @@ enum class SurfStatus : std::uint8_t {
 ///
 /// Source     Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 110 (2008). Boxes
 ///            of 3 (k 2^o + 1) px in octave o = 1, 2, … with k = 1 … 4, sampled every 2^(o−1) px;
-///            maxima of the two inner sizes. They are refined by a parabola in x and y and one in
-///            size, because the paper's joint one is biased by up to a tenth of a step if position
-///            and size both lie between samples.
+///            maxima of the two inner sizes. They are refined by one parabola in x and y and one in
+///            size; the paper's joint one is biased by up to a tenth of a step.
 /// Ownership  Only sums over the image are kept. The caller owns points and descriptors.
 /// Threads    set_image() and detect() by one thread; describe() is const.
 /// Memory     From the arena at construction: 4 bytes per pixel and twelve rows. If the output is
@@ -67,8 +66,7 @@ enum class SurfStatus : std::uint8_t {
 class Surf {
  public:
   Surf() noexcept = default;
-  /// `max_width` and `max_height`: maximum size of the images. Throws std::length_error if the
-  /// arena is full.
+  /// Throws std::length_error if the arena is full.
   Surf(int max_width, int max_height, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 

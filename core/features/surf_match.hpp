@@ -14,7 +14,6 @@ struct SurfView {
 };
 
 struct SurfMatch {
-  /// Indices of the points.
   std::uint32_t left = 0, right = 0;
   /// Euclidean distance of unit vectors, 0 … 2.
   float distance = 0;
@@ -25,7 +24,6 @@ struct SurfMatch {
 /// band.
 struct EpipolarBand {
   Mat3 F = Mat3::Zero();
-  /// Half width of the band.
   double px = 0;
 };
 
@@ -75,7 +73,6 @@ class SurfMatcher {
   };
   void compare(const SurfView& left, const SurfView& right, const EpipolarBand* band) noexcept;
 
-  // Best partner of each point.
   std::span<Best> left_, right_;
 };
 

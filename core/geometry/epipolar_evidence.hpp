@@ -17,9 +17,8 @@ struct EpipolarEvidence {
 /// Evaluates the distances of matches from their epipolar lines, in px, 0 … `band_px`.
 ///
 /// Distances of true matches follow half a Gaussian, whose width is measured but at least
-/// `noise_px`; chance matches are uniform in the searched band. A fitting calibration means that
-/// half of the matches are true. Points without a match are not used. Pure, but reorders
-/// `distances`.
+/// `noise_px`; chance matches are uniform in the searched band. With a fitting calibration half of
+/// the matches are assumed true. Pure, but reorders `distances`.
 [[nodiscard]] EpipolarEvidence weigh_epipolar_distances(std::span<float> distances, double band_px,
                                                         double noise_px) noexcept;
 

@@ -18,8 +18,7 @@ constexpr const char* kWho = "rig MLESAC";
 constexpr std::size_t kAbortChunk = 64;
 // Number of Gauss–Newton steps on inliers, from a pose with an error of a few sigmas.
 constexpr int kPolishSteps = 3;
-// Maximum number of refined hypotheses per solve; there are about log(hypotheses), and later ones
-// matter least.
+// Maximum number of refined hypotheses per solve; there are about log(hypotheses).
 constexpr int kMaxPolished = 12;
 // Huber's threshold in sigmas: inliers are cut at T², so none is down-weighted.
 constexpr double kNoHuber = 1e6;

@@ -23,45 +23,44 @@ struct MlesacOptions {
 
 struct MlesacPose {
   /// True if there is a pose; the caller checks its inliers. False if the input or options are
-  /// invalid, there are too many points for the workspace, or, without a prior, no camera has three
-  /// usable observations or no sample gave a pose.
+  /// invalid, the workspace is too small, or, without a prior, no camera has three usable
+  /// observations or no sample gave a pose.
   bool found = false;
   Transform T_left_world{};
+
   /// Number of points all of whose observations are usable and within T².
   int inliers = 0;
-  /// Number of observations within T².
   int inlier_observations = 0;
   /// Number of usable observations of all cameras.
   int observations = 0;
   /// Cost C; lower is better.
   double score = 0;
-  /// Number of three-point samples drawn.
   int samples = 0;
 };
 
 /// Estimates the pose of a rig in the world from points seen by any of its cameras, with outliers.
 ///
-/// A sample is three points seen by one camera, in three different buckets of its image (8 × 6 over
-/// the points' bounding rectangle), so that they are spread out; camera k's three-point pose
-/// becomes T_left_world = T_camera_left[k]⁻¹ T_k_world. Each hypothesis is scored over every
-/// observation of every camera by the truncated form of MLESAC's likelihood (P. H. S. Torr, A.
-/// Zisserman, "MLESAC", CVIU 78, 2000: the mixture of a Gaussian for inliers and a uniform density
-/// for outliers; its cost ρ₂):
+/// A sample is three points seen by one camera, spread over different buckets of its image (8 × 6
+/// over the points' bounding rectangle); camera k's three-point pose becomes T_left_world =
+/// T_camera_left[k]⁻¹ T_k_world. Each hypothesis is scored over every observation of every camera
+/// by the truncated form of MLESAC's likelihood (P. H. S. Torr, A. Zisserman, "MLESAC", CVIU 78,
+/// 2000: the mixture of a Gaussian for inliers and a uniform density for outliers; its cost ρ₂):
 ///
 ///     C = Σ_o min(e_o², T²),   e_o² = |measured − projected|² / σ_o²;   behind the camera: T²
 ///
 /// T² is where the two densities of the mixture cross. Scoring stops once C exceeds the best so
-/// far. Because a sample's pose has the noise of three points only, each new best is refined by a
-/// few least-squares steps over its inliers if that lowers C (local optimisation: O. Chum, J.
-/// Matas, J. Kittler, DAGM 2003). It stops after N = ln(1 − confidence) / ln(1 − w³) samples, with
-/// w the share of inlier observations of the best so far.
+/// far. Each new best, with the noise of three points only, is refined by a few least-squares steps
+/// over its inliers if that lowers C (local optimisation: O. Chum, J. Matas, J. Kittler, DAGM
+/// 2003). It stops after N = ln(1 − confidence) / ln(1 − w³) samples, with w the share of inlier
+/// observations of the best so far.
 ///
 /// Ownership  Workspace in the arena. flags() stay valid until the next solve().
 /// Threads    One caller per object; several objects may run in parallel.
 /// Memory     All at construction.
 /// Precision  Scores in float about the points' mean (0.01 px for points within 100 times their
 ///            distance), flags in double.
-/// Errors     If no pose is found, it is the identity and meaningless.
+/// Errors     If no pose is found, it is the identity. Same input, options and random state: same
+///            result, on every instruction set.
 class RigMlesac {
  public:
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;

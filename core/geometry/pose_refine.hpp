@@ -24,12 +24,12 @@ struct PoseRefineOptions {
 };
 
 struct RefinedPose {
-  /// True if there is a pose. False if the input, start or options are invalid, there are too many
-  /// points for the workspace or fewer than three usable observations, or these do not determine
-  /// six degrees of freedom.
+  /// True if there is a pose. False if the input, start or options are invalid, the workspace is
+  /// too small, or the usable observations do not determine six degrees of freedom.
   bool usable = false;
   /// False if the pose was still changing; it is then the best so far.
   bool converged = false;
+
   /// Result; the start if nothing could be refined.
   Transform T_left_world{};
   /// Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m), X_left ← Exp(φ) X_left + τ.
@@ -39,10 +39,12 @@ struct RefinedPose {
   double rotation_sigma = 0;
   /// The same for the camera position, in metres; large values mean weak geometry.
   double translation_sigma = 0;
+
   /// Robust residual scale in input sigmas, ≥ min_scale.
   double scale = 1;
   /// Root mean square of the inliers' residuals, per coordinate.
   double rms_px = 0;
+
   /// Number of points with every usable observation below the χ² threshold.
   int inliers = 0;
   int inlier_observations = 0;
@@ -53,15 +55,15 @@ struct RefinedPose {
 /// Refines the pose of a rig over all cameras' observations with fixed points: Levenberg–Marquardt
 /// on Huber-weighted pixels.
 ///
-///     min Σ_o ρ(|x_o − π_k(T_k T_left_world p)| / (σ_o s)),   s = max(min_scale, median |e|
-///     / 1.1774)
+///     min Σ_o ρ(|x_o − π_k(T_k T_left_world p)| / (σ_o s)),
+///     s = max(min_scale, median |e| / 1.1774)
 ///
 /// (1.1774 σ is the median length of a Gaussian vector of two coordinates.) s is computed at the
 /// start and again after the first steps, when a rough start no longer inflates it.
 ///
 /// If there are gross outliers then (gross_chi2), a second round continues without them: Huber's
 /// loss bounds an outlier's influence but never removes it. A wrong point 5 m away weighs as much
-/// as hundreds of right ones at 50 m: three of them move a pose by a decimetre.
+/// as hundreds of right ones at 50 m.
 ///
 /// Ownership  Workspace in the arena. flags() stay valid until the next refine().
 /// Threads    One caller per object. Memory: all at construction.

@@ -29,8 +29,8 @@ struct StereoMlesacOptions {
 struct StereoEstimate {
   /// See MlesacPose::found; needs at least five matches.
   bool found = false;
-  /// The estimate, with |t| = baseline.
   Transform T_right_left{};
+
   /// Σ JᵀJ/σ² over the inliers, for δ of moved_on_sphere().
   Mat5 information = Mat5::Zero();
   /// Standard deviation in the worst direction, in rad; infinite if the matches do not determine
@@ -38,6 +38,7 @@ struct StereoEstimate {
   double rotation_sigma = 0;
   /// Standard deviation of the direction of t, in rad.
   double direction_sigma = 0;
+
   /// Number of matches within T² and in front of both cameras.
   int inliers = 0;
   /// Cost C; lower is better.

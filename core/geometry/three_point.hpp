@@ -12,7 +12,6 @@ namespace vergence {
 struct ThreePointSolutions {
   /// Number of solutions, 0 … 4.
   int count = 0;
-  /// Solutions, in no order.
   std::array<Transform, 4> T_camera_world{};
 };
 
@@ -26,8 +25,8 @@ struct ThreePointSolutions {
 /// R is the rotation between the two triangles' own frames, orthonormal by construction.
 ///
 /// Input   rays: unit vectors in the camera's frame; points: world, m, of any scale. Both are
-///         checked. Threads Pure. Memory none. Time about 1 µs. Errors none; nothing that comes out
-///         is NaN.
+///         checked.
+/// Threads Pure. Time about 1 µs. Results are never NaN.
 [[nodiscard]] ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
                                                     const std::array<Vec3, 3>& points) noexcept;
 

@@ -20,7 +20,6 @@ inline constexpr std::size_t kCacheLine = 64;
 
 /// Bytes of an arena under one name.
 struct ArenaRow {
-  /// Points to a constant.
   const char* name = "";
   std::size_t bytes = 0;
 };

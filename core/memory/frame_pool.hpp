@@ -45,7 +45,6 @@ class FramePool {
   [[nodiscard]] static constexpr std::size_t stride(int width) noexcept {
     return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine;
   }
-  /// Number of bytes that the arena must provide.
   [[nodiscard]] static constexpr std::size_t memory_needed(int width, int height,
                                                            std::size_t slots) noexcept {
     return slots * stride(width) * static_cast<std::size_t>(height);
@@ -93,7 +92,6 @@ class FramePool {
   [[nodiscard]] int width() const noexcept { return width_; }
   [[nodiscard]] int height() const noexcept { return height_; }
   [[nodiscard]] std::size_t slots() const noexcept { return slots_; }
-  /// Number of free slots, for statistics.
   [[nodiscard]] std::size_t available() const noexcept { return free_.size(); }
 
  private:

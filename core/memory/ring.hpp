@@ -52,8 +52,8 @@ class Ring {
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
 
  private:
-  alignas(kCacheLine) std::atomic<std::size_t> head_{// Separate cache lines avoid false sharing.
-                                                     0};
+  // Separate cache lines avoid false sharing.
+  alignas(kCacheLine) std::atomic<std::size_t> head_{0};
   alignas(kCacheLine) std::atomic<std::size_t> tail_{0};
   alignas(kCacheLine) std::array<T, N> items_{};
 };

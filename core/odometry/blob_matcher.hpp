@@ -26,7 +26,6 @@ inline constexpr std::size_t kMaxBlobs = 1500;
 class BlobMatcher {
  public:
   BlobMatcher() noexcept = default;
-  /// `max_width` and `max_height`: maximum size of the images.
   BlobMatcher(int max_width, int max_height, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 

@@ -10,10 +10,10 @@ inline constexpr double kLongestExtrapolation = 2.0;
 /// Covariance of one frame's motion: translation (m), then rotation (rad), about the left camera's
 /// axes.
 ///
-/// It is kFitInflation² times that of the frame's pose fit (`fit`: left perturbation φ rad, τ m). A
-/// fit takes the points as known, but their errors last for many frames; the factor is measured on
-/// recorded sequences (build/bench/covariance_bench). A motion extrapolated over `extrapolated_s`
-/// is uncertain by half of itself and by the unknown motion after kLongestExtrapolation. Pure.
+/// It is kFitInflation² times that of the frame's fit (`fit`: left perturbation φ rad, τ m), which
+/// takes the points as known although their errors last for many frames; the factor is measured
+/// (build/bench/covariance_bench). A motion extrapolated over `extrapolated_s` is uncertain by half
+/// of itself and by the unknown motion after kLongestExtrapolation. Pure.
 [[nodiscard]] Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                                      double extrapolated_s) noexcept;
 /// Covariance that the window's correction of a pose adds to the motion to it, because the
@@ -31,9 +31,9 @@ inline constexpr double kLongestExtrapolation = 2.0;
 /// Model  Motions have independent errors and share four: a relative error of all lengths, from the
 ///        calibration's depth, and a rotation per metre about each axis, from lens errors. First
 ///        order: P ← A P Aᵀ + Q, and c ← A c + q for the shared errors, with the adjoint A of the
-///        motion (Barfoot, State Estimation for Robotics, 7.3.1). A frame is measured against the
-///        map, not the previous frame: P, c and the motion refer to an anchor, the last pose that
-///        has certainly moved or has changed the map. At standstill nothing accumulates.
+///        motion (Barfoot, State Estimation for Robotics, 7.3.1). Frames are measured against the
+///        map: P, c and the motion refer to an anchor, the last pose that has certainly moved or
+///        has changed the map, so at standstill nothing accumulates.
 ///
 ///     const Mat6 motion = motion_covariance(fit, drift.motion_to(T_left_world), 0);
 ///     drift.step(T_left_world, motion, 0.005, keyframe);
@@ -42,9 +42,9 @@ inline constexpr double kLongestExtrapolation = 2.0;
 /// Threads  A value; one caller. Does not allocate.
 class DriftCovariance {
  public:
-  /// Adds the next pose, with the motion's covariance from motion_covariance() and the relative
-  /// sigma of lengths by the calibration. `map_changed`: this frame changed the map, so the next
-  /// poses are measured against a new reference. The first pose is exact: it defines the world.
+  /// Adds the next pose, with its motion's covariance and the relative sigma of lengths by the
+  /// calibration. `map_changed`: the next poses are measured against a changed map. The first pose
+  /// is exact: it defines the world.
   void step(const Transform& T_left_world, const Mat6& motion, double length_sigma,
             bool map_changed) noexcept;
   /// Returns T_now_before of the next pose; the identity before the first.

@@ -94,14 +94,14 @@ class FrontEnd {
   void set_band(double px) noexcept { band_px_ = px; }
 
   /// Searches for the map's points in the whole image of camera k by their descriptors. Returns the
-  /// number of tentative matches. Their observations are rough and include wrong ones; those of
-  /// other cameras stay. Takes some milliseconds: for frames that tracking has lost.
+  /// number of tentative matches, whose observations are rough and include wrong ones; those of
+  /// other cameras stay. Takes some milliseconds.
   [[nodiscard]] int relocalise(Map& map, int k) noexcept;
 
   /// Matches corners of `left`, or blobs (OdometryOptions::init_features), in camera k without a
-  /// known rig, except that it rotates the image by less than about 20°. Matches have mutually best
-  /// descriptors and are then aligned; wrong ones remain. Takes about ten milliseconds, with blobs
-  /// thirty. Valid until the next call.
+  /// known rig, except that it rotates the image by less than about 20°. Descriptors are mutually
+  /// best and matches aligned; wrong ones remain. Takes about 10 ms, with blobs 30 ms. Valid until
+  /// the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
   /// Detects new corners of `left` where `map` has no points (null: everywhere) and matches them in
@@ -192,7 +192,6 @@ class FrontEnd {
   PairRunner& runner_;
   int cameras_;
   std::uint8_t structured_ = 0;
-  // Fingerprints of the last images.
   std::array<Fingerprint, kMaxCameras> fingerprints_{};
   std::array<UndistortedCamera, kMaxCameras> lenses_{};
   std::array<features::Mask, kMaxCameras> masks_{};

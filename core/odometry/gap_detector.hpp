@@ -10,10 +10,9 @@ namespace vergence::odometry {
 /// Detects gaps between frames that are too long for motion prediction, and requests a map reset
 /// after one.
 ///
-/// The limit is a multiple of the usual interval between frames, so a steady 1 Hz has no gaps.
-/// After a gap the few surviving points constrain only one frame, and keeping them would spread the
-/// gap's pose error over many frames; so a new map is requested. If every interval is a gap, no
-/// request is made.
+/// The limit is a multiple of the usual interval, so a steady 1 Hz has no gaps. After a gap the few
+/// surviving points would spread the gap's pose error over many frames; so a new map is requested,
+/// unless every interval is a gap.
 ///
 /// Not thread-safe. Does not allocate.
 class GapDetector {
@@ -42,9 +41,8 @@ class GapDetector {
  private:
   // Number of newest intervals whose median is the usual one.
   static constexpr std::size_t kIntervals = 9;
-  // Maximum number of usual intervals without a gap. At 10 Hz, a vehicle that brakes or accelerates
-  // at 5 m/s² deviates by 0.9 m from its predicted motion after six of them, so near points are no
-  // longer found.
+  // Maximum number of usual intervals without a gap. Braking at 5 m/s² for six intervals at 10 Hz
+  // deviates by 0.9 m from the prediction, so near points are no longer found.
   static constexpr double kLongest = 6;
 
   /// Median interval in seconds; gaps have no effect unless they are the majority.
@@ -62,7 +60,6 @@ class GapDetector {
   Stamp last_{};
   // In seconds.
   std::array<double, kIntervals> intervals_{};
-  // Number of intervals so far.
   std::size_t count_ = 0;
   // True if the newest frame came after a gap.
   bool before_ = false;

@@ -43,9 +43,7 @@ struct PointObservation {
   }
 };
 
-/// Life cycle of a map point.
 enum class PointStage : std::uint8_t {
-  /// The slot is unused.
   free,
   /// The point is followed, but was not yet found often enough to constrain poses.
   candidate,
@@ -66,6 +64,7 @@ struct MapPoint {
   /// Number of frames in which the point was found.
   std::uint16_t found = 0;
   Vec3 p_world = Vec3::Zero();
+
   /// Pose of the left camera in which the patch was cut.
   Transform T_origin_world{};
   /// Ray (x, y, 1) of its pixel there.
@@ -73,19 +72,19 @@ struct MapPoint {
   /// Derivative of that ray's x and y with respect to the raw pixel.
   Mat2 d_ray_d_pixel = Mat2::Identity();
   features::Patch patch{};
+
   /// Observations in the current frame that agree with the pose.
   PointObservation now{};
   /// Bit k is set if the point was found in camera k's current image, whether or not it agrees.
   std::uint8_t in_images = 0;
   /// True if an additional camera has seen the point where expected.
   bool across = false;
+
   /// True if the track log has taken the point, at `logged_at`.
   bool logged = false;
   /// Raw pixel in `left` when it was last logged.
   Eigen::Vector2f logged_at{};
-  /// Raw pixels in the current frame.
   std::array<Eigen::Vector2f, kMaxCameras> raw{};
-  /// Observations by keyframe slot.
   std::array<PointObservation, kMaxWindow> seen{};
 
   /// True if the position is accurate enough to constrain poses.

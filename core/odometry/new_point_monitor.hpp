@@ -6,8 +6,8 @@ namespace vergence::odometry {
 /// front of the scene, new points are lost immediately. Not thread-safe. Does not allocate.
 class NewPointMonitor {
  public:
-  /// Adds the numbers of new points searched for in a frame and found at rest. Small numbers are
-  /// summed over frames, so that one blurred frame does not decide.
+  /// Adds the numbers of new points searched for in a frame and found at rest. Numbers are summed
+  /// over frames, so that one blurred frame does not decide.
   void add(int tried, int kept) noexcept {
     tried_ += tried;
     kept_ += kept;

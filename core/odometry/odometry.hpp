@@ -23,21 +23,24 @@ struct FrameOutcome {
   Mat6 fit_covariance = Mat6::Zero();
   PoseStatus status = PoseStatus::lost;
   Reason reason = Reason::no_pose;
+
   int inliers = 0;
   int stereo_inliers = 0;
   double reprojection_px = 0;
   bool keyframe = false;
-  /// Work done in addition to the pose.
   FrameWorkload effort{};
+
   /// Time since the last pose measured from images; 0 if this one is.
   double unseen_s = 0;
   /// Motion expected over unseen_s. A predicted pose includes it; the pose of a repeated left image
   /// does not.
   Transform expected{};
+
   /// True if the map was rebuilt in this frame.
   bool restarted = false;
   /// True if the pose was found again in the window after being lost.
   bool relocalised = false;
+
   /// True if rebuild() will change to the next calibration; call it when this frame's tracks are no
   /// longer needed.
   bool relink_due = false;
@@ -48,14 +51,17 @@ struct FrameOutcome {
   bool resumed = false;
   /// With `relinked`, the share of the map's points that fit the calibration.
   double points_kept = 0;
+
   /// True if rebuild() will rebuild the map from this frame after a gap.
   bool renewal_due = false;
   /// True if rebuild() has rebuilt the map.
   bool renewed = false;
   /// True if the rig's transform was estimated from this frame's images alone.
   bool initialised = false;
+
   /// Time since the previous frame if that is a gap, else 0.
   double gap_s = 0;
+
   /// Bit k is set if camera k delivered a new image with structure.
   std::uint8_t structured = 0;
   /// True if every camera delivered a new image with structure.
@@ -65,6 +71,7 @@ struct FrameOutcome {
   /// True if one camera repeated an image while another delivered a new one; the former may be an
   /// exposure late from now on.
   bool uneven = false;
+
   /// Factor by which the world was scaled about the left camera, to match the known baseline.
   double scale = 1;
   /// Correction T_adjusted_fitted of this frame's fitted pose by the window.
@@ -77,7 +84,6 @@ struct FrameOutcome {
   }
 };
 
-/// Relation between the cameras' poses.
 enum class Link : std::uint8_t {
   /// The cameras are one rigid rig with the calibration in use: stereo odometry.
   linked,
@@ -116,8 +122,8 @@ class Odometry {
   [[nodiscard]] FrameOutcome process(const RigFrame& frame, Duration budget = {}) noexcept;
 
   /// Changes to this calibration, with linked cameras. The next frame is still posed with the old
-  /// one; its rebuild() then makes the change. If the cameras were linked the map is kept and
-  /// recomputed; if not, a new map is built from that frame if possible.
+  /// one; its rebuild() then makes the change, and recomputes the map, or builds a new one if the
+  /// cameras were not linked.
   void link(const RigCalibration& rig) noexcept;
   /// Call after process() of every frame: does what the outcome reports as due, unless a link was
   /// revoked since.

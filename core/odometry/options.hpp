@@ -14,6 +14,7 @@ struct OdometryOptions {
   int pyramid_levels = 4;
   /// Half width of the search band around the epipolar line, 0.5 … 5.
   double band_px = 2.0;
+
   /// Standard deviation of one coordinate of a tracked corner on level 0, in px; also the minimum
   /// residual scale.
   double pixel_sigma = 0.15;
@@ -22,18 +23,20 @@ struct OdometryOptions {
   double parallax_sigma = 0.8;
   /// Threshold of the robust loss, in sigmas, 1 … 10.
   double huber = 2.0;
+
   /// Number of keyframes in the adjusted window, 3 … 20.
   int window_keyframes = 10;
   /// Maximum prior sigma of the rotation between two cameras, 0 … 0.05; 0 keeps it fixed.
   double extrinsic_rotation_sigma_rad = 0.001;
-  /// Maximum number of solver steps per keyframe, 1 … 30.
+  /// Maximum number of solver steps per new keyframe, 1 … 30.
   int window_steps = 5;
-  /// Median angle in rad between the rays and those of the last keyframe that triggers a new one,
-  /// 0.005 … 0.3.
+  /// Median angular displacement of the points since the last keyframe that triggers a new one, in
+  /// rad, 0.005 … 0.3.
   double keyframe_parallax = 0.03;
   /// Share of the last keyframe's points that are still tracked below which a new one is made, 0.1
   /// … 1.
   double keyframe_tracked = 0.8;
+
   /// Minimum number of inliers of a pose; fewer make it `lost`, 6 … 200.
   int min_inliers = 20;
   /// Number of inliers below which a pose is `degraded: few_inliers`.

@@ -20,10 +20,10 @@ struct WindowOutcome {
 
 /// Adjusts the window's poses and points together; the oldest keyframe is constant.
 ///
-/// A calibration error changes all disparities of a window equally, not independently. So the
-/// rotation of every additional camera that shifts disparities is estimated with the window; its
-/// prior has the sigma of the calibration's depths. Each window starts from the calibration, so
-/// that nothing counts twice, and the estimate never leaves the odometry.
+/// A calibration error changes all disparities of a window equally. So the rotation of every
+/// additional camera that shifts disparities is estimated with the window, with the sigma of the
+/// calibration's depths as prior. Each window starts from the calibration, so that nothing counts
+/// twice, and the estimate never leaves the odometry.
 ///
 /// Memory  From the arena at construction. Observations beyond its capacity are left out.
 class WindowAdjuster {
@@ -62,7 +62,6 @@ class WindowAdjuster {
   BundleAdjuster adjuster_;
   // The calibration, with the prior covariance of the rotations that are estimated.
   RigCalibration prior_rig_;
-  // True if the rotations are estimated.
   bool rotations_free_ = false;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
@@ -71,7 +70,6 @@ class WindowAdjuster {
   FixedVector<Transform, kMaxWindow * kMaxCameras> poses_;
   FixedVector<std::uint8_t, kMaxWindow * kMaxCameras> constant_;
   BoundedVector<Vec3> points_;
-  // Map index of each point.
   BoundedVector<std::uint16_t> owner_;
   BoundedVector<BundleObservation> observations_;
   std::span<float> residuals_;

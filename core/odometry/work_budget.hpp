@@ -8,7 +8,7 @@ namespace vergence::odometry {
 
 /// Plans the optional work of a frame within its time budget. Work is left out in this order: new
 /// points, down to a quarter; keyframes of the window, down to four; steps of its solver, down to
-/// one; the window. The time of each piece of work is predicted from the slowest recent frame.
+/// one; the window. Times are predicted from the slowest recent frame.
 ///
 /// Not thread-safe. Does not allocate. Without a budget all work is planned and no clock is read.
 class WorkBudget {

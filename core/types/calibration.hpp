@@ -86,16 +86,17 @@ struct RigCalibration {
   int cameras = 0;
   std::array<Intrinsics, kMaxCameras> intrinsics{};
   std::array<Transform, kMaxCameras> T_camera_left{};
+
   /// Standard deviations rx ry rz (rad) tx ty tz (m) by noise; 0 if unknown.
   std::array<std::array<double, 6>, kMaxCameras> sigma_noise{};
   /// Standard deviations including uncertain intrinsics.
   std::array<std::array<double, 6>, kMaxCameras> sigma_total{};
-  // Covariances including uncertain intrinsics; zero if unknown. Zero() is explicit because Eigen
-  // does not initialise a Mat6.
+  /// Covariances including uncertain intrinsics; zero if unknown, which Eigen does not default to.
   std::array<Mat6, kMaxCameras> covariance_total{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(),
                                                  Mat6::Zero()};
   /// Joint covariance of all parameters, from which depth errors follow; empty if unknown.
   RigCovariance covariance{};
+
   /// Measured length |t| of camera 1's baseline, in metres.
   double baseline = 0;
   /// Standard deviation of the baseline, in metres; 0 if exact.
@@ -105,7 +106,6 @@ struct RigCalibration {
   Stamp found{};
   /// Number of rig frames that the calibration is based on.
   int frames = 0;
-  /// Root mean square residual of the solve.
   double reprojection_px = 0;
   /// Relative standard deviation of path lengths, by the noise of the tracks and usual errors of
   /// intrinsics, without baseline_sigma.

@@ -30,7 +30,6 @@ enum class CalibrationCause : std::uint8_t {
 
 /// Focal length measured online, compared with the configured one.
 struct FocalMeasurement {
-  /// Configured fx of the left camera.
   double configured_px = 0;
   /// Measured fx; 0 if not measured.
   double measured_px = 0;
@@ -53,26 +52,29 @@ struct CalibrationDecision {
   const char* reason = "";
   /// Estimated calibration, also when rejected.
   RigCalibration calibration{};
+
   /// Number of frames from the alarm, start or request to the decision.
   int latency_frames = 0;
   /// Number of the first frame of the changed rig; 0 if not applicable.
   std::uint64_t onset_frame = 0;
+
   /// Median distance of held-out frames' matches from their epipolar lines for the camera that fits
   /// worst, with the previous calibration and with the estimate.
   double held_out_before_px = 0;
   double held_out_after_px = 0;
+
   /// Depth at which the next two errors are evaluated; 0 if they were not.
   double reference_depth_m = 0;
   /// Predicted depth error of the estimate, 1 sigma.
   double depth_sigma_percent = 0;
   /// Depth error of the previous calibration relative to the estimate; 0 if there was none.
   double depth_error_percent = 0;
+
   /// True if the depths of the calibration now in use are within the tolerated error.
   bool verified = false;
   /// Evidence that the rig is that of the previous calibration or, with `contradicted`, another
   /// one.
   ChangeEvidence evidence;
-  /// Newest measurement of this run.
   FocalMeasurement focal{};
   ///
   double solve_ms = 0;

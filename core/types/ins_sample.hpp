@@ -24,7 +24,6 @@ struct Geodetic {
   }
 };
 
-/// Kind of a position fix.
 enum class FixStatus : std::uint8_t {
   /// There is no position, or it is meaningless.
   none,
@@ -58,15 +57,18 @@ struct InsSample {
   FixStatus fix = FixStatus::none;
   bool attitude_valid = false;
   bool velocity_valid = false;
+
   Geodetic position{};
   /// Velocity, in m/s.
   std::array<double, 3> velocity_enu{};
   /// Attitude as Hamilton quaternion x y z w: v_enu = q ⊗ v_ins ⊗ q*.
   std::array<double, 4> q_enu_ins{0, 0, 0, 1};
-  // Heading of a receiver without an attitude, used if attitude_valid is false: yaw of the body
-  // about up, counter-clockwise from east, in rad.
+
+  /// Heading of a receiver without an attitude, used if attitude_valid is false: yaw of the body
+  /// about up, counter-clockwise from east, in rad.
   HeadingSource heading_source = HeadingSource::none;
   double yaw_enu = 0;
+
   /// Horizontal standard deviation per axis, in metres.
   double position_sigma = 0;
   /// Standard deviation of the height, in metres.

@@ -9,7 +9,6 @@
 
 namespace vergence {
 
-/// State of the estimator.
 enum class State : std::uint8_t {
   initialising,
   parallel_monocular,
@@ -19,7 +18,6 @@ enum class State : std::uint8_t {
   lost
 };
 
-/// Status of a pose.
 enum class PoseStatus : std::uint8_t {
   /// The pose is reliable.
   ok,
@@ -36,8 +34,8 @@ enum class Reason : std::uint8_t {
   no_image,
   /// An image has no structure: covered, black or saturated.
   image_no_contrast,
-  /// A camera delivered its previous image again, in this frame or a recent one, while others went
-  /// on. It may be an exposure late until a dozen frames in motion show otherwise.
+  /// A camera delivered its previous image again, now or recently, while others went on. It may be
+  /// an exposure late until a dozen frames in motion show otherwise.
   image_repeated,
   /// There is too little texture to start from.
   few_features,
@@ -99,6 +97,7 @@ struct PoseSample {
   State state = State::initialising;
   PoseStatus status = PoseStatus::lost;
   Reason reason = Reason::none;
+
   /// Pose of the left camera; the identity when `lost`.
   Transform T_world_left{};
   /// Covariance of T_world_left by dead reckoning since the first pose: position (m), then rotation
@@ -107,10 +106,12 @@ struct PoseSample {
   /// Covariance of the motion since the last pose, without length_sigma: translation (m), then
   /// rotation (rad), about the left camera's axes.
   Covariance6 motion_covariance{};
+
   /// Relative standard deviation that all lengths share, from the calibration.
   float length_sigma = 0;
   /// Distance by which the window moved the fitted pose; included in the covariances.
   float corrected_m = 0;
+
   /// Number of points that support the pose.
   int inliers = 0;
   /// Number of inliers seen by a second camera in this frame.
@@ -118,6 +119,7 @@ struct PoseSample {
   /// Root mean square residual of the inliers, per coordinate.
   double reprojection_px = 0;
   bool keyframe = false;
+
   /// Work done in addition to the pose.
   FrameWorkload effort{};
   /// Wall time of each stage; of parallel ones the slower side.

@@ -23,7 +23,6 @@ void back_substitute(KernelJob& job, std::size_t first, std::size_t last,
 /// Computes cost and residuals only.
 void evaluate(KernelJob& job, std::size_t first, std::size_t last) noexcept;
 
-/// Result of the Cholesky factorisation.
 struct PivotReport {
   /// Number of pivots not above `tolerance` times their diagonal; those parameters are not moved.
   int small = 0;

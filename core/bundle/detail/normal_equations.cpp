@@ -7,10 +7,9 @@
 //     pose (τ, φ):       B = F [ I  −[X_i]× ]
 //     camera k (τ, φ):   A = F [ I  −[X_i]× ]
 //     point:             C = F R_i
-// A camera's perturbation is written in the base camera's axes.
-// So one 3×3 matrix Q = Σ FᵀwF a pose and camera carries everything: P += R_iᵀ Q R_i, O = [I;
-// [X_i]×] Q R_i, and the sums of Bᵀ w B over the points of one camera serve as its share of I, of M
-// and of S alike.
+// A camera's perturbation is in the base camera's axes. So one 3×3 matrix Q = Σ FᵀwF per pose and
+// camera suffices: P += R_iᵀ Q R_i, O = [I; [X_i]×] Q R_i, and the sums of Bᵀ w B over the points
+// of one camera are its share of I, M and S.
 #include <algorithm>
 #include <bit>
 

@@ -3,9 +3,9 @@
 
 namespace vergence::detail {
 
-/// Checks a problem and lays it out for the kernels: points sorted by the poses that see them, in
-/// batches of eight. Returns false with the reason in *result if the workspace cannot be used.
-/// Reads the problem's arrays only within their sizes.
+/// Checks a problem and lays it out for the kernels, with points sorted by the poses that see them,
+/// in batches of eight. Returns false with the reason in *result. Reads the problem's arrays only
+/// within their sizes.
 [[nodiscard]] bool set_up(BundleWorkspace& w, const BundleProblem& problem,
                           const BundleOptions& options, BundleResult* result) noexcept;
 

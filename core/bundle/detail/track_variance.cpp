@@ -160,10 +160,10 @@ class Clusters {
   std::array<bool, static_cast<std::size_t>(kMaxCells* kMaxCells)> any_{};
 };
 
-/// Variance with two kinds of larger clusters, because tracks share errors in both: a cell of the
-/// left image (residual lens errors are a field over the image), and a block of frames (effects of
-/// the scene). With independent errors each gives the variance by tracks, so their mean is used. If
-/// all tracks are in one cell or block, the other kind is used, or the tracks.
+/// Variance with two kinds of larger clusters, in which tracks share errors: cells of the left
+/// image (residual lens errors) and blocks of frames (effects of the scene). With independent
+/// errors each gives the variance by tracks, so their mean is used. If all tracks are in one cell
+/// or block, only the other kind is used, or the tracks.
 Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem, int cells,
                          TrackGradient& gradient, int size) noexcept {
   Clusters by_cell(size), by_block(size);

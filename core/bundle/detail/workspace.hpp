@@ -7,7 +7,7 @@
 
 namespace vergence::detail {
 
-/// Number of points processed together: a cache line of doubles, the widest SIMD vector.
+/// Number of points processed together: the lanes of the widest SIMD vector.
 inline constexpr int kBatch = 8;
 /// Number of rows of one pose in the reduced system; θ_S is padded to a multiple.
 inline constexpr int kBlock = 6;
@@ -15,13 +15,12 @@ inline constexpr int kBlock = 6;
 inline constexpr int kYSize = kBlock * 3 * kBatch;
 /// Number of doubles in its first three rows.
 inline constexpr int kYTop = 3 * 3 * kBatch;
-/// Number of rows of KernelJob::factors.
 inline constexpr int kFactorRows = 11;
 /// Depth of a point that no camera sees, in metres.
 inline constexpr double kFar = 1e30;
 /// 21 elements of the symmetric 6×6 and 6 of the gradient.
 inline constexpr int kPoseSums = 27;
-/// Maximum number of batches multiplied together: one block of each, 18 kB, fits into the L1 cache.
+/// Maximum number of batches multiplied together; one block of each, 18 kB, fits into the L1 cache.
 inline constexpr int kGroupLimit = 16;
 inline constexpr int kMaxShared = kBlock * (kMaxCameras - 1) + kIntrinsicsSize * kMaxCameras;
 inline constexpr int kMaxSharedBlocks = (kMaxShared + kBlock - 1) / kBlock;
@@ -72,7 +71,6 @@ struct KernelCamera {
 /// Layout of the rows of θ_S. Extrinsics of camera k: (τ, φ), or (β, φ) with τ = basis β; then free
 /// intrinsics of each camera.
 struct SharedLayout {
-  /// Number of rows used.
   int size = 0;
   /// Number of blocks of kBlock rows, the last one padded.
   int blocks = 0;
@@ -104,17 +102,18 @@ struct KernelJob {
   const double* jets = nullptr;
   /// [batch][3][kBatch], output of back_substitute().
   double* candidate = nullptr;
+
   /// [block][3][3][kBatch]: rows of τ of Y = O L⁻ᵀ with P = L Lᵀ. Those of φ are X_i × them and are
   /// kept for the current group only.
   double* y = nullptr;
   /// [block of the group][6][3][kBatch]: all of Y.
   double* y_group = nullptr;
-  /// First block of the current group.
   std::size_t group_begin = 0;
   /// [batch][shared.blocks][6][3][kBatch]: N L⁻ᵀ.
   double* y_shared = nullptr;
   /// [batch][kFactorRows][kBatch]: L⁻¹ (6), z = L⁻¹ e_P (3), minimum depth, 0.
   double* factors = nullptr;
+
   /// [pose][classes][kPoseSums][kBatch].
   double* sums = nullptr;
   /// [pose][camera][kIntrinsicsSize][6][kBatch]: Σ JᵀwB.
@@ -125,9 +124,11 @@ struct KernelJob {
   double* reduced = nullptr;
   /// [slot][kBatch], output of evaluate(); may be null.
   float* squared = nullptr;
+
   /// Number of cameras whose normal equations are summed separately.
   int classes = 1;
   std::uint8_t class_cameras[kMaxCameras] = {};
+
   SharedLayout shared;
   int free_poses = 0;
   BundleLoss loss = BundleLoss::none;
@@ -168,7 +169,6 @@ struct BundleWorkspace {
   std::span<std::uint64_t> order;
   /// First observation of each point, with one more element at the end.
   std::span<std::uint32_t> first_observation;
-  /// Number of observations of each pose.
   std::span<std::uint32_t> pose_observations;
   /// Buffers of the set-up: first slot of each pose in the batch, and its cameras.
   std::span<std::uint32_t> pose_slot;

@@ -11,7 +11,6 @@
 
 namespace vergence::calibration::detail {
 
-/// Evidence of one moving frame.
 struct FrameEvidence {
   std::uint64_t frame = 0;
   Evidence evidence;
@@ -40,7 +39,6 @@ class ChangeDetector {
  public:
   /// `covariance`: of θ at the reference.
   void reset(const MonitorOptions& options, const Mat5& covariance) noexcept;
-  /// See Monitor::expect_scatter().
   void expect_scatter(double bias_px) noexcept;
   /// A frame that exceeds the threshold on its own counts only if the next one does as well: a
   /// knock lasts, whereas a distorted image (skewed exposure, a shaken rolling shutter) does not.
@@ -89,7 +87,6 @@ class ChangeDetector {
   double lambda_ = 0;
   // Running means of the spreads.
   double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;
-  // Statistic of the last decide().
   double newest_statistic_ = 0;
   // Number of consecutive frames above the threshold.
   int over_ = 0;

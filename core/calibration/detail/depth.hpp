@@ -14,7 +14,6 @@ struct CovisiblePoint {
   const Camera* left = nullptr;
   const Camera* right = nullptr;
   double depth_m = 0;
-  /// Pixel in the left image.
   Vec2 pixel = Vec2::Zero();
   /// Left ray (x, y, 1).
   Vec3 ray = Vec3::Zero();

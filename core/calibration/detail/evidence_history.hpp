@@ -13,7 +13,6 @@ class EvidenceHistory {
  public:
   /// Number of individual frames, among which an onset is exact.
   static constexpr std::size_t kRecent = 64;
-  /// Number of frames in a block.
   static constexpr std::size_t kBlock = 15;
   // Number of blocks over which a drift is traced: two minutes at 30 Hz.
   static constexpr std::size_t kBlocks = 240;

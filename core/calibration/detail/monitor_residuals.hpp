@@ -12,7 +12,6 @@ namespace vergence::calibration::detail {
 /// Maximum number of observations of a frame; further ones are left out.
 inline constexpr std::size_t kMaxObservations = 1024;
 
-/// The reference calibration with derived quantities.
 struct Reference {
   EpipolarGeometry epipolar{Transform{}};
   Pinhole left{}, right{};
@@ -26,7 +25,7 @@ struct StereoResiduals {
   /// Ratio of the variance of g in this frame to that of white noise: mean over the five
   /// parameters.
   double spread_now = 0;
-  /// The same ratio with the correlation to earlier observations of the same tracks. Its sum over
+  /// This ratio with the correlation to earlier observations of the same tracks. Its sum over
   /// frames gives the variance of the summed gradient.
   double spread_life = 0;
 };
@@ -64,7 +63,6 @@ class MonitorResiduals {
 
   std::size_t rows_ = 0;
   std::array<StereoRow, kMaxObservations> stereo_{};
-  // Buffer for medians.
   std::array<double, kMaxObservations> sizes_{};
   // Memory by track number; a newer track replaces one with the same low bits.
   std::array<Memory, 4096> memories_{};

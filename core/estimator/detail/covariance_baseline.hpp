@@ -11,13 +11,12 @@
 namespace vergence {
 
 /// Baseline of the motions' uncertainty: the median over recent motions. A motion whose sigma is
-/// several times larger is reported as less reliable, whatever the cause; a single certain motion
-/// among uncertain ones does not end the report.
+/// several times larger is reported; a single certain motion among uncertain ones does not end the
+/// report.
 ///
 /// Without faults no motion is more than 1.6 times as uncertain as the baseline on recorded
 /// sequences, and 2.3 times on the rendered street (build/bench/covariance_bench). Cameras out of
-/// sync give more than 4 times, a tunnel 3 times from its third frame on
-/// (FaultPairs.imageLateAfterALostOneIsNotOk).
+/// sync give more than 4 times, a tunnel 3 times (FaultPairs.imageLateAfterALostOneIsNotOk).
 ///
 /// Not thread-safe. Does not allocate.
 class CovarianceBaseline {
@@ -29,11 +28,6 @@ class CovarianceBaseline {
     constexpr double kMoves = 2;
     return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
-  /// Returns true from a motion more than kTimes times as uncertain as the baseline on, until the
-  /// rms of the last three is below kRelease times the baseline. Such motions do not enter the
-  /// baseline, so lasting uncertainty is reported for as long as it lasts.
-  ///
-  /// sigma_m: of the translation of a motion that measurable(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
     recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
     times_ = kept_ >= kMin ? sigma_m / median() : 0;

@@ -93,6 +93,7 @@ struct Estimator::Parts {
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
+
   // Standard deviation of the depth by the verified calibration, in percent.
   double verified_percent = 0;
   // Evidence that the verified calibration is the rig's.
@@ -101,12 +102,14 @@ struct Estimator::Parts {
   bool focal_contradicted = false;
   // True if this frame's pose differs from the last one by more than its uncertainty.
   bool moves = false;
+
   int without_pose = 0;
   // True if a gap was reported and has not ended.
   bool in_gap = false;
   // Number of consecutive frames without stereo matches.
   int unmatched_frames = 0;
   Reason notified_missing = Reason::none;
+
   std::atomic<bool> requested{false};
   // One frame records at most eight events.
   FixedVector<EstimatorEvent, 16> events;

@@ -13,11 +13,9 @@ class SolutionReview {
     const RigCalibration& nominal;
     /// Null if no calibration is in use.
     const RigCalibration* in_use;
-    /// Origin of the calibration in use.
     calibration::CalibrationOrigin source;
     const calibration::TrackLog& log;
     const calibration::FocalCheck& focal;
-    /// See AcceptanceInput::may_have_changed.
     bool may_have_changed = true;
   };
   SolutionReview(const calibration::RigSolution& solved, const Context& context) noexcept

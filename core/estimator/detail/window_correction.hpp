@@ -2,9 +2,9 @@
 
 namespace vergence {
 
-/// Correction of a frame's fitted pose by the window adjustment. When the window corrects errors of
-/// older frames, the correction appears as a jump in the newest motion. The motion is unreliable if
-/// the jump exceeds both its own sigma and the share kShare of its length.
+/// Correction of a frame's fitted pose by the window, which appears as a jump in the newest motion
+/// when errors of older frames are corrected. The motion is unreliable if the jump exceeds both its
+/// own sigma and the share kShare of its length.
 ///
 /// On recorded sequences without faults the largest jump beyond the sigma is 4.0 % of its motion
 /// (build/bench/covariance_bench).

@@ -11,7 +11,6 @@ inline constexpr int kPlacesAtATime = 32;
 
 /// An 8×8 template with its sums.
 struct Block {
-  /// Pixels, row by row.
   std::uint8_t pixels[kBlock * kBlock];
   /// Σ T and 64 Σ T² − (Σ T)².
   float sum = 0, variance = 0;

@@ -8,9 +8,8 @@ namespace vergence::detail {
 /// selected at run time).
 ///
 /// Sums run in a fixed number of virtual lanes and are reduced in a fixed order, without fused
-/// multiply-add, so they are bit-identical on every target. Columns are padded to whole blocks;
-/// each struct states the content of its padding. The block sizes are the lanes of the widest
-/// vectors (AVX-512).
+/// multiply-add: bit-identical on every target. Columns are padded to whole blocks, the lanes of
+/// the widest vectors (AVX-512); each struct states its padding.
 inline constexpr std::size_t kFloatBlock = 16;
 inline constexpr std::size_t kDoubleBlock = 8;
 
