@@ -22,7 +22,7 @@ namespace vergence::odometry {
 struct ImageCheck {
   /// Bit k is set if camera k delivered an image.
   std::uint8_t given = 0;
-  /// Bit k is set if that image is new and has structure.
+  /// Bit k is set if that image has structure. A repeated one counts only if the left one is, too.
   std::uint8_t structured = 0;
   /// True if a camera delivered its previous image or the left one's again, which noise makes
   /// impossible for a new image.

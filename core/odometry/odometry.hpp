@@ -62,7 +62,7 @@ struct FrameOutcome {
   /// Time since the previous frame if that is a gap, else 0.
   double gap_s = 0;
 
-  /// Bit k is set if camera k delivered a new image with structure.
+  /// See ImageCheck::structured.
   std::uint8_t structured = 0;
   /// True if every camera delivered a new image with structure.
   bool images_good = false;

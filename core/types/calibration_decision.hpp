@@ -21,7 +21,7 @@ enum class CalibrationCause : std::uint8_t {
   out_of_sync,
   /// A recalibration was requested.
   requested,
-  /// New frames are added to the calibration in use.
+  /// New frames refine the calibration in use.
   refinement,
   /// The calibration in use is not that of the rig.
   contradicted,

@@ -29,7 +29,7 @@ class SolutionReview {
   /// Compares the solution with the calibration `current`.
   [[nodiscard]] calibration::Assessment assess(
       const RigCalibration& current, calibration::CalibrationOrigin source) const noexcept;
-  /// Fills in the depth errors of the calibration in use after this decision.
+  /// Fills in the decision's depth errors, with the solution as the calibration in use.
   void assess_next(CalibrationDecision* decision) const noexcept;
   /// Makes a CalibrationDecision with the data of the solution; the caller sets the outcome.
   [[nodiscard]] CalibrationDecision decision(Stamp stamp) const noexcept;
