@@ -178,7 +178,8 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
   if (!jump->measured) return;
   const double limit =
       std::max({kMinJump, kJumpSigmas * jump->sigma_px, kJumpScatter * std::sqrt(mean_square_)});
-  if (measured_ >= kFirstFrames && std::abs(jump->px) > limit) {
+  if (measured_ >= kFirstFrames) jump->over_limit = std::abs(jump->px) / limit;
+  if (jump->over_limit > 1) {
     jump->suspected = true;
     pending_ = Pending{true, frame, jump->px, jump->sigma_px, 0};
     return;

@@ -18,6 +18,8 @@ struct DisparityJump {
   /// Standard deviation, from the scatter of the tracks.
   double sigma_px = 0;
   int tracks = 0;
+  /// The change over the smallest one that is suspected; 0 until the usual scatter is known.
+  double over_limit = 0;
   /// True if the change exceeds the usual scatter; the next frame decides.
   bool suspected = false;
   /// True if the change did not revert: the rig has changed.

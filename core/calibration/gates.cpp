@@ -205,12 +205,13 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
         100 * depth / measured.T_camera_left[static_cast<std::size_t>(k)].t.norm();
     const double m = current_percent(current, k, depth, o);
     const double odds = log_odds_of(difference, s, m, kOtherTurn * by_turn);
+    const double certainty = (odds - before) / certain;
     // If the rig is that of the calibration in use, the best estimate of its depth error is the
     // weighted mean of both.
     const double weight = source == CalibrationOrigin::this_drive ? 1.0 : m * m / (m * m + s * s);
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
-    a.verified = a.verified && s > 0 && odds - before > certain && off <= o.max_depth_error_percent;
-    const bool contradicted = difference > o.max_depth_error_percent && odds - before < -certain;
+    a.verified = a.verified && s > 0 && certainty > 1 && off <= o.max_depth_error_percent;
+    const bool contradicted = difference > o.max_depth_error_percent && certainty < -1;
     const double least = source == CalibrationOrigin::this_drive ? m : kShareOfCurrent * m;
     sharper = sharper && s < least;
     a.nearer = a.nearer || (s < least && difference > kChance * s);
@@ -219,6 +220,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     worst = off;
     a.contradicted = contradicted;
     a.log_odds = odds;
+    a.certainty = certainty;
     a.depth_m = depth;
     a.sigma_percent = s;
     a.difference_percent = difference;
@@ -242,26 +244,26 @@ const char* reason(Gate gate) noexcept {
     case Gate::not_solved:
       return "the adjustment did not converge";
     case Gate::needs_motion:
-      return "too little way was driven to see it";
+      return "the path driven is too short";
     case Gate::needs_near_structure:
-      return "too few near points were seen";
+      return "too few points are near enough to determine the depth";
     case Gate::cameras_swapped:
-      return "the right camera is on the left: cables or their order in the configuration are "
-             "exchanged";
+      return "the right camera is on the left: its cable or its order in the configuration is "
+             "swapped";
     case Gate::implausible_direction:
       return "the direction between the cameras is far from the configured one";
     case Gate::implausible_rotation:
       return "the rotation between the cameras is far from the configured one";
     case Gate::out_of_sync:
-      return "the cameras' images are not of the same instant";
+      return "the cameras' images are not from the same instant";
     case Gate::does_not_fit:
-      return "frames that were not used contradict it";
+      return "held-out frames do not fit it";
     case Gate::no_better:
       return "the calibration in use fits as well";
     case Gate::rig_changed:
-      return "the rig changed among the frames that it was solved from";
+      return "the rig changed during the frames of the solve";
     case Gate::depth_unknown:
-      return "the tracks do not hold the depth well enough yet";
+      return "the tracks do not determine the depth well enough yet";
   }
   return "";
 }

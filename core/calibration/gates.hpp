@@ -49,6 +49,9 @@ struct Assessment {
 
   /// Log odds that the rig is the one of the calibration in use.
   double log_odds = 0;
+  /// Log odds with the prior over those that decide: above 1 it is verified, below −1 contradicted,
+  /// if the depths are within or beyond the tolerated error as well.
+  double certainty = 0;
   /// Evidence for that, or against it if log_odds is negative.
   ChangeEvidence evidence;
 

@@ -89,8 +89,12 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
   if (std::max(shifted_[0], shifted_[1]) < 1) usual_px_ += kFollow * (now - usual_px_);
 }
 
+double PairingEvidence::lag_margin() const noexcept {
+  return std::max(shifted_[0], shifted_[1]) / kDecided;
+}
+
 int PairingEvidence::lag_frames() const noexcept {
-  if (std::max(shifted_[0], shifted_[1]) < kDecided) return 0;
+  if (lag_margin() < 1) return 0;
   return shifted_[0] > shifted_[1] ? 1 : -1;
 }
 

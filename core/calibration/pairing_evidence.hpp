@@ -36,6 +36,8 @@ class PairingEvidence {
   [[nodiscard]] double distance_px() const noexcept { return distance_px_; }
   /// Lag in frames: 1 if the camera is late, −1 if the left one is, 0 if no lag is detected.
   [[nodiscard]] int lag_frames() const noexcept;
+  /// Evidence for a lag over the evidence that decides.
+  [[nodiscard]] double lag_margin() const noexcept;
   /// True if one or two frames indicate a lag, so other conclusions from them are unreliable.
   [[nodiscard]] bool suspected() const noexcept;
   /// Call when an image was repeated: a camera may be a frame late from now on.

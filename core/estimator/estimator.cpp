@@ -78,6 +78,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   Parts& p = *parts_;
   p.events.clear();
   p.decisions.clear();
+  p.margins = {};
   PoseSample sample;
   sample.frame = frame.number;
   sample.stamp = frame.stamp;
@@ -120,7 +121,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       p.calibrator.map_rebuilt(p.odometry);
       if (out.relink_due)
         p.record(EstimatorEvent::Kind::calibration_taken_up, frame.stamp,
-                 "the scene is seen through the calibration adopted", 100 * out.points_kept);
+                 "the map uses the accepted calibration", 100 * out.points_kept);
     }
     if (out.renewed) p.calibrator.monitor().map_renewed(p.odometry.map());
     p.calibrate(frame);
@@ -182,6 +183,7 @@ bool Estimator::verified() const noexcept { return parts_->calibrator.verified()
 const calibration::TrackLog& Estimator::tracks() const noexcept {
   return parts_->calibrator.frames().log();
 }
+const DecisionMargins& Estimator::margins() const noexcept { return parts_->margins; }
 bool Estimator::calibrated() const noexcept { return parts_->calibrator.calibrated(); }
 
 }  // namespace vergence

@@ -11,6 +11,7 @@
 #include "core/odometry/options.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/calibration_decision.hpp"
+#include "core/types/decision_margins.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
@@ -160,6 +161,8 @@ class Estimator {
   /// The newest moving frames with their tracks; empty without `online`. Valid until the next
   /// process().
   [[nodiscard]] const calibration::TrackLog& tracks() const noexcept;
+  /// Margins of the decisions on the last frame; all 0 for a frame without a pose.
+  [[nodiscard]] const DecisionMargins& margins() const noexcept;
 
  private:
   struct Parts;

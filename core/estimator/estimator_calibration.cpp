@@ -109,6 +109,7 @@ void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexce
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorResult::Kind;
   const RigAssessment v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
+  margins = v.margins;
   degradations.hold(Degradation::rig, v.undecided, Reason::recalibrating, frame.number);
   if (v.lag_frames != 0) {
     record_out_of_sync(frame.stamp, v.lag_frames);

@@ -127,7 +127,9 @@ void Estimator::Parts::check_motion(const odometry::FrameOutcome& out, const Mat
     return;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
   const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
-  const bool unusual = usual.measurable(step_m, sigma_m) && usual.unusual(sigma_m);
+  const bool measurable = usual.measurable(step_m, sigma_m);
+  const bool unusual = measurable && usual.unusual(sigma_m);
+  if (measurable) margins.uncertainty = usual.margin();
   degradations.hold(Degradation::motion, unusual || correction.spoils_motion(),
                     Reason::weak_geometry, last_number);
 }

@@ -264,6 +264,7 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
     d.depth_sigma_percent = a.sigma_percent;
     d.depth_error_percent = a.difference_percent;
     d.evidence = a.evidence;
+    d.certainty = a.certainty;
     if (a.contradicted) d.cause = CalibrationCause::contradicted;
     // At the end no held-out frames are left; the solution of more frames is better.
     const calibration::TrackLog& log = frames_.log();

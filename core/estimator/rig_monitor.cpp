@@ -259,7 +259,10 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
     else
       camera(k).jumps.skip(step);
     MonitorResult v;
-    if (!map_reset_pending_) v = monitor_verdict(k, odometry, outcome, frame, found, moving);
+    if (!map_reset_pending_) {
+      v = monitor_verdict(k, odometry, outcome, frame, found, moving);
+      rig.margins.change = std::max(rig.margins.change, v.statistic / options_.threshold);
+    }
     // A lag moves matches off the epipolar lines, and changes disparities whenever the speed
     // changes. So no change of the rig is reported while cameras may be out of sync.
     const bool may_lag = pairing.suspected() || pairing.questioned();
@@ -275,6 +278,8 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
       v.onset_frame = jump.onset_frame;
       v.evidence = evidence_of(jump, pinhole(rig_, k).fx);
     }
+    rig.margins.jump = std::max(rig.margins.jump, jump.over_limit);
+    rig.margins.lag = std::max(rig.margins.lag, pairing.lag_margin());
     rig.undecided = rig.undecided || v.undecided || jump.suspected;
     if (v.kind <= rig.kind) continue;
     rig.kind = v.kind;

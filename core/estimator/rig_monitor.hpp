@@ -6,6 +6,7 @@
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/pairing_evidence.hpp"
 #include "core/odometry/odometry.hpp"
+#include "core/types/decision_margins.hpp"
 
 namespace vergence {
 
@@ -21,6 +22,8 @@ struct RigAssessment {
   bool undecided = false;
   /// True if motion shows that the images of all cameras are from the same instant.
   bool cameras_in_sync = false;
+  /// Largest of all cameras; `uncertainty` is not measured here.
+  DecisionMargins margins;
 };
 
 /// Checks in every frame that the calibration still describes the rig. Each additional camera has a

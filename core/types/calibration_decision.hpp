@@ -75,6 +75,8 @@ struct CalibrationDecision {
   /// Evidence that the rig is that of the previous calibration or, with `contradicted`, another
   /// one.
   ChangeEvidence evidence;
+  /// Log odds for the previous calibration over those that decide: Assessment::certainty.
+  double certainty = 0;
   FocalMeasurement focal{};
   ///
   double solve_ms = 0;

@@ -8,9 +8,8 @@
 // "within" is the share of positions inside the ellipsoid of 95 %. The recorded drives' truth has
 // errors of its own, which are added to the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger,
 // Lenz, Urtasun, CVPR 2012), of EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where
-// nothing is stated, an assumed 0.05°. The last line of a drive tells how uncertain its most
-// uncertain motion is, times the usual one, and the largest share of a motion that the window
-// corrected by more than the motion's sigma.
+// nothing is stated, an assumed 0.05°. The last line of a drive is the largest share of a
+// motion that the window corrected by more than the motion's sigma.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -22,7 +21,6 @@
 #include <Eigen/Cholesky>
 
 #include "app/session/drive_calibration.hpp"
-#include "core/estimator/detail/covariance_baseline.hpp"
 #include "core/estimator/detail/window_correction.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/odometry/drift_covariance.hpp"
@@ -145,15 +143,9 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
   return poses;
 }
 
-/// Statistics of a drive's evaluated motions.
-struct Extremes {
-  double most_unusual = 0;   // the most uncertain motion, times what is usual
-  double largest_share = 0;  // of a motion that the window corrected by more than its sigma
-};
-
-Extremes find_extremes(std::span<const Posed> poses) {
-  CovarianceBaseline usual;
-  Extremes most;
+/// Largest share of a motion that the window corrected by more than the motion's sigma.
+double largest_correction(std::span<const Posed> poses) {
+  double largest = 0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const Transform motion =
         poses[i - 1].sample.T_world_left.inverse() * poses[i].sample.T_world_left;
@@ -162,12 +154,9 @@ Extremes find_extremes(std::span<const Posed> poses) {
     const double sigma_m =
         std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace() - moved_m * moved_m));
     if (WindowCorrection{moved_m, motion.t.norm(), sigma_m}.significant())
-      most.largest_share = std::max(most.largest_share, moved_m / motion.t.norm());
-    if (!usual.measurable(motion.t.norm(), sigma_m)) continue;
-    (void)usual.unusual(sigma_m);
-    most.most_unusual = std::max(most.most_unusual, usual.times_usual());
+      largest = std::max(largest, moved_m / motion.t.norm());
   }
-  return most;
+  return largest;
 }
 
 void print(const std::string& name, const TruthSigma& sigma, std::span<const Posed> poses) {
@@ -183,11 +172,9 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   for (std::size_t i = 10; i < poses.size(); ++i)
     add_motion(poses[0], poses[i], sigma, full(poses[i].sample.covariance), &all);
   all.print(name, "all");
-  const Extremes most = find_extremes(poses);
   fmt::print(
-      "{:12s} most uncertain motion: {:.1f} times as the usual one; the window's largest "
-      "correction beyond a motion's sigma: {:.1f} % of the motion\n",
-      name, most.most_unusual, 100 * most.largest_share);
+      "{:12s} the window's largest correction beyond a motion's sigma: {:.1f} % of the motion\n",
+      name, 100 * largest_correction(poses));
 }
 
 }  // namespace

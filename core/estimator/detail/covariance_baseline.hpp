@@ -40,8 +40,8 @@ class CovarianceBaseline {
     return false;
   }
 
-  /// Sigma of the last motion over the baseline; 0 with too few motions to have one.
-  [[nodiscard]] double times_usual() const noexcept { return times_; }
+  /// Sigma of the last motion over the one that is unusual; 0 with too few motions to have one.
+  [[nodiscard]] double margin() const noexcept { return times_ / kTimes; }
 
  private:
   // Numbers of motions in the baseline, before it is used, and in the test for the end.

@@ -86,6 +86,8 @@ struct Estimator::Parts {
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
   CovarianceBaseline usual{};
+  // Of the last frame.
+  DecisionMargins margins{};
   DegradationLedger degradations{};
   // Standard deviation of all lengths, in percent, from the calibration in use.
   double length_sigma_percent;
