@@ -52,8 +52,6 @@ struct Machine {
   std::function<std::string(const std::string& node)> group_of;
   /// For this user; of a folder that does not exist yet, where it would be made.
   std::function<std::optional<DiskRoom>(const std::filesystem::path& folder)> room_at;
-  /// State that the kernel reports.
-  std::optional<bool> clock_synchronised;
 
   /// The machine that this process runs on.
   [[nodiscard]] static Machine here();
@@ -73,8 +71,6 @@ struct Machine {
 
   /// Capability `bit` of this process (linux/capability.h).
   [[nodiscard]] bool has_capability(unsigned bit) const;
-  /// Soft limit of this process by its name in /proc/self/limits; -1: unlimited.
-  [[nodiscard]] std::optional<std::int64_t> limit(const std::string& name) const;
   [[nodiscard]] bool in_group(const std::string& group) const;
 
  private:
