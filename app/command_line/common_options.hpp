@@ -30,6 +30,13 @@ struct CommonOptions {
                                             const std::vector<std::string>& before = {}) const;
 };
 
+/// Declares an option. The help text shows it under the heading `group`, its value as `type`.
+template <class Value>
+CLI::Option* add_option(CLI::App& command, const char* name, Value& value, const char* help,
+                        const char* type, const char* group = "Options") {
+  return command.add_option(name, value, help)->type_name(type)->group(group);
+}
+
 /// Accepts one of the values, and names them in the help and in the message for another one.
 [[nodiscard]] CLI::Validator one_of(std::vector<std::string> values);
 
