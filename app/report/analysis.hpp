@@ -50,7 +50,7 @@ struct Analysis {
   std::vector<double> ours_x, ours_y, theirs_x, theirs_y;  // m
 
   /// Numbers of frames.
-  std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0;
+  std::size_t read = 0, ok = 0, degraded = 0, lost = 0;
   /// Skipped frames; without a summary, those missing by their numbers.
   std::size_t skipped = 0;
   /// Frames that were not ok, by Session::reasons.

@@ -3,7 +3,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "app/report/analysis.hpp"
@@ -40,24 +39,5 @@ struct Assessment {
 };
 
 [[nodiscard]] Assessment assess(const Session& session, const Analysis& analysis);
-
-/// Collects what speaks against a drive, and what to do; the grade is that of the worst.
-class Findings {
- public:
-  void find(Grade grade, std::string reason);
-  void advise(std::string message) { assessment_.advice.push_back(std::move(message)); }
-  /// No pose can be relied on; the first reason stands.
-  void give_up(const std::string& reason, const std::string& advice);
-  /// The worst reasons first, equal ones as they were found. The message is still to be made.
-  [[nodiscard]] Assessment assessment() const;
-
- private:
-  struct Found {
-    Grade grade;
-    std::string reason;
-  };
-  std::vector<Found> found_;
-  Assessment assessment_;
-};
 
 }  // namespace vergence::app::report

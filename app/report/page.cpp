@@ -65,7 +65,7 @@ const char* name_of_skipped(const Session& s) {
 void frames_group(const Session& s, const Analysis& a, MetricTable* f) {
   f->group("Frames");
   f->row("read", grouped(a.read));
-  if (a.read > a.unknown) {
+  if (a.read > 0) {
     f->row("ok", grouped(a.ok));
     f->row("degraded", grouped(a.degraded));
     f->row("lost", grouped(a.lost));
@@ -355,9 +355,7 @@ std::string error_card(const Analysis& a) {
 }
 
 std::string ok_card(const Session& s, const Analysis& a) {
-  if (!a.ok_share)
-    return number_card("unknown", "Frames ok",
-                       a.read > 0 ? "poses.csv is missing" : "no frame was received");
+  if (!a.ok_share) return number_card("unknown", "Frames ok", "no frame was received");
   // Rounded down, so that 100 % means every frame.
   const double percent = std::floor(*a.ok_share * 1000) / 10;
   const std::string skipped = a.skipped > 0 ? fmt::format(", {} {}", grouped(a.skipped),

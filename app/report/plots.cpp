@@ -192,14 +192,13 @@ std::vector<Lane> make_lanes(const Session& s, const Analysis& a, const PlotBox&
   std::array<std::optional<Lane>, 6> states;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
-    if (f.status) mark(&lanes[static_cast<std::size_t>(*f.status)], box, a, i);
-    if (!f.state || f.state == State::lost)
-      continue;  // that state and that status are the same frames
-    auto& lane = states[static_cast<std::size_t>(*f.state)];
+    mark(&lanes[static_cast<std::size_t>(f.status)], box, a, i);
+    if (f.state == State::lost) continue;  // that state and that status are the same frames
+    auto& lane = states[static_cast<std::size_t>(f.state)];
     if (!lane) {
-      std::string name(to_string(*f.state));
+      std::string name(to_string(f.state));
       std::replace(name.begin(), name.end(), '_', ' ');
-      lane = empty(name, kStateCss[static_cast<std::size_t>(*f.state)]);
+      lane = empty(name, kStateCss[static_cast<std::size_t>(f.state)]);
     }
     mark(&*lane, box, a, i);
   }
@@ -225,7 +224,7 @@ void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
 }  // namespace
 
 std::string bands_plot(const Session& session, const Analysis& analysis) {
-  if (analysis.read == analysis.unknown) return {};
+  if (analysis.read == 0) return {};
   PlotBox box = time_box(analysis);
   box.left = kBandLeft;
   box.top = 2;

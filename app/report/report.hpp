@@ -4,19 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "app/report/assessment.hpp"
+
 namespace vergence::app {
 
 /// Result of writing a report.
 struct ReportOutcome {
-  std::filesystem::path page;  // SESSION/report.html
-  std::string headline;        // "Good", "Usable with care", "Do not use", and why, in one message
-  bool usable = true;          // false: no pose can be relied on
-  std::string main_reason{};   // then: why, with counts, and what to do
-  std::string grade{};         // the headline's beginning
-  std::vector<std::string> reasons{};  // half messages, the worst first
-  std::vector<std::string> advice{};   // what to do next, whole messages
+  std::filesystem::path page{};  // SESSION/report.html
+  report::Assessment assessment{};
   std::vector<std::string> missing{};  // messages: files or lines that were not there, not whole
-                                       // or not read
 };
 
 /// The end of a drive for a terminal, three lines: usable or not and why, what to do, where the

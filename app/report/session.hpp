@@ -20,13 +20,12 @@ namespace vergence::app::report {
 inline constexpr double kNone =
     std::numeric_limits<double>::quiet_NaN();  // a number that is not there
 
-/// A line of poses.csv, or of trajectory.tum where poses.csv is lost (then state and status are not
-/// known).
+/// A line of poses.csv.
 struct Frame {
   Stamp stamp{};
   std::int64_t number = -1;
-  std::optional<State> state{};
-  std::optional<PoseStatus> status{};
+  State state{};
+  PoseStatus status{};
   /// Index into Session::reasons.
   std::uint16_t reason = 0;
   bool posed = false;
