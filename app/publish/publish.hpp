@@ -27,7 +27,7 @@ class Publishing {
 
   SessionRequests requests_;
   std::unique_ptr<LinePublisher> lines_;  // outlives the page, which shows its latency
-  std::unique_ptr<LivePage> page_;
+  std::unique_ptr<SessionObserver> page_;
   std::string link_{};  // to the page, for a person to open
 };
 
