@@ -99,7 +99,7 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  [[nodiscard]] virtual const SourceFacts& facts() const noexcept = 0;
+  [[nodiscard]] const SourceFacts& facts() const noexcept { return facts_; }
 
   /// Before start(): `observer` receives the trigger board's pulses, if there is one, and outlives
   /// the source.
@@ -121,19 +121,19 @@ class FrameSource {
   /// still delivers.
   virtual void halt() noexcept {}
   /// Ends what start() began, after halt().
-  virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
+  virtual void finish(Progress* progress) = 0;
 
   /// Adds to the summary: frames skipped, devices, times, truth.
   virtual void describe(const SessionTotals& totals, const Estimator& estimator,
                         SummaryInput* input) const = 0;
-  /// Prints the statistics shown at the end.
-  virtual void print_metrics(const SessionTotals& totals, const SummaryInput& input,
-                             Progress* progress) const = 0;
   /// Exit code for a problem of the source itself, whose message it has printed; called if there
   /// are poses.
   [[nodiscard]] virtual std::optional<ExitCode> verdict(Progress* /*progress*/) const {
     return std::nullopt;
   }
+
+ protected:
+  SourceFacts facts_{};  // set by the constructor
 };
 
 }  // namespace vergence::app

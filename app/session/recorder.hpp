@@ -91,14 +91,12 @@ class Recorder final : public SessionObserver {
   void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
   using ErrorMessage = std::array<char, 512>;  // ends with 0, cut at the array's end
-  template <class... Arguments>
-  void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
 
   struct Files;
   Options options_;
   std::unique_ptr<Files> files_;
-  TotalsBuilder totals_;
+  SessionTotals totals_;
   std::string line_;  // being formatted
   std::size_t memory_ = 0;
   Stamp newest_;  // of the poses
