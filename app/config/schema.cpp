@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-
 namespace vergence::app {
 
 namespace groups {
@@ -743,7 +742,7 @@ const std::vector<Group>& schema() {
       groups::sync(),     groups::odometry(),   groups::calibration_options(),
       groups::monitor(),  groups::comparison(), groups::kitti_raw(),
       groups::mock(),     groups::record(),     groups::publish(),
-      groups::realtime(),   groups::faults()};
+      groups::realtime(), groups::faults()};
   return all;
 }
 

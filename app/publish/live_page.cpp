@@ -87,6 +87,11 @@ struct LivePoint {
   bool both = false;
 };
 
+/// A report before its comparison with the INS.
+struct Posed {
+  FrameReport report{};
+};
+
 /// `publish.http`: the live page (docs/live_interface.md).
 ///
 /// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
@@ -164,9 +169,6 @@ class LivePage final : public SessionObserver {
  private:
   using Clock = std::chrono::steady_clock;
 
-  struct Posed {
-    FrameReport report{};  // before its comparison with the INS
-  };
   using Item =
       std::variant<Posed, FrameReport, EventRecord, CalibrationRecord, PublishedEnuAlignment>;
 

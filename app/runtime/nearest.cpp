@@ -1,6 +1,5 @@
 #include "app/runtime/nearest.hpp"
 
-
 namespace vergence::app {
 
 namespace {

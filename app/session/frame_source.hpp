@@ -90,8 +90,8 @@ struct SourceFacts {
   bool on_request = false;
 };
 
-/// Source of a session's frames, readings and device events: devices (LiveSource) or a recorded
-/// drive (RecordedSource). run_session() treats both alike.
+/// Source of a session's frames, readings and device events: devices (run_drive()) or a recorded
+/// drive (run_replay()). run_session() treats both alike.
 ///
 /// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's; finish()
 ///          and what comes after it when the estimator's has joined.

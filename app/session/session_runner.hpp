@@ -23,10 +23,10 @@ struct SessionOptions {
 /// Runs a source through estimator and comparison into a session folder: set-up,
 /// watching, events, comparison, summary, report and verdict, the same for devices and recordings.
 ///
-///     LiveSource source(request);
+///     const auto source = make_recorded_source(request, …);
 ///     SessionOptions options;
 ///     options.out = "sessions/monday";
-///     const ExitCode code = run_session(source, request.configuration, options, signals);
+///     const ExitCode code = run_session(*source, request.configuration, options, signals);
 ///
 /// Threads  The source's own, the estimator (sealed, with the comparison and the observers), its
 ///          worker, the calibration solver (sealed, too), the recorder; the caller's thread draws
