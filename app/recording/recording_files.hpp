@@ -103,6 +103,7 @@ class RecordingFiles {
   McapFile file_;
 
   // Used by the writer's thread only.
+
   // Number of the current file.
   int number_ = 0;
   // True if file names are numbered.
