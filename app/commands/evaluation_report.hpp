@@ -14,8 +14,8 @@
 
 namespace vergence::app {
 
-/// The figures of an evaluation for a machine. Keys carry their unit; a figure that does not exist
-/// is null. With a status other than ok: the counts alone.
+/// Results of an evaluation as JSON. Keys carry their unit; missing values are null. If the status
+/// is not ok, only the counts.
 [[nodiscard]] nlohmann::ordered_json evaluation_json(const TrajectoryEvaluation& evaluation,
                                                      const EvaluationOptions& options);
 
@@ -23,60 +23,65 @@ namespace vergence::app {
 [[nodiscard]] std::string evaluation_text(const TrajectoryEvaluation& evaluation,
                                           const EvaluationOptions& options);
 
-/// Why there are no figures, as a whole message. `interval`: the usual one between the reference's
-/// poses. Precondition: the status is not ok.
+/// Message about why there are no results. `interval` is the usual one of the reference's poses.
+/// Precondition: the status is not ok.
 [[nodiscard]] std::string evaluation_problem(const TrajectoryEvaluation& evaluation,
                                              const EvaluationOptions& options, Duration interval);
-/// That most poses lie in holes of the reference, and what bridges them; empty: they do not.
+/// Remark that most poses are in gaps of the reference, and how to bridge them; empty if not.
 [[nodiscard]] std::string gap_remark(const TrajectoryEvaluation& evaluation,
                                      const EvaluationOptions& options, Duration interval);
 
 /// INS extrinsics used if none are estimated.
 struct InsMount {
   Transform T_ins_left{};
-  std::string source{};    // where it is from
-  bool axes_only = false;  // unknown extrinsics: a camera along the INS's x axis, at its origin
+  /// Origin of the values.
+  std::string source{};
+  /// True if the extrinsics are unknown: a camera along the INS's x axis, at its origin.
+  bool axes_only = false;
 };
 
-/// The mount that the sessions around these files or folders compared with, of the first that has
-/// one in its summary.json; else the axes alone.
+/// INS extrinsics used by the sessions of these files or directories, the first in a summary.json;
+/// else the axes only.
 [[nodiscard]] InsMount load_ins_mount(const std::filesystem::path& estimate,
                                       const std::filesystem::path& readings);
 
-/// For a machine, as summary.json has it.
+/// INS extrinsics as JSON, in the format of summary.json.
 [[nodiscard]] nlohmann::ordered_json ins_mount_json(const InsMount& mount);
-/// For a person, a line with its end.
+/// INS extrinsics as a line of text.
 [[nodiscard]] std::string ins_mount_text(const InsMount& mount);
 
-/// The mount between two trajectories' bodies; the drawing it is told against is the nearest of:
-/// the same axes, forward-left-up against a camera's, and the reverse. Not ok: a status only.
+/// Estimated extrinsics between the bodies of two trajectories, relative to the nearest nominal
+/// axes: equal, forward-left-up against a camera's, or the reverse. If not ok, only the status is
+/// valid.
 struct FoundMount {
   MountStatus status = MountStatus::too_few;
   Mount mount{};
   Mat3 nominal = Mat3::Identity();
-  bool of_ins = false;  // the reference is an INS and the estimate a camera: what is found is what
-                        // the configuration calls the mount
+  /// True if the reference is an INS and the estimate a camera, so that the result is the
+  /// configuration's INS extrinsics.
+  bool of_ins = false;
 };
 [[nodiscard]] FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference);
 
-/// The readings of an INS in the east-north-up axes at the first place among them: those with an
-/// attitude and a place that satellites gave, velocities where told.
+/// INS samples with attitude and GNSS position, in east-north-up axes at the first position, with
+/// velocities if present.
 [[nodiscard]] std::vector<MountReference> ins_moments(std::span<const InsRecord> readings);
-/// The mount of the left camera in an INS's body, told against a camera that looks along the INS's
-/// x with its x to the right.
+/// Extrinsics of the left camera in an INS's body, relative to a camera that looks along the INS's
+/// x axis.
 [[nodiscard]] FoundMount find_ins_mount(const Trajectory& estimate,
                                         std::span<const MountReference> moments);
-/// The poses of the moments.
+/// Poses of the moments.
 [[nodiscard]] Trajectory poses_of(std::span<const MountReference> moments);
 
-/// The reference brought to the estimate's body. Stamps stay: a clock offset is told, not applied.
+/// Reference transformed to the estimate's body. Stamps are unchanged: a clock offset is reported,
+/// not applied.
 [[nodiscard]] Trajectory brought_over(const Trajectory& reference, const Transform& T_ref_est);
 
-/// For a machine; what is not observable is null, with its sigma beside it.
+/// Extrinsics as JSON; unobservable values are null, next to their sigma.
 [[nodiscard]] nlohmann::ordered_json mount_json(const FoundMount& found);
-/// Why there is none, a few words. Precondition: the status is not ok.
+/// Short reason for a missing estimate. Precondition: the status is not ok.
 [[nodiscard]] const char* mount_problem(MountStatus status);
-/// For a person, lines with their ends. Precondition: the status is ok.
+/// Extrinsics as lines of text. Precondition: the status is ok.
 [[nodiscard]] std::string mount_text(const FoundMount& found);
 
 }  // namespace vergence::app

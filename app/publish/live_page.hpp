@@ -25,28 +25,27 @@
 
 namespace vergence::app {
 
-/// A point that the left camera followed, raw pixels, and where the right one saw it.
+/// Point tracked in the left camera, in raw pixels, and its match in the right one.
 struct LivePoint {
   std::array<float, 2> left{}, right{};
   bool both = false;
 };
 
-/// A grey JPEG of the image, at most kThumbnailWidth pixels wide; empty for an empty image.
+/// Grey JPEG of the image, at most kThumbnailWidth pixels wide; empty for an empty image.
 [[nodiscard]] std::string thumbnail(const ImageView& image);
 inline constexpr int kThumbnailWidth = 480;
 
-/// RFC 4648.
+/// Encoding of RFC 4648.
 [[nodiscard]] std::string base64(std::string_view bytes);
 
-/// `publish.http`: the live page (docs/live_interface.md).
+/// Live page (docs/live_interface.md).
 ///
-/// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
-///          picture, copies two images; no lock, no system call. Everything else: a thread
-///          of its own, made by the constructor, that yields to the estimator's where a core is
-///          short.
-/// Memory   Rings fixed; the images' memory with the first viewer. Ring full: frames are left out,
-///          totals stay true.
-/// Errors   The constructor throws InputError (HttpServer), std::system_error.
+/// Threads  on_…() run on the estimator's thread: they fill rings and, if a viewer waits for an
+///          image, copy two images, without lock or system call. The constructor starts a
+///          low-priority thread for everything else.
+/// Memory   Fixed rings; image memory with the first viewer. If a ring is full, frames are dropped;
+///          totals stay correct.
+/// Errors   The constructor throws InputError (HttpServer) and std::system_error.
 class LivePage final : public SessionObserver {
  public:
   struct Options {
@@ -54,7 +53,8 @@ class LivePage final : public SessionObserver {
     HttpPolicy policy{};
   };
 
-  /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
+  /// `requests` must outlive it. `line_age_ms` returns the 99th percentile of the pose lines' age;
+  /// negative if there are none.
   LivePage(const Options& options, SessionRequests* requests, std::function<double()> line_age_ms);
   ~LivePage() override;
   LivePage(const LivePage&) = delete;
@@ -86,34 +86,39 @@ class LivePage final : public SessionObserver {
   SessionRequests* requests_;
   std::function<double()> line_age_ms_;
 
-  // From the estimator's thread to the page's.
+  // Passed from the estimator's thread to the page's.
   Ring<FrameReport, 64> poses_;
   Ring<FrameReport, 256> reports_;
   Ring<EventRecord, 64> events_;
   Ring<CalibrationRecord, 8> calibrations_;
   Ring<PublishedEnuAlignment, 8> alignments_;
-  /// For summary.json.
+  /// Counters for summary.json.
   struct Counts {
     std::atomic<std::uint64_t> updates{0}, dropped{0};
   } counts_;
   FrameImages images_;
-  FixedVector<LivePoint, 600> points_;  // of images_: as many as a page can show
+  // Points of images_, as many as a page can show.
+  FixedVector<LivePoint, 600> points_;
   std::atomic<bool> started_{false}, ended_{false}, stop_{false};
-  SessionStart start_{};  // published by started_
+  // Published by started_.
+  SessionStart start_{};
 
-  // Used by the page's thread only.
+  // Used only by the page's thread.
   LiveState state_;
   bool begun_ = false;
-  const std::string epoch_;  // tells a viewer that the program was started again
+  // Tells a viewer that the program was restarted.
+  const std::string epoch_;
   nlohmann::json newest_images_{};
-  std::string newest_image_{};            // number of their frame
-  Clock::time_point asked_{}, wanted_{};  // for the state, for images
+  // Frame number of these images.
+  std::string newest_image_{};
+  // Times of the last requests for the state and for images.
+  Clock::time_point asked_{}, wanted_{};
   HttpServer server_;
   std::thread thread_;
 };
 
-/// The live page: HTML, style sheet and script in one, from app/publish/page/. Lives as long as
-/// the program.
+/// HTML, style sheet and script of the live page in one text, from app/publish/page/. Valid as long
+/// as the program.
 [[nodiscard]] std::string_view page_html();
 
 }  // namespace vergence::app

@@ -10,20 +10,18 @@
 
 namespace vergence::app {
 
-/// The threads of a drive as they come: gives them the scheduling that `realtime:` asks for, and
-/// collects their names, so that one that made no allocation is reported with its 0.
-///
-/// Threads  The caller's of a session.
-/// Errors   What the system refuses is said on *progress; the drive goes on.
+/// Applies the configured scheduling (`realtime`) to the threads of a run as they start, and
+/// collects their names, so that threads without allocations are reported with 0. Used by the
+/// session's caller. A refusal by the system is printed on *progress; the run continues.
 class DriveThreads {
  public:
   explicit DriveThreads(const RealtimeSettings& settings);
 
-  /// Locks memory, if asked for: everything is set up, and no frame has come.
+  /// Locks memory if configured. Call when everything is set up, before the first frame.
   void lock_memory(Progress* progress);
-  /// Called every 50 ms while frames come.
+  /// Call every 50 ms during the run.
   void poll(Progress* progress);
-  /// ThreadAllocations' counts, beside the names that poll() has seen.
+  /// Counts of ThreadAllocations, with the names that poll() has seen.
   [[nodiscard]] ThreadAllocationCounts allocations() const;
 
  private:
@@ -34,8 +32,7 @@ class DriveThreads {
   std::set<std::string> ours_{};
 };
 
-/// `runtime heap allocations: vergence-sync 3`, with the threads that are not 0; empty:
-/// there are none.
+/// Message such as `runtime heap allocations: vergence-sync 3`; empty if there are none.
 [[nodiscard]] std::string allocations_message(const ThreadAllocationCounts& allocations);
 
 }  // namespace vergence::app

@@ -22,34 +22,34 @@
 
 namespace vergence::app {
 
-/// Bytes taken by one holder, an arena's with what it holds by name.
+/// Memory of one component; of an arena also its named parts.
 struct MemoryRow {
   std::string name{};
   std::size_t bytes = 0;
   std::span<const ArenaRow> parts{};
 };
 
-/// The table of --print-memory on stdout, before the drive.
+/// Prints the table of --print-memory on stdout, before the run.
 void print_memory_table(const std::vector<MemoryRow>& memory);
 
-/// Loop of the estimator's thread: takes input from the source, estimates its pose, compares it
-/// with the INS, and hands everything on to the session's output.
+/// Loop of the estimator's thread: takes input from the source, estimates the pose, compares it
+/// with the INS, and passes everything to the session's output.
 ///
-/// Threads  run(): the estimator's, sealed. ask_calibration(), drained(), items(), waiting(): any.
-///          Everything else: the owner's, before run() or after its thread has joined, but for
-///          event_log()'s show().
-/// Memory   Arenas, at construction.
+/// Threads  run() is on the estimator's thread, which is sealed. ask_calibration(), drained(),
+///          items() and waiting() are thread-safe. The owner makes the other calls, except
+///          event_log()'s show(), before run() or after joining the thread.
+/// Memory   Arenas, allocated at construction.
 class EstimationLoop {
  public:
   /// The arguments must outlive this object.
   EstimationLoop(FrameSource& source, const Configuration& configuration,
                  const SessionOptions& options);
 
-  /// Before run(). `recording`: what viewers may stop; null: nothing is recorded. `calibrations`:
-  /// whose outcomes become events.
+  /// Call before run(). `recording` can be stopped by viewers; null without recording. Outcomes of
+  /// `calibrations` become events.
   void open(const SessionOutput& output, DriveRecorder* recording,
             CalibrationWriter* calibrations) noexcept;
-  /// Logs the outcomes of saving calibrations. The estimator's thread, or after it was joined.
+  /// Logs the outcomes of saving calibrations, on the estimator's thread or after joining it.
   void log_kept_calibrations() noexcept;
   /// Runs until the source is exhausted.
   void run() noexcept;
@@ -80,7 +80,8 @@ class EstimationLoop {
   [[nodiscard]] const Arena& comparison_arena() const noexcept { return comparison_arena_; }
 
  private:
-  struct Beat {  // for the check that the loop does not hang
+  // Progress for the check that the loop does not hang.
+  struct Beat {
     std::atomic<std::uint64_t> items{0};
     std::atomic<bool> waiting{false};
   };
@@ -94,7 +95,8 @@ class EstimationLoop {
 
   FrameSource& source_;
   const SourceFacts& facts_;
-  SessionRequests* const requests_;  // null: no requests are possible
+  // Null if no requests are possible.
+  SessionRequests* const requests_;
   const ReferenceTrack reference_;
   const CameraMasks masks_;
   const EstimatorOptions options_;
@@ -113,7 +115,8 @@ class EstimationLoop {
   std::optional<Vec3> newest_position_{};
   std::atomic<bool> calibration_asked_{false}, drained_{false};
   Beat beat_;
-  bool delivering_ = false;  // a frame has come
+  // True once a frame has come.
+  bool delivering_ = false;
 };
 
 }  // namespace vergence::app

@@ -21,18 +21,20 @@ namespace vergence::app {
 struct RunRequest {
   SessionOptions session{};
   Configuration configuration;
-  CalibrationSource calibration{};   // --from-scratch, --calibration
-  std::vector<std::string> faults;   // of the command line, beside the configuration's
-  std::optional<double> duration_s;  // all of the drive when not set
-  bool fast = false;                 // virtual time: nothing is dropped for time
+  /// Value of --from-scratch and --calibration.
+  CalibrationSource calibration{};
+  /// Faults of the command line, in addition to the configuration's.
+  std::vector<std::string> faults;
+  /// Empty runs to the end.
+  std::optional<double> duration_s;
+  /// Virtual time, in which nothing is dropped.
+  bool fast = false;
 };
 
-/// The devices of a configuration as the source of a session: cameras, INS and board, real or a
-/// mock's.
+/// Source with the devices of a configuration: cameras, INS and trigger board, real or simulated.
 ///
-/// Ownership  Holds the devices. `request` outlives it.
-/// Errors     The constructor throws InputError: configuration; DeviceError: devices that are not
-///            there.
+/// Owns the devices. `request` must outlive it. The constructor throws InputError (configuration)
+/// and DeviceError (missing devices).
 class LiveSource final : public FrameSource {
  public:
   explicit LiveSource(const RunRequest& request);
@@ -54,10 +56,11 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override;
 
  private:
-  [[nodiscard]] std::chrono::steady_clock::time_point end() const;  // with a duration
+  // End of a run with a duration.
+  [[nodiscard]] std::chrono::steady_clock::time_point end() const;
   void make_facts();
   void make_acquisition();
-  /// An event that goes before the frame in hand. False: none is left.
+  /// Returns an event that precedes the frame in hand; false if none is left.
   [[nodiscard]] bool next_event(SourceItem* item) noexcept;
   void write_truth(std::vector<std::string>* faults) const;
   [[nodiscard]] TruthMetrics truth_metrics(const SessionTotals& totals,
@@ -68,25 +71,29 @@ class LiveSource final : public FrameSource {
   const Configuration& configuration_;
   DriveDevices devices_;
   SourceFacts facts_;
-  std::unique_ptr<ExposureControl> exposure_;  // null: exposures are fixed
-  PulseObserver* pulse_observer_ = nullptr;    // null: pulses are not recorded
+  // Null if exposures are fixed.
+  std::unique_ptr<ExposureControl> exposure_;
+  // Null if pulses are not recorded.
+  PulseObserver* pulse_observer_ = nullptr;
   std::unique_ptr<Acquisition> acquisition_;
-  Stamp start_{};  // of the drive
+  // Start of the run.
+  Stamp start_{};
   std::chrono::steady_clock::time_point begun_{};
   std::vector<StampedPose> truth_;
 
-  // Used by the estimator's thread; read by others after it has joined.
+  // Used by the estimator's thread; read by others after joining it.
   TimingMonitor time_;
   std::vector<bool> fault_logged_;
-  Acquired in_hand_{};    // given, or held back behind its events
-  bool waiting_ = false;  // in_hand_ is a frame that was not given yet
+  // Item returned, or held back behind its events.
+  Acquired in_hand_{};
+  // True if in_hand_ is a frame that was not returned yet.
+  bool waiting_ = false;
 };
 
-/// Drives: the cameras, INS and board of the configuration into a session folder (run_session()).
-///
-/// Errors   InputError, DeviceError before the session folder is made, for all that can be known by
-///          then. Afterwards messages on stderr.
-/// → as run_session(); device_failed: a camera was gone at the end
+/// Runs the cameras, INS and trigger board of the configuration into a session directory
+/// (run_session()). Throws InputError or DeviceError before the directory is made, as far as
+/// possible; later errors are messages on stderr. Returns as run_session(), or device_failed if a
+/// camera was disconnected at the end.
 [[nodiscard]] ExitCode run_drive(const RunRequest& request);
 
 }  // namespace vergence::app

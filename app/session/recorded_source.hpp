@@ -16,29 +16,29 @@
 
 namespace vergence::app {
 
-/// The INS of a drive that is replayed, and how it is compared.
+/// INS of a replayed sequence and the options of its comparison.
 struct ReplayedIns {
-  std::vector<InsRecord> readings{};  // around the frames that are replayed; empty: there is no INS
+  /// Samples around the replayed frames; empty without an INS.
+  std::vector<InsRecord> readings{};
   ComparisonOptions options{};
   std::string mount_source{};
-  std::vector<std::string> remarks{};  // messages
+  std::vector<std::string> remarks{};
 };
 
-/// Reads the frames [request.start, …) of the sequence. A mount that the configuration says
-/// (`ins.lever_arm_m`, `ins.boresight_deg`) stands before the data set's own;
-/// `comparison.max_gap_ms` and `max_wait_ms` are no less than one and a half of the recording's
-/// usual interval. InputError: as read_recorded_ins() and comparison_options() say.
+/// Reads the samples for the frames [request.start, …) of the sequence. Configured extrinsics
+/// (`ins.lever_arm_m`, `ins.boresight_deg`) take precedence over the data set's.
+/// `comparison.max_gap_ms` and `max_wait_ms` are at least 1.5 of the recording's usual interval.
+/// Throws InputError as read_recorded_ins() and comparison_options() do.
 [[nodiscard]] ReplayedIns replayed_ins(const ReplayRequest& request,
                                        const StereoSequence& sequence);
 
-/// A recorded drive as the source of a session. Nothing is dropped; an INS that was recorded comes
-/// in the order of its stamps, before the frames that are not older.
-///
-/// Ownership  Holds the sequence and the pool that its images are decoded into. `request` outlives
-///            it.
+/// Recorded sequence as the source of a session. Nothing is dropped; INS samples come in order of
+/// their stamps, before frames that are not older. Owns the sequence and the pool for its decoded
+/// images. `request` must outlive it.
 class RecordedSource final : public FrameSource {
  public:
-  /// `truth`: of the data set, may be empty. Precondition: request.start is a frame of it.
+  /// `truth` is that of the data set and may be empty. Precondition: request.start is a frame of
+  /// the sequence.
   RecordedSource(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin,
                  Trajectory truth, ReplayedIns ins);
 
@@ -57,18 +57,24 @@ class RecordedSource final : public FrameSource {
   const ReplayRequest& request_;
   const StereoSequence sequence_;
   const ReplayedIns ins_;
-  const std::size_t count_;  // frames of this replay
+  // Number of frames of this replay.
+  const std::size_t count_;
   Arena frames_arena_;
   FramePool pool_;
   SourceFacts facts_;
   std::unique_ptr<FrameDecoder> decoder_;
 
-  // Used by the estimator's thread; read by others after it has joined.
-  DecodedPair pair_{};    // given, or held back behind its readings
-  bool waiting_ = false;  // pair_ was not given yet
-  bool ended_ = false;    // there are no more pairs
+  // Used by the estimator's thread; read by others after joining it.
+
+  // Pair returned, or held back behind its samples.
+  DecodedPair pair_{};
+  // True if pair_ was not returned yet.
+  bool waiting_ = false;
+  // True if there are no more pairs.
+  bool ended_ = false;
   std::size_t next_reading_ = 0;
-  std::uint64_t unread_ = 0;  // of skipped_, those that the decoder came to
+  // Those of skipped_ that the decoder reached.
+  std::uint64_t unread_ = 0;
   std::uint64_t skipped_ = 0;
 };
 

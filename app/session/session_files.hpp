@@ -14,33 +14,33 @@
 /// Shared steps of commands that write a session directory.
 namespace vergence::app {
 
-/// Size of an arena for so many bytes of contents, with the alignment of the first piece.
+/// Arena size for this number of bytes, with alignment of the first part.
 [[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
 
-/// One worker beside the estimator with two threads or more.
+/// Runner with a worker thread next to the estimator if `threads` is at least two.
 [[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
 
-/// The calibration's part of the summary.
+/// Fills in the calibration part of the summary.
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
                           const SessionTotals& totals, const EstimatorOptions& options,
                           SummaryInput* input);
 
-/// Returns the message about an unverified calibration; empty if it is verified or there is
-/// none.
+/// Message about an unverified calibration; empty if it is verified or there is none.
 [[nodiscard]] std::string verification_message(const SummaryInput& input);
 
-/// summary.json of the session; what goes wrong becomes a message of *faults.
+/// Writes summary.json of the session; problems become a message in *faults.
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
                            const SummaryInput& input, std::vector<std::string>* faults);
 
 /// Result of writing report.html.
 struct SessionReport {
   ReportOutcome outcome{};
-  std::string failure{};  // why there is none; empty: it is there
+  /// Reason for a missing report; empty if it was written.
+  std::string failure{};
 };
 [[nodiscard]] SessionReport write_session_report(const std::filesystem::path& session);
 
-/// Prints closing_lines(); with `quiet` only those that must not be missed.
+/// Prints closing_lines(); with `quiet` only the essential ones.
 void print_verdict(const SessionReport& report, bool quiet, Progress* progress);
 
 }  // namespace vergence::app

@@ -14,17 +14,16 @@
 
 namespace vergence::app {
 
-/// A recorded session as the source of another: the estimator is given what it was given then, in
-/// the same order, images that were missing included, and its solver answers at the same frames. So
-/// the poses are those of the drive, bit for bit, unless something else is asked for.
+/// Recorded session as the source of another one. The estimator gets the same input in the same
+/// order, including missing images, and its solver finishes at the same frames. So the poses are
+/// bit for bit those of the recorded run, unless other settings are requested.
 ///
-/// Ownership  Holds the recording. `request` outlives it.
-/// Errors     The constructor throws InputError: a damaged description, images of another size than
-///            the calibration's.
+/// Owns the recording. `request` must outlive it. The constructor throws InputError for a damaged
+/// description, or images of another size than the calibration's.
 class SessionSource final : public FrameSource {
  public:
-  /// `other`: begins with this instead of what the drive began with, adopting after a fixed number
-  /// of frames. Precondition: request.start is a frame of it.
+  /// `other` replaces the recorded initial calibration; calibrations are then adopted after a fixed
+  /// number of frames. Precondition: request.start is a frame of the session.
   SessionSource(const ReplayRequest& request, RecordedSession session,
                 std::optional<StartingCalibration> other);
 
@@ -43,22 +42,27 @@ class SessionSource final : public FrameSource {
   [[nodiscard]] SourceFrame load(const RecordedFrame& frame) noexcept;
 
   const ReplayRequest& request_;
-  RecordedSession session_;  // without frames after finish()
-  const bool other_;         // another beginning than the drive's
-  const std::size_t end_;    // behind the last frame of this replay
+  // Without frames after finish().
+  RecordedSession session_;
+  // True for another initial calibration.
+  const bool other_;
+  // Index after the last frame of this replay.
+  const std::size_t end_;
   SourceFacts facts_;
-  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;  // of the frame in hand
+  // Images of the frame in hand.
+  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;
   std::atomic<bool> stopped_{false};
 
-  // Used by the estimator's thread; read by others after it has joined.
+  // Used by the estimator's thread; read by others after joining it.
   std::size_t next_frame_ = 0, next_reading_ = 0;
-  bool recalibration_reported_ = false;  // of the next frame
+  // True if reported for the next frame.
+  bool recalibration_reported_ = false;
   std::uint64_t images_missing_ = 0;
-  ThreadRunner reader_{BackgroundThread::Role::reader};  // decoding takes heap
+  // Decodes on its own thread, because decoding allocates.
+  ThreadRunner reader_{BackgroundThread::Role::reader};
 };
 
-/// Returns the initial calibration of a recorded session. InputError: the recording's description
-/// is damaged.
+/// Initial calibration of a recorded session. Throws InputError for a damaged description.
 [[nodiscard]] StartingCalibration recorded_beginning(const SessionDescription& description,
                                                      const std::string& name);
 

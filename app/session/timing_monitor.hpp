@@ -9,15 +9,14 @@
 
 namespace vergence::app {
 
-/// Timing of a session: clocks, pairing, latencies, its stamps against the INS's UTC. Events
-/// as messages, figures for summary.json.
-///
-/// Threads  note…(): the estimator's, sealed. json(): any, after that has joined. Memory: fixed;
-///          messages are in place.
+/// Timing of a session: clocks, pairing, latencies, and stamps against the INS's UTC. Reports
+/// events as messages, and statistics for summary.json. record_…() and of_…() run on the
+/// estimator's thread, which is sealed; json() after joining it. Fixed memory.
 class TimingMonitor {
  public:
   struct Message {
-    const char* kind = nullptr;  // null: nothing to tell
+    /// Null if there is nothing to report.
+    const char* kind = nullptr;
     std::array<char, 200> text{};
     bool to_user = false;
   };
@@ -26,14 +25,14 @@ class TimingMonitor {
 
   /// Message of a device event.
   [[nodiscard]] Message of_device(const DeviceEvent& event) const noexcept;
-  /// A set that was handed out: tells when a run of ambiguous ones begins.
+  /// Handles an output set; reports the start of a run of ambiguous ones.
   [[nodiscard]] Message of_set(const SyncedSet& set) noexcept;
-  /// A reading: tells when what the receiver and the filter say has changed, and of the
-  /// session's stamps against UTC.
+  /// Handles an INS sample; reports changed status of receiver or filter, and the session's stamps
+  /// against UTC.
   [[nodiscard]] Message of_reading(const InsRecord& reading) noexcept;
 
-  /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,
-  /// meaningless in virtual time.
+  /// Records the pose of these images. `estimate_ms` is the estimation time, `now` the host time,
+  /// which is meaningless in virtual time.
   void record_pose(const AcquiredFrame& frame, float estimate_ms, HostStamp now) noexcept;
 
   /// The block `time` of summary.json.
@@ -45,12 +44,15 @@ class TimingMonitor {
 
   SyncMode mode_;
   bool virtual_;
-  bool ambiguous_ = false;  // the last set
+  // State of the last set.
+  bool ambiguous_ = false;
   TimeHistogram latency_;
-  InsQuality quality_{};  // as told last
+  // Last reported quality.
+  InsQuality quality_{};
   FixStatus fix_ = FixStatus::none;
   bool any_quality_ = false, utc_reported_ = false;
-  double reported_ahead_s_ = 0;  // of the session's stamps ahead of the INS's UTC
+  // Time by which the session's stamps are ahead of the INS's UTC.
+  double reported_ahead_s_ = 0;
 };
 
 }  // namespace vergence::app
