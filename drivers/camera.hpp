@@ -25,8 +25,10 @@ enum class CameraTrigger : std::uint8_t {
 
 /// Requested or applied configuration of a camera.
 struct CameraConfiguration {
-  int width = 0;   // px
-  int height = 0;  // px
+  /// Width of the image, in pixels.
+  int width = 0;
+  /// Height of the image, in pixels.
+  int height = 0;
   /// Exposure rate; with a hardware trigger the maximum rate of the pulses.
   double rate_hz = 0;
   Duration exposure{};
@@ -46,8 +48,8 @@ struct CameraConfiguration {
   int sharing = 1;
 };
 
-/// Validates a request for any camera: empty, or the problem, as in `a
-/// size of 0 x 480`.
+/// Validates a request for any camera. Returns an empty string, or the problem (`a size of 0 x
+/// 480`).
 [[nodiscard]] std::string find_invalid(const CameraConfiguration& requested);
 
 /// Exposure and gain while a camera streams.
@@ -59,16 +61,17 @@ struct ExposureSetting {
 
 enum class FrameStatus : std::uint8_t {
   complete,
-  /// Parts of the image never came; their pixels are undefined.
+  /// Parts of the image were not received; their pixels are undefined.
   incomplete,
 };
 
 /// One exposure, handed out by wait().
 struct Frame {
   FrameSlot slot = 0;
-  /// Exposures since start(), from 0, unwrapped; gaps are frames that never came.
+  /// Number of exposures since start(), from 0 and unwrapped; a gap is a frame that was not
+  /// received.
   std::uint64_t counter = 0;
-  /// Start of the exposure by the camera's clock.
+  /// Start of the exposure, on the camera's clock.
   DeviceStamp exposure_start{};
   /// Time when the last byte arrived.
   HostStamp arrival{};
@@ -87,13 +90,13 @@ struct CameraStatistics {
   std::uint64_t torn = 0;
   /// Exposures dropped because no slot was free.
   std::uint64_t underruns = 0;
-  /// Exposures that happened and never arrived.
+  /// Exposures that were not received.
   std::uint64_t lost = 0;
   /// Successful start() calls.
   std::uint64_t starts = 0;
 };
 
-/// One opened camera: gige, iidc, v4l2 and mock, all behind this.
+/// Interface of one opened camera of any kind (gige, iidc, v4l2, mock).
 ///
 ///     DeviceStatus status = DeviceStatus::ok;
 ///     const std::unique_ptr<CameraDevice> camera = driver.open("", &status);  // "": the first
@@ -110,20 +113,20 @@ struct CameraStatistics {
 ///     }
 ///
 /// Ownership  A slot belongs to the camera until wait() hands it out, then to the caller until
-///            release(). Slots are the transport's own buffers or those of a FramePool; either way
-///            view() shows the pixels, without a copy.
+///            release(). Slots are the transport's own buffers or those of a FramePool. In both
+///            cases view() shows the pixels without a copy.
 /// Threads    configure, start, stop: the owner's thread. wait: one consumer thread. release: one
 ///            thread, the same or another. wait and release may overlap stop(). set_exposure: one
 ///            thread, may overlap everything but configure(). statistics: any.
-/// Memory     No allocation by the caller's thread between start() and stop(). Slots are fixed at
-///            configure().
-/// Time       exposure_start by the device's clock, arrival by the host's (or by virtual time, for
-///            a mock that runs faster).
-/// Pixels     8-bit grey, row 0 on top; rows as the transport brings them, or padded to cache lines
-///            where the driver converts. The padding is not initialised.
-/// Full       With no slot free the newest exposure is dropped and counted (`underruns`); a mock in
-///            virtual time waits instead.
-/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and
+/// Memory     The caller's threads do not allocate between start() and stop(). configure() fixes
+///            the slots.
+/// Time       exposure_start is on the device's clock, arrival on the host's (or in virtual time,
+///            for a mock that runs faster than real time).
+/// Pixels     8-bit grey, row 0 on top. Rows have the transport's stride, or are padded to cache
+///            lines if the driver converts. The padding is not initialised.
+/// Full       If no slot is free, the newest exposure is dropped and counted (`underruns`); a mock
+///            in virtual time waits instead.
+/// Errors     No call throws. A call that does not return `ok` changes only the counters and
 ///            *arrival.
 class CameraDevice {
  public:
@@ -131,63 +134,63 @@ class CameraDevice {
   virtual ~CameraDevice() = default;
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
-  /// While not streaming and with every slot released, else `busy`. *actual (may be null): what the
-  /// camera will do, rounded to what it can. → ok, unsupported, bad_configuration, busy,
-  /// disconnected
+  /// Applies a configuration. Fails with `busy` while streaming or while a slot is held. *actual
+  /// (may be null) receives the values rounded to what the camera supports. → ok, unsupported,
+  /// bad_configuration, busy, disconnected
   [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& requested,
                                                CameraConfiguration* actual) noexcept = 0;
-  /// From the start of an exposure to its arrival. Precondition: configured.
+  /// Delays from the start of an exposure to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
-  /// Starts streaming, also again after `disconnected`; while streaming it does nothing. `ready`
-  /// (may be null) is notified of every frame and of a disconnect. → ok, disconnected, ended,
+  /// Starts streaming, also after `disconnected`; does nothing while streaming. `ready` (may be
+  /// null) is notified of every frame and of a disconnect. → ok, disconnected, ended,
   /// no_permission, no_bandwidth, bad_configuration (not configured)
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Oldest frame not yet handed out, waiting at most `limit` (0: look once). `ok`: frame->slot is
-  /// the caller's. `disconnected`: frame->arrival says when it was noticed. → ok, timeout, stopped,
-  /// ended, disconnected
+  /// Returns the oldest frame not yet handed out and waits at most `limit` for it (0: does not
+  /// wait). With `ok`, frame->slot belongs to the caller. With `disconnected`, frame->arrival is
+  /// the time when the disconnect was detected. → ok, timeout, stopped, ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Frame* frame) noexcept = 0;
   /// Precondition: the slot was handed out and not yet released.
   [[nodiscard]] virtual ImageView view(FrameSlot slot) const noexcept = 0;
-  /// Gives a slot back, in any order. Precondition as view().
+  /// Returns a slot to the camera, in any order. Same precondition as view().
   virtual void release(FrameSlot slot) noexcept = 0;
-  /// Wakes wait() with `stopped`; no device access and no notify() after it returns. Twice is
-  /// harmless.
+  /// Wakes wait() with `stopped`. There is no device access and no notify() after it returns. May
+  /// be called twice.
   virtual void stop() noexcept = 0;
-  /// One exposure, with CameraTrigger::software and while streaming. → ok, unsupported, stopped,
-  /// disconnected
+  /// Triggers one exposure; requires CameraTrigger::software and a running stream. → ok,
+  /// unsupported, stopped, disconnected
   [[nodiscard]] virtual DeviceStatus trigger_once() noexcept { return DeviceStatus::unsupported; }
-  /// Exposure and gain from one of the next frames on, while streaming; those frames tell it, and a
-  /// camera that comes back has it. Outside of what the camera has the nearest is taken; *actual
-  /// (may be null): what it took. Talks to the device: as long as that, never for ever; not for a
-  /// thread that has a frame to give. → ok, unsupported, bad_configuration (not positive, longer
-  /// than the interval), stopped, disconnected, failed
+  /// Changes exposure and gain while streaming, starting with one of the next frames; each frame
+  /// carries its own values. A camera that reconnects keeps the setting. Values out of range are
+  /// clamped; *actual (may be null) receives the applied ones. The call blocks while it accesses
+  /// the device, so the thread that delivers frames must not make it. → ok, unsupported,
+  /// bad_configuration (not positive, longer than the interval), stopped, disconnected, failed
   [[nodiscard]] virtual DeviceStatus set_exposure(const ExposureSetting& /*wanted*/,
                                                   ExposureSetting* /*actual*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// One message about the last call that was not `ok`: what was refused, what the camera offers,
-  /// what to do. Empty: the status says it all. Owner's thread; may allocate.
+  /// Message about the last call that was not `ok`: the refused request, what the camera offers and
+  /// the fix. Empty if the status is sufficient. Call from the owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
-  /// One message about what works, but not as well as it should (a buffer the system made
-  /// smaller): what, and what to do. Empty: nothing. Owner's thread; may allocate.
+  /// Message about a limitation that does not prevent operation (a buffer that the system made
+  /// smaller), with the fix; empty if there is none. Call from the owner's thread; may allocate.
   [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual CameraStatistics statistics() const noexcept = 0;
 };
 
-/// One kind of camera: a row in the table of drivers.
+/// Driver for one kind of camera: a row in the table of drivers.
 ///
-/// Ownership  A device may outlive its driver.
-/// Not thread-safe. Memory: ordinary; before the drive only.
+/// A device may outlive its driver. Not thread-safe. Allocates, so it is used only before a run.
 class CameraDriver {
  public:
   virtual ~CameraDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
-  /// `serial` empty: the first. Null: *status says why. → ok, not_found, no_permission, busy,
-  /// unsupported (it is no such camera), failed
+  /// Opens the camera with this serial number, or the first one if `serial` is empty. Returns null
+  /// if it fails; *status has the reason. → ok, not_found, no_permission, busy, unsupported (a
+  /// device of another kind), failed
   [[nodiscard]] virtual std::unique_ptr<CameraDevice> open(std::string_view serial,
                                                            DeviceStatus* status) = 0;
-  /// One message about the last open() that gave nothing, or enumerate() that found nothing.
-  /// Empty: the status says it all.
+  /// Message about the last open() or enumerate() that found no device; empty if the status is
+  /// sufficient.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 

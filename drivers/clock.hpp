@@ -25,7 +25,7 @@ struct HostMoment {
 };
 
 /// Reads the real-time clock between two readings of the monotonic one. The thread may be preempted
-/// in between, so the shortest of several trials counts.
+/// in between, so the shortest of several trials is used.
 template <class Day, class Host>
 [[nodiscard]] HostMoment tightest_moment(Day day, Host host) {
   constexpr int kTrials = 5;

@@ -6,20 +6,20 @@
 
 #include "core/types/time.hpp"
 
-/// Common parts of cameras, INS and trigger boards.
+/// Types shared by cameras, INS and trigger boards.
 namespace vergence {
 
-/// Nanoseconds of a device's own clock, unwrapped by its driver. Origin and rate are the device's:
-/// a ClockMapper ties it to the host.
+/// Nanoseconds of a device's own clock, unwrapped by its driver. Origin and rate are those of the
+/// device; a ClockMapper maps the stamp to the host's clock.
 using DeviceStamp = Instant<struct DeviceClock>;
 
 enum class DeviceStatus : std::uint8_t {
   ok,
-  /// No data came within the limit.
+  /// No data arrived within the limit.
   timeout,
   /// Not streaming: stop() was called, or start() never was.
   stopped,
-  /// A finite source (simulated drive) is at its end; no more data will come.
+  /// A finite source (a simulated drive) is at its end; no more data follows.
   ended,
   /// Unplugged, powered off or unresponsive; start() may reconnect.
   disconnected,
@@ -50,8 +50,7 @@ struct DeviceInfo {
   std::string place;
 };
 
-/// Timing of the path from measurement to host, for the configuration in
-/// force.
+/// Timing of the path from measurement to host, for the current configuration.
 struct DeviceTiming {
   /// Minimum delay from the stamped instant to the arrival.
   Duration min_delay{};
@@ -61,10 +60,10 @@ struct DeviceTiming {
   Duration resolution = Duration::microseconds(1);
 };
 
-/// Callback of a driver when something can be taken. One Notifier may serve several devices.
+/// Callback of a driver when new data can be taken. One Notifier may serve several devices.
 ///
-/// Threads  notify() from the driver's threads, at any time between start() and the return of
-///          stop(); it neither blocks nor calls back.
+/// notify() runs on the driver's threads, at any time between start() and the return of stop(). It
+/// must not block or call the driver.
 class Notifier {
  public:
   virtual ~Notifier() = default;

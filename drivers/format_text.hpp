@@ -5,8 +5,8 @@
 
 namespace vergence {
 
-/// printf into a string of at most 319 bytes; what is longer is cut. For messages with numbers,
-/// off the real-time path.
+/// Formats like printf into a string of at most 319 bytes; longer text is cut. For messages outside
+/// the real-time path.
 template <class... Args>
 [[nodiscard]] std::string format_text(const char* format, Args... args) {
   std::array<char, 320> text{};

@@ -27,25 +27,27 @@ struct InsQuality {
   bool sync_out = false;
 };
 
-/// One reading on the session's clock: stamp and error bound are set. Plain, goes through rings.
+/// Sample on the session's clock, with stamp and error bound set. Trivially copyable, so that it
+/// can pass through rings.
 struct InsRecord {
   InsSample sample{};
-  InsQuality quality{};  // `status` is the device's, or the data set's, own word
+  /// Its `status` is the status word of the device or of the data set.
+  InsQuality quality{};
 };
 
-/// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the host's
-/// clock is tied to Unix time elsewhere.
+/// Sample as received. `sample.stamp` and `sample.stamp_error` are not set yet, because the host's
+/// clock is mapped to Unix time elsewhere.
 struct InsReading {
   InsSample sample{};
   InsQuality quality{};
-  /// Time of the measurement by the INS's clock, unwrapped; it increases until a disconnect.
+  /// Time of the measurement on the INS's clock, unwrapped; it increases until a disconnect.
   DeviceStamp measured{};
   /// Time when the last byte arrived.
   HostStamp arrival{};
-  /// True for the first reading after a pause().
+  /// True for the first sample after a pause().
   bool resumed = false;
-  // A driver with the time of each byte on the wire maps the stamp itself; else a
-  // ClockMapper does, from `arrival`.
+  // True if the driver set `host` itself, because it has the time of each byte on the wire.
+  // Otherwise a ClockMapper derives `host` from `arrival`.
   bool mapped = false;
   /// `measured` on the host's clock.
   HostStamp host{};
@@ -62,7 +64,7 @@ struct InsStatistics {
   std::uint64_t malformed = 0;
   /// Restarts of the device and steps of its clock.
   std::uint64_t restarts = 0;
-  /// Readings dropped because the ring was full (live only).
+  /// Samples dropped because the ring was full (live only).
   std::uint64_t overruns = 0;
   std::uint64_t starts = 0;
 };
@@ -75,53 +77,55 @@ struct InsStatistics {
 ///       use(reading.sample, reading.mapped ? reading.host
 ///                                          : mapper.map(reading.measured, reading.arrival).host);
 ///
-/// Ownership  Values; nothing to give back.
-/// Threads    configure, start, stop: the owner's thread. wait: one consumer thread; it may overlap
-///            stop(). statistics: any.
-/// Memory     No allocation by the caller's thread between start() and stop().
-/// Full       A reading that finds no room is dropped and counted; a mock in virtual time waits
+/// Ownership  Samples are values; nothing has to be released.
+/// Threads    configure, start and stop belong to the owner's thread, wait to one consumer thread,
+///            which may overlap stop(). statistics may be called from any thread.
+/// Memory     The caller's threads do not allocate between start() and stop().
+/// Full       A sample that finds no room is dropped and counted; a mock in virtual time waits
 ///            instead.
-/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and
+/// Errors     No call throws. A call that does not return `ok` changes only the counters and
 ///            reading->arrival.
 class InsDevice {
  public:
-  virtual ~InsDevice() = default;  // stops
+  /// Stops the device.
+  virtual ~InsDevice() = default;
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
-  /// Readings a second. *actual_hz (may be null): what it will do. → ok, unsupported,
-  /// bad_configuration, disconnected
+  /// Sets the sample rate, in Hz. *actual_hz (may be null) receives the applied rate. → ok,
+  /// unsupported, bad_configuration, disconnected
   [[nodiscard]] virtual DeviceStatus configure(double rate_hz, double* actual_hz) noexcept = 0;
-  /// From the measurement to its arrival. Precondition: configured.
+  /// Delays from a measurement to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
-  /// As CameraDevice::start().
+  /// Same contract as CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Oldest reading not yet taken, in the order of measurement, waiting at most `limit` (0: look
-  /// once). `disconnected`: reading->arrival says when it was noticed. → ok, timeout, stopped,
-  /// ended, disconnected
+  /// Returns the oldest sample not yet taken, in order of measurement, and waits at most `limit`
+  /// for it (0: does not wait). With `disconnected`, reading->arrival is the time when the
+  /// disconnect was detected. → ok, timeout, stopped, ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;
   virtual void stop() noexcept = 0;
-  /// While it streams: makes neither readings nor pulses (SyncOut) for so long, as soon as it can;
-  /// no reading before or after is lost for it. Does not wait. Any thread. → ok, unsupported,
-  /// stopped
+  /// Suspends samples and SyncOut pulses for the duration `gap`, as soon as possible; no other
+  /// sample is lost. Does not block; any thread may call it while the device streams. → ok,
+  /// unsupported, stopped
   [[nodiscard]] virtual DeviceStatus pause(Duration /*gap*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// One message about the last call that was not `ok`: what was refused, what to do. Empty: the
-  /// status says it all. Owner's thread; may allocate.
+  /// Message about the last call that was not `ok`, with the fix; empty if the status is
+  /// sufficient. Call from the owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
-  /// One message about what works, but not as asked. Empty: nothing. As last_error().
+  /// Message about a setting that was not applied as requested; empty if there is none. Same rules
+  /// as last_error().
   [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual InsStatistics statistics() const noexcept = 0;
 };
 
-/// One kind of INS: a row in the table of drivers. As CameraDriver.
+/// Driver for one kind of INS: a row in the table of drivers. Same contract as CameraDriver.
 class InsDriver {
  public:
   virtual ~InsDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial,
                                                         DeviceStatus* status) = 0;
-  /// One message about the last open() that gave nothing. Empty: the status says it all.
+  /// Message about the last open() that failed; empty if the status is sufficient.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 

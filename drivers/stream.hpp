@@ -10,7 +10,7 @@
 
 namespace vergence {
 
-/// Stream to a device's consumer, in order of arrival.
+/// Element of the stream to a device's consumer, in order of arrival.
 template <class T>
 struct Delivery {
   enum class What : std::uint8_t { item, gone, back, end } what = What::item;
@@ -20,24 +20,25 @@ struct Delivery {
 
 /// Queue from the thread of a driver to the consumer of its device.
 ///
-/// Threads  push(), full(), empty(), wait_for_room(): producer. start(), stop(): owner. take(): one
-///          consumer; with limit 0 it takes no lock.
-/// Full     push() refuses; the driver drops and counts, or, in virtual time, waits for room.
+/// Threads  The producer calls push(), full(), empty() and wait_for_room(); the owner start() and
+///          stop(); one consumer take(), which takes no lock if the limit is 0.
+/// Full     push() returns false. The driver then drops and counts, or, in virtual time, waits for
+///          room.
 template <class T, std::size_t N>
 class Stream {
  public:
   [[nodiscard]] bool push(const Delivery<T>& d) noexcept {
     if (!ring_.push(d)) return false;
-    const std::lock_guard lock(
-        mutex_);  // stop() waits for it: there are no notifications after it has returned
+    // stop() also takes this mutex, so there are no notifications after it has returned.
+    const std::lock_guard lock(mutex_);
     filled_.notify_one();
     if (notifier_ != nullptr) notifier_->notify();
     return true;
   }
   [[nodiscard]] bool full() const noexcept { return ring_.full(); }
-  /// Everything pushed so far was taken.
+  /// True if everything pushed so far was taken.
   [[nodiscard]] bool empty() const noexcept { return ring_.empty(); }
-  /// Returns when there is room, or the device is stopped.
+  /// Returns when there is room or the device is stopped.
   void wait_for_room() const noexcept {
     for (;;) {
       const std::uint32_t seen = taken_.load(std::memory_order_acquire);
@@ -49,8 +50,8 @@ class Stream {
     return streaming_.load(std::memory_order_acquire);
   }
 
-  /// Starts the consumer's side. After a disconnect, `ok` only once the device is back. → ok,
-  /// disconnected, ended
+  /// Starts the consumer's side. After a disconnect it returns `ok` only once the device has
+  /// reconnected. → ok, disconnected, ended
   [[nodiscard]] DeviceStatus start(Notifier* notifier) noexcept {
     {
       const std::lock_guard lock(mutex_);
@@ -64,22 +65,24 @@ class Stream {
         ended_ = true;
         return DeviceStatus::ended;
       }
-      disconnected_ = false;  // nothing but `back` and `end` follows a `gone`
+      // A `gone` is followed only by `back` or `end`.
+      disconnected_ = false;
     }
     streaming_.store(true, std::memory_order_release);
     return DeviceStatus::ok;
   }
   void stop() noexcept {
     streaming_.store(false, std::memory_order_release);
-    notify_release();  // a producer that waits for room would wait forever
+    // Wakes a producer that waits for room; otherwise it would wait forever.
+    notify_release();
     {
       const std::lock_guard lock(mutex_);
       notifier_ = nullptr;
     }
     filled_.notify_all();
   }
-  /// Drops what was not taken, and the disconnected state. Precondition: stopped, the producer's
-  /// thread has ended, no thread is in take().
+  /// Drops what was not taken, and the disconnected state. Preconditions: stopped, the producer's
+  /// thread has ended and no thread is in take().
   void clear() noexcept {
     for (Delivery<T> d; ring_.pop(&d);) ended_ = ended_ || d.what == Delivery<T>::What::end;
     disconnected_ = false;
@@ -113,10 +116,13 @@ class Stream {
 
   Ring<Delivery<T>, N> ring_;
   std::atomic<bool> streaming_{false};
-  std::atomic<std::uint32_t> taken_{0};        // the width a futex has
-  bool disconnected_ = false, ended_ = false;  // the consumer's
+  // Counts taken elements. Has the width of a futex, so that waiting needs no proxy.
+  std::atomic<std::uint32_t> taken_{0};
+  // Only the consumer uses these two flags.
+  bool disconnected_ = false, ended_ = false;
   std::mutex mutex_;
-  Notifier* notifier_ = nullptr;  // under mutex_
+  // Guarded by mutex_.
+  Notifier* notifier_ = nullptr;
   std::condition_variable filled_;
 };
 

@@ -11,30 +11,30 @@
 
 namespace vergence {
 
-/// One camera's exposure as its feedback line told it, after the edge of its pulse. Not seen: not
-/// wired, or no exposure happened.
+/// Exposure of one camera as measured on its feedback input, relative to the edge of its pulse. Not
+/// `seen` means that the input is not wired or that no exposure happened.
 struct PulseExposure {
   bool seen = false;
   Duration start{}, end{};
 };
 
-/// One pulse that went out to the cameras.
+/// Pulse sent to the cameras.
 struct Pulse {
-  /// Increases by one per pulse, also for pulses omitted by a pause; restarts at 0 with another
+  /// Increases by one per pulse, including pulses omitted by a pause; restarts at 0 with another
   /// `boot`.
   std::uint64_t number = 0;
-  /// Time of the edge by the board's clock.
+  /// Time of the edge on the trigger board's clock.
   DeviceStamp edge{};
   /// Time when the report arrived.
   HostStamp arrival{};
-  /// Identifies the board's start; numbers and edges of two boots cannot be compared.
+  /// Identifies the start of the trigger board; numbers and edges of two boots are not comparable.
   std::uint32_t boot = 0;
   /// True for the first pulse after a start or a pause.
   bool resumed = false;
-  /// Exposures by camera.
+  /// Exposures by camera index.
   std::array<PulseExposure, kMaxCameras> exposure{};
-  // A driver that asks the board for its time maps the edge itself; else a ClockMapper does, from
-  // `arrival`.
+  // True if the driver set `host` itself, because it queries the trigger board's time. Otherwise a
+  // ClockMapper derives `host` from `arrival`.
   bool mapped = false;
   /// `edge` on the host's clock.
   HostStamp host{};
@@ -42,13 +42,13 @@ struct Pulse {
   Duration host_error{};
 };
 
-/// Requested or applied configuration of a board.
+/// Requested or applied configuration of a trigger board.
 struct TriggerConfiguration {
   double rate_hz = 0;
   /// Width of a pulse.
   Duration width = Duration::microseconds(200);
-  /// 0: even intervals. Else every interval is longer or shorter by this, in an order that does not
-  /// repeat, so that the cameras' own stamps prove which frame belongs to which pulse.
+  /// If not 0, every interval is longer or shorter by this duration, in a sequence that does not
+  /// repeat, so that the cameras' own stamps verify which frame belongs to which pulse.
   Duration vary{};
   /// Mask of the outputs that are pulsed; output k triggers camera k.
   std::uint8_t lines = 0x03;
@@ -63,9 +63,9 @@ struct TriggerConfiguration {
 struct TriggerStatistics {
   /// Reported pulses.
   std::uint64_t pulses = 0;
-  /// Pulses whose report never came.
+  /// Pulses whose report was not received.
   std::uint64_t lost = 0;
-  /// Restarts of the board.
+  /// Restarts of the trigger board.
   std::uint64_t reboots = 0;
   /// Reports that could not be decoded.
   std::uint64_t malformed = 0;
@@ -82,44 +82,46 @@ struct TriggerStatistics {
 ///     for (Pulse pulse; board.wait(Duration::seconds(1), &pulse) == DeviceStatus::ok;)
 ///       if (pulse.mapped) synchronizer.pulse(pulse);
 ///
-/// Ownership, threads, memory, errors: as InsDevice.
+/// Ownership, threads, memory and errors are those of InsDevice.
 class TriggerDevice {
  public:
-  virtual ~TriggerDevice() = default;  // stops
+  /// Stops the pulses.
+  virtual ~TriggerDevice() = default;
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// → ok, unsupported, bad_configuration, disconnected
   [[nodiscard]] virtual DeviceStatus configure(const TriggerConfiguration& requested,
                                                TriggerConfiguration* actual) noexcept = 0;
-  /// From the edge to the arrival of its report. Precondition: configured.
+  /// Delays from an edge to the arrival of its report. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept { return {}; }
-  /// The first pulse goes out after this. As CameraDevice::start().
+  /// Starts the pulses. Same contract as CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Oldest report not yet taken, waiting at most `limit` (0: look once). → ok, timeout, stopped,
-  /// ended, disconnected
+  /// Returns the oldest report not yet taken and waits at most `limit` for it (0: does not wait). →
+  /// ok, timeout, stopped, ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Pulse* pulse) noexcept = 0;
-  /// Leaves so many pulses out, as soon as it can, then goes on by itself: a gap that every camera
-  /// shows. While streaming; does not wait for the board. Any one thread. → ok, unsupported,
-  /// stopped, disconnected
+  /// Omits this number of pulses as soon as possible and then resumes: a gap that all cameras
+  /// share. Does not wait for the trigger board; one thread may call it while streaming. → ok,
+  /// unsupported, stopped, disconnected
   [[nodiscard]] virtual DeviceStatus pause(std::uint32_t /*pulses*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// No pulse after it returns.
+  /// Stops the pulses. No pulse is sent after it returns.
   virtual void stop() noexcept = 0;
-  /// As those of InsDevice.
+  /// Same contract as those of InsDevice.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
   [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual TriggerStatistics statistics() const noexcept = 0;
 };
 
-/// One kind of trigger board: a row in the table of drivers. As CameraDriver.
+/// Driver for one kind of trigger board: a row in the table of drivers. Same contract as
+/// CameraDriver.
 class TriggerDriver {
  public:
   virtual ~TriggerDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   [[nodiscard]] virtual std::unique_ptr<TriggerDevice> open(std::string_view serial,
                                                             DeviceStatus* status) = 0;
-  /// As InsDriver::last_error().
+  /// Same contract as InsDriver::last_error().
   [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 

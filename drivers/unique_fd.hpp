@@ -5,7 +5,7 @@
 
 namespace vergence {
 
-/// A descriptor that closes itself.
+/// File descriptor that is closed on destruction.
 class UniqueFd {
  public:
   UniqueFd() noexcept = default;
@@ -17,7 +17,7 @@ class UniqueFd {
   }
   ~UniqueFd() { reset(); }
 
-  /// Nothing can be done about a close that fails: the descriptor is free either way.
+  /// An error of close() is ignored: the descriptor is free either way.
   void reset(int fd = -1) noexcept {
     if (fd_ >= 0) (void)::close(fd_);
     fd_ = fd;

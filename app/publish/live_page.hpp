@@ -14,7 +14,7 @@ namespace vergence::app {
 [[nodiscard]] std::string thumbnail(const ImageView& image);
 inline constexpr int kThumbnailWidth = 480;
 
-/// RFC 4648.
+/// Encoding of RFC 4648.
 [[nodiscard]] std::string base64(std::string_view bytes);
 
 struct LivePageOptions {

@@ -25,17 +25,22 @@ namespace vergence::app {
   return distinct;
 }
 
-/// Insertions, deletions, replacements and exchanges of neighbours that turn `a` into `b`, bytes,
-/// upper and lower case alike (optimal string alignment). O(|a|·|b|) time, O(|b|) memory; only the
-/// first 256 bytes of each are looked at.
+/// Number of insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`, in
+/// bytes and case-insensitively (optimal string alignment). O(
+/// a
+/// ·
+/// b
+/// ) time, O(
+/// b
+/// ) memory; uses only the first 256 bytes of each.
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
 
-/// The known word closest to a mistyped one; the first of several equally close. Nothing when every
-/// word would have to be changed by more than half.
+/// Known word closest to a mistyped one, the first of several. Empty if every word would need
+/// changes to more than half.
 [[nodiscard]] std::optional<std::string> nearest(std::string_view word,
                                                  const std::vector<std::string>& known);
 
-/// `; did you mean "X"?` for a message, or "" when nothing is near.
+/// Text `; did you mean "X"?` for a message, or "" if no word is close.
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        const std::vector<std::string>& known);
 

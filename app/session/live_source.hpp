@@ -14,10 +14,14 @@ namespace vergence::app {
 struct RunRequest {
   SessionOptions session{};
   Configuration configuration;
-  CalibrationSource calibration{};   // --from-scratch, --calibration
-  std::vector<std::string> faults;   // of the command line, beside the configuration's
-  std::optional<double> duration_s;  // all of the drive when not set
-  bool fast = false;                 // virtual time: nothing is dropped for time
+  /// Value of --from-scratch and --calibration.
+  CalibrationSource calibration{};
+  /// Faults of the command line, in addition to the configuration's.
+  std::vector<std::string> faults;
+  /// Empty runs to the end.
+  std::optional<double> duration_s;
+  /// Virtual time, in which nothing is dropped.
+  bool fast = false;
 };
 
 /// Drives: the cameras, INS and board of the configuration into a session folder (run_session()).

@@ -10,18 +10,19 @@
 
 namespace vergence::app {
 
-/// The INS of a drive that is replayed, and how it is compared.
+/// INS of a replayed sequence and the options of its comparison.
 struct ReplayedIns {
-  std::vector<InsRecord> readings{};  // around the frames that are replayed; empty: there is no INS
+  /// Samples around the replayed frames; empty without an INS.
+  std::vector<InsRecord> readings{};
   ComparisonOptions options{};
   std::string mount_source{};
-  std::vector<std::string> remarks{};  // messages
+  std::vector<std::string> remarks{};
 };
 
-/// Reads the frames [request.start, …) of the sequence. A mount that the configuration says
-/// (`ins.lever_arm_m`, `ins.boresight_deg`) stands before the data set's own;
-/// `comparison.max_gap_ms` and `max_wait_ms` are no less than one and a half of the recording's
-/// usual interval. InputError: as read_recorded_ins() and comparison_options() say.
+/// Reads the samples for the frames [request.start, …) of the sequence. Configured extrinsics
+/// (`ins.lever_arm_m`, `ins.boresight_deg`) take precedence over the data set's.
+/// `comparison.max_gap_ms` and `max_wait_ms` are at least 1.5 of the recording's usual interval.
+/// Throws InputError as read_recorded_ins() and comparison_options() do.
 [[nodiscard]] ReplayedIns replayed_ins(const ReplayRequest& request,
                                        const StereoSequence& sequence);
 

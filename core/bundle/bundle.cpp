@@ -16,15 +16,19 @@ using detail::BundleState;
 using detail::BundleWorkspace;
 using detail::System;
 
-constexpr double kMinDamping = 1e-12;      // below it the damping is lost in rounding
-constexpr double kMinGaugeDamping = 1e-9;  // where the scale is free the damping alone holds it
-constexpr double kLargestDamping = 1e10;   // steps are then shorter than any tolerance
-constexpr double kPivotTolerance =
-    1e-14;  // relative pivot of the damped system below which it counts as singular
-constexpr double kRankTolerance = 1e-11;  // of the undamped one
+// Minimum damping, above rounding.
+constexpr double kMinDamping = 1e-12;
+// Minimum damping if the scale is free, which nothing else constrains.
+constexpr double kMinGaugeDamping = 1e-9;
+// Maximum damping, at which steps are shorter than any tolerance.
+constexpr double kLargestDamping = 1e10;
+// Minimum relative pivot of the damped system; below it the system counts as singular.
+constexpr double kPivotTolerance = 1e-14;
+// Minimum relative pivot of the undamped system.
+constexpr double kRankTolerance = 1e-11;
 
-/// Takes storage for every array of a workspace from `take`, which either hands out arena memory or
-/// only counts.
+/// Requests storage for every array of a workspace from `take`, which either returns arena memory
+/// or only counts.
 template <class Take>
 void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
   using namespace detail;
@@ -87,7 +91,7 @@ struct Count {
   }
 };
 
-/// One solve(): the loop of Levenberg and Marquardt and what comes after it.
+/// One solve(): the Levenberg–Marquardt loop and the covariances.
 class Solve {
  public:
   Solve(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options,
@@ -100,7 +104,8 @@ class Solve {
   void run() noexcept {
     damping_ = options_.initial_damping;
     if (!system_.linearise(best(), damping_)) {
-      result_.termination = BundleTermination::invalid_input;  // a point behind its camera
+      // A point is behind its camera.
+      result_.termination = BundleTermination::invalid_input;
       return;
     }
     cost_ = system_.cost();
@@ -167,7 +172,7 @@ class Solve {
     }
   }
 
-  /// More damping about the best state. False: no more to be had.
+  /// Increases the damping about the best state. Returns false at its maximum.
   bool retreat() noexcept {
     damping_ *= 10;
     return damping_ <= kLargestDamping && system_.linearise(best(), damping_);
@@ -186,21 +191,21 @@ class Solve {
     return std::max(largest, std::sqrt(system_.rows() > 0 ? 0.0 : system_.point_decrement()));
   }
 
-  /// A free scale has one direction that nothing sees: in parallel_monocular that is as it should
-  /// be.
+  /// Number of unobservable directions: the scale in parallel_monocular.
   int free_directions() const noexcept {
     return options_.configuration == BundleConfiguration::parallel_monocular ? 1 : 0;
   }
 
-  /// Least ratio of a direction that something should see.
+  /// Smallest pivot ratio of the observable directions.
   double min_seen(const detail::PivotReport& pivots) const noexcept {
     return free_directions() == 0 ? pivots.min_ratio : pivots.second_ratio;
   }
 
-  /// A direction that only the damping holds: its pivot falls with λ, that of a seen one stays. One
-  /// factorisation cannot tell them apart.
+  /// Detects directions that only the damping constrains: their pivots fall with λ. One
+  /// factorisation alone cannot distinguish them.
   void watch_rank() noexcept {
-    constexpr double kFell = 0.3;  // of the ratio, when λ fell to a tenth
+    // Share of the ratio, for a tenfold smaller λ.
+    constexpr double kFell = 0.3;
     const double ratio = min_seen(pivots_);
     if (watched_damping_ > 0 && damping_ < 0.5 * watched_damping_)
       rank_suspicious_ = ratio < kFell * watched_ratio_;
@@ -211,24 +216,26 @@ class Solve {
 
   bool rank_deficient() noexcept {
     if (system_.rows() == 0 || !system_.linearise(best(), 0.0)) return false;
-    // Rounding may leave the pivot of an unobserved direction well above the tolerance, of
-    // either sign. It is still far below what the damping alone had made of it.
-    constexpr double kLeft = 0.01;  // of the last ratio under damping
+    // Rounding may leave the pivot of an unobserved direction above the tolerance, of either sign,
+    // but far below its value with damping.
+    // Share of the last ratio with damping.
+    constexpr double kLeft = 0.01;
     const auto pivots =
         detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(), kRankTolerance);
     return pivots.small > free_directions() || min_seen(pivots) < kLeft * watched_ratio_;
   }
 
-  /// The newest free pose's block of the inverse of the whole system, θ_S and all: in the factor
-  /// that takes the rows from that pose on.
+  /// Computes the newest free pose's block of the inverse of the whole system, including θ_S, from
+  /// the rows of the factor from that pose on.
   void pose_covariance() noexcept {
     const std::size_t rows = system_.rows(), ld = system_.ld();
     if (w_.free_poses == 0 || !system_.linearise(best(), 0.0)) return;
     if (detail::cholesky(w_.A.data(), rows, rows, ld, kRankTolerance).small > 0) return;
     const std::size_t first = (static_cast<std::size_t>(w_.free_poses) - 1) * detail::kBlock;
-    // That pose's columns of L⁻¹, by rows.
+    // That pose's columns of L⁻¹, row by row.
     std::array<Vec6, detail::kBlock*(1 + detail::kMaxSharedBlocks)> inverse;
-    Mat6 covariance = Mat6::Zero();  // (τ, φ)
+    // In the order (τ, φ).
+    Mat6 covariance = Mat6::Zero();
     for (std::size_t r = first; r < rows; ++r) {
       Vec6 row = Vec6::Zero();
       if (r - first < detail::kBlock) row[static_cast<Eigen::Index>(r - first)] = 1;
@@ -295,7 +302,8 @@ std::size_t BundleAdjuster::memory_needed(const BundleCapacities& capacities) no
 }
 
 BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
-  constexpr std::size_t kMaxPoses = 65535, kMaxObservations = 1U << 28U;  // what the indices hold
+  // Limits of the index types.
+  constexpr std::size_t kMaxPoses = 65535, kMaxObservations = 1U << 28U;
   if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMaxPoses ||
       c.points > kMaxObservations || c.observations > kMaxObservations)
     throw std::invalid_argument(

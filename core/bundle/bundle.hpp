@@ -10,189 +10,233 @@
 
 namespace vergence {
 
-/// Which blocks of θ = [θ_S | θ_I | θ_P] are free. One code; the configuration is the
-/// choice of partition.
+/// Selects the free blocks of θ = [θ_S | θ_I | θ_P]: shared parameters, poses, points.
 enum class BundleConfiguration : std::uint8_t {
-  stereo_calibration,  // θ_S: T_camera_left of every camera but 0, and intrinsics if asked; θ_I:
-                       // one pose a rig frame
-  stereo_odometry,  // θ_S empty: T_camera_left and intrinsics are constant;              θ_I: one
-                    // pose a rig frame
-  parallel_monocular,  // θ_S empty, T_camera_left is not read;                              θ_I:
-                       // one pose an image
+  /// θ_S: T_camera_left of every additional camera, and selected intrinsics; θ_I: one pose per rig
+  /// frame.
+  stereo_calibration,
+  /// θ_S is empty: T_camera_left and intrinsics are constant; θ_I: one pose per rig frame.
+  stereo_odometry,
+  /// θ_S is empty and T_camera_left is not read; θ_I: one pose per image.
+  parallel_monocular,
 };
 
-/// One feature in one image. `x`, `y` in pixels of camera `camera`, through that camera's
-/// distortion.
+/// One feature in one image. `x`, `y` are pixels of camera `camera` including its distortion.
 ///
-/// stereo_*: `pose` is the rig frame and `camera` the camera of the rig: X_camera =
+/// stereo_*: `pose` is the rig frame, `camera` the camera of the rig: X_camera =
 /// T_camera_left[camera] * T_left_world[pose] * X.
-/// parallel_monocular: `pose` is the image (left and right images of one rig frame have poses of
-/// their own, `T_camera_world`), `camera` only chooses the intrinsics: X_camera =
+/// parallel_monocular: `pose` is the image, and `camera` only selects the intrinsics: X_camera =
 /// T_left_world[pose] * X.
 struct BundleObservation {
   std::uint32_t point = 0;
   std::uint16_t pose = 0;
   std::uint8_t camera = 0;
-  float inverse_sigma = 1.0F;  // 1/px, of one coordinate, > 0
-  double x = 0, y = 0;         // px; double, because float resolves only 6e-5 px at 1000 px
+  /// Inverse standard deviation of one coordinate in 1/px, > 0.
+  float inverse_sigma = 1.0F;
+  /// Double precision, because float resolves only 6e-5 px at 1000 px.
+  double x = 0, y = 0;
 };
 
-/// Prior of a pose: `information` (rotation, then translation) of the
-/// perturbation δ = (φ, τ) that takes the prior's transform to the pose: R = Exp(φ) R₀, t = Exp(φ)
-/// t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
+/// Prior of a pose: `information` (rotation, then translation) of the perturbation δ = (φ, τ) from
+/// the prior to the pose: R = Exp(φ) R₀, t = Exp(φ) t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
 struct BundlePosePrior {
   std::uint16_t pose = 0;
   Transform T_left_world{};
-  Mat6 information = Mat6::Zero();  // symmetric, positive semidefinite; 1/rad², 1/(rad m), 1/m²
+  /// Symmetric, positive semidefinite; in 1/rad², 1/(rad m), 1/m².
+  Mat6 information = Mat6::Zero();
 };
 
-/// A problem in the caller's arrays; solve() reads them all and writes those marked in/out.
+/// A problem in the caller's arrays; solve() writes those marked in/out.
 ///
 /// Order  Observations are sorted by (point, pose, camera), strictly: a feature appears once.
-///        Points without observations are left alone.
+///        Points without observations are not changed.
 struct BundleProblem {
-  std::span<Camera> cameras;  // 1 … kMaxCameras; in/out where intrinsics are free, else read only
-  std::span<Transform> T_camera_left;  // as many as cameras, [0] the identity; in/out in
-                                       // stereo_calibration; may be empty in parallel_monocular
-  std::span<Transform> T_left_world;   // poses, in/out
-  std::span<const std::uint8_t>
-      pose_constant;       // 1: not changed. As many as poses, or empty: only pose 0 is constant
-  std::span<Vec3> points;  // world, metres, in/out
-  std::span<const std::uint8_t>
-      point_constant;  // 1: not changed. As many as points, or empty: none
+  /// 1 … kMaxCameras cameras; in/out if intrinsics are free.
+  std::span<Camera> cameras;
+  /// One transform per camera, the first the identity; in/out in stereo_calibration; may be empty
+  /// in parallel_monocular.
+  std::span<Transform> T_camera_left;
+  /// Poses, in/out.
+  std::span<Transform> T_left_world;
+  /// One flag per pose, 1 if it is constant; if empty, only pose 0 is.
+  std::span<const std::uint8_t> pose_constant;
+  /// Points in the world in metres, in/out.
+  std::span<Vec3> points;
+  /// One flag per point, 1 if it is constant; if empty, none is.
+  std::span<const std::uint8_t> point_constant;
   std::span<const BundleObservation> observations;
-  std::span<const BundlePosePrior> pose_priors;  // of free poses; may be empty
-  std::span<float> squared_residuals;  // out: |ε|² inverse_sigma² of each observation at the
-                                       // result; as many as observations, or empty
+
+  /// Priors of free poses; may be empty.
+  std::span<const BundlePosePrior> pose_priors;
+  /// Output: |ε|² inverse_sigma² of each observation at the result; one per observation, or empty.
+  std::span<float> squared_residuals;
 };
 
 enum class BundleLoss : std::uint8_t { none, huber, cauchy };
 
-/// Knowledge of the length of T_camera_left[k].t: it is the scale of everything.
+/// Knowledge of the length of T_camera_left[k].t, which determines the scale.
 enum class BundleLength : std::uint8_t {
-  exact,  // t_k = metres · u, u on the sphere: 5 free parameters for that camera; the input's t_k
-          // is brought to that length
-  measured,  // residual (|t_k| − metres)/sigma: 6 free parameters
-  free,      // nothing: 6 free parameters; some other camera must fix the scale
+  /// t_k = metres · u with u on the sphere, so 5 free parameters; the input's t_k is scaled to that
+  /// length.
+  exact,
+  /// Residual (|t_k| − metres)/sigma, with 6 free parameters.
+  measured,
+  /// Unknown, with 6 free parameters; another camera must determine the scale.
+  free,
 };
 
 struct BundleLengthConstraint {
   BundleLength kind = BundleLength::exact;
-  double metres = 0;  // > 0; 0 with `exact`: the length that T_camera_left comes with
-  double sigma = 0;   // m, > 0, with `measured`
+  /// Length > 0; with `exact`, 0 selects the length of the input.
+  double metres = 0;
+  /// Standard deviation with `measured`, in metres, > 0.
+  double sigma = 0;
 };
 
 /// One camera's intrinsics in the adjustment (stereo_calibration only).
 struct BundleIntrinsics {
-  std::uint16_t free = 0;                             // bit i: parameter i is estimated
-  std::array<double, kIntrinsicsSize> prior_mean{};   // used where free and prior_sigma > 0
-  std::array<double, kIntrinsicsSize> prior_sigma{};  // 0: no prior
+  /// Bit i is set if parameter i is estimated.
+  std::uint16_t free = 0;
+  /// Mean of the prior of free parameters with prior_sigma > 0.
+  std::array<double, kIntrinsicsSize> prior_mean{};
+  /// Standard deviation of the prior; 0 for no prior.
+  std::array<double, kIntrinsicsSize> prior_sigma{};
   std::array<double, kIntrinsicsSize> held_sigma{
-      -1, -1, -1, -1, 0, 0, 0, 0, 0};  // of what is held, for the wide covariance;
-                                       // negative: the default, 0.1 % of a focal length and 0.5 px
-                                       // of a principal point
+      /// Standard deviation of fixed parameters for the total covariance; negative for the default,
+      /// 0.1 % of a focal length and 0.5 px of a principal point.
+      -1, -1, -1, -1, 0, 0, 0, 0, 0};
 };
 
-/// Prior of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the
-/// parameters that are free here.
+/// Prior of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the free
+/// parameters.
 struct BundleSharedPrior {
-  const RigCalibration* rig = nullptr;  // mean and `covariance`; null: nothing is known. Rows
-                                        // without a variance: nothing is known of them
-  double weight =
-      1;  // factor by which the solve overweights its tracks; the prior gets the same, > 0
+  /// Mean and `covariance`; null for no prior. Rows without a variance have no prior.
+  const RigCalibration* rig = nullptr;
+  /// Factor > 0 by which the solve overweights its tracks, and so the prior.
+  double weight = 1;
 };
 
 struct BundleOptions {
   BundleConfiguration configuration = BundleConfiguration::stereo_odometry;
-  std::array<BundleLengthConstraint, kMaxCameras>
-      length{};  // [k] of camera k ≥ 1; read in stereo_calibration
-  std::array<BundleIntrinsics, kMaxCameras> intrinsics{};  // read in stereo_calibration
+  /// Constraint of each camera k ≥ 1 in stereo_calibration.
+  std::array<BundleLengthConstraint, kMaxCameras> length{};
+  std::array<BundleIntrinsics, kMaxCameras> intrinsics{};
   BundleSharedPrior shared_prior{};
-  int cells = 0;  // covariance: clusters are so many cells a side of the image, and blocks of
-                  // frames; 0 … 8, 0: each track is one
-  double shared_errors = 1;  // times the clusters' variance: what tracks of one surface share and a
-                             // cluster a track does not see, > 0
-  BundleLoss loss = BundleLoss::none;
-  double loss_threshold = 2.0;  // sigmas, > 0; Huber: where it turns linear; Cauchy: scale
-  int max_steps = 30;           // solver steps tried, accepted or not, 1 … 1000
-  double cost_tolerance =
-      1e-6;  // stop when a step changes the cost by less than this share of it, ≥ 0
-  double update_tolerance = 1e-10;  // stop when |δ| ≤ tolerance · (|θ| + tolerance), ≥ 0
-  double gradient_tolerance = 0;    // stop when the largest component of the reduced gradient, each
-                                    // over the root of its diagonal, is below, ≥ 0
-  double initial_damping = 1e-4;  // λ of the first step; diagonals × (1 + λ), ÷ 10 after a success,
-                                  // × 10 after a failure, in (0, 1e6]
-  bool covariance = false;       // fill BundleResult's covariances of θ_S (stereo_calibration)
-  bool pose_covariance = false;  // fill BundleResult::pose_covariance, of the free pose with the
-                                 // highest index; costs as much as a step
+  /// Clusters of the covariance: image cells, this many per side (0 … 8), and blocks of frames;
+  /// with 0 each track is a cluster.
+  int cells = 0;
+  /// Factor > 0 of the clusters' variance, for errors that tracks of one surface share but clusters
+  /// do not show.
+  double shared_errors = 1;
 
-  /// Every field is in its range.
+  BundleLoss loss = BundleLoss::none;
+  /// Threshold of Huber's loss or scale of Cauchy's in sigmas, > 0.
+  double loss_threshold = 2.0;
+
+  /// Maximum number of solver steps, accepted or not, 1 … 1000.
+  int max_steps = 30;
+  /// Stops if a step changes the cost by less than this share, ≥ 0.
+  double cost_tolerance = 1e-6;
+  /// Stops if |δ| ≤ tolerance · (|θ| + tolerance), ≥ 0.
+  double update_tolerance = 1e-10;
+  /// Stops if the largest component of the reduced gradient, each over the root of its diagonal, is
+  /// smaller, ≥ 0.
+  double gradient_tolerance = 0;
+  /// Initial λ in (0, 1e6], by which diagonals are multiplied as 1 + λ; λ is divided by 10 after a
+  /// success and multiplied by 10 after a failure.
+  double initial_damping = 1e-4;
+
+  /// Computes the covariances of θ_S (stereo_calibration).
+  bool covariance = false;
+  /// Computes BundleResult::pose_covariance of the free pose with the highest index; costs as much
+  /// as a step.
+  bool pose_covariance = false;
+
+  /// True if every field is in its range.
   [[nodiscard]] bool valid() const noexcept;
 };
 
 enum class BundleTermination : std::uint8_t {
-  small_update,       // converged: |δ| below update_tolerance
-  small_gradient,     // converged
-  small_cost_change,  // converged
-  max_steps,          // stopped on the way; the result is the best so far
-  diverged,           // no damping up to the largest lowers the cost; the result is the best so far
-  invalid_input,      // options out of range, sizes, indices, order or numbers that cannot be, a
-                      // point behind its camera at the start; nothing was changed
-  rank_deficient,     // the observations do not determine the parameters; unchanged if found before
-                      // the first step, else the best so far
-  capacity,           // more of something than the adjuster was built for; nothing was changed
+  /// Converged: |δ| is below update_tolerance.
+  small_update,
+  /// Converged.
+  small_gradient,
+  /// Converged.
+  small_cost_change,
+  /// Not converged; the result is the best so far.
+  max_steps,
+  /// No damping lowers the cost; the result is the best so far.
+  diverged,
+  /// The problem or options are invalid, or a point is behind its camera at the start; nothing was
+  /// changed.
+  invalid_input,
+  /// The observations do not determine the parameters; unchanged if detected before the first step,
+  /// else the best so far.
+  rank_deficient,
+  /// A capacity of the adjuster is exceeded; nothing was changed.
+  capacity,
 };
 
 /// Covariances are of the left perturbation (rotation rad, then translation m), R ← Exp(φ) R, t ← t
 /// + τ, as in RigCalibration; with an exact length the 6×6 has rank 5.
 struct BundleResult {
-  BundleResult() noexcept {  // Eigen leaves a matrix as it finds the memory
+  /// Eigen does not initialise matrices.
+  BundleResult() noexcept {
     for (auto* all : {&covariance_white, &covariance_noise, &covariance_total})
       for (Mat6& m : *all) m.setZero();
   }
 
   BundleTermination termination = BundleTermination::invalid_input;
-  int steps = 0;          // tried
-  int accepted = 0;       // of these
-  double final_cost = 0;  // ½ Σ ρ(|ε|²/σ²) + priors
-  double rms_px =
-      0;  // root mean of |ε|² over observations, px, both coordinates together, unweighted
-  double damping = 0;  // λ at the end
+  int steps = 0;
+  int accepted = 0;
+  /// ½ Σ ρ(|ε|²/σ²) plus priors.
+  double final_cost = 0;
+  /// Root mean of |ε|² over observations, both coordinates together, unweighted.
+  double rms_px = 0;
+  /// Final λ.
+  double damping = 0;
 
-  bool has_covariance = false;  // asked for, and the undamped system is positive definite
-  double sigma0_squared = 0;  // Σ w |ε|²/σ² over the degrees of freedom: 1 if inverse_sigma is true
-  std::array<Mat6, kMaxCameras> covariance_white{};  // [k] of T_camera_left[k]: σ̂² H⁻¹
-  std::array<Mat6, kMaxCameras>
-      covariance_noise{};  // cluster-robust (`cells`), times shared_errors; priors as they are
-  std::array<Mat6, kMaxCameras>
-      covariance_total{};  // covariance_noise + what the held intrinsics may be off by
-  std::array<std::array<double, kIntrinsicsSize>, kMaxCameras>
-      intrinsics_sigma{};  // of the free ones, from covariance_noise
-  RigCovariance
-      covariance{};  // covariance_total of all of θ_S together, with what is held but uncertain
-  double inflation = 1;  // mean over θ_S of the variance by clusters over the one by H⁻¹
+  /// True if covariances were requested and the undamped system is positive definite.
+  bool has_covariance = false;
+  /// Σ w |ε|²/σ² over the degrees of freedom; 1 if inverse_sigma is correct.
+  double sigma0_squared = 0;
+  /// Covariance of each T_camera_left[k] as σ̂² H⁻¹.
+  std::array<Mat6, kMaxCameras> covariance_white{};
+  /// Cluster-robust covariance (`cells`), times shared_errors; priors are not scaled.
+  std::array<Mat6, kMaxCameras> covariance_noise{};
+  /// covariance_noise plus the uncertainty of fixed intrinsics.
+  std::array<Mat6, kMaxCameras> covariance_total{};
+  /// Standard deviations of free intrinsics, from covariance_noise.
+  std::array<std::array<double, kIntrinsicsSize>, kMaxCameras> intrinsics_sigma{};
+  /// Joint covariance_total of θ_S and of fixed but uncertain intrinsics.
+  RigCovariance covariance{};
+  /// Mean over θ_S of the ratio of the variance by clusters to that by H⁻¹.
+  double inflation = 1;
 
   bool has_pose_covariance = false;
-  std::uint16_t pose = 0;               // whose
-  Mat6 pose_covariance = Mat6::Zero();  // H⁻¹ (inverse_sigma taken as true) with all else that is
-                                        // free marginalised, of R ← Exp(φ) R, t ← Exp(φ) t + τ
+  std::uint16_t pose = 0;
+  /// H⁻¹ with inverse_sigma taken as true, marginalised over all other parameters, for R ← Exp(φ)
+  /// R, t ← Exp(φ) t + τ.
+  Mat6 pose_covariance = Mat6::Zero();
 
-  /// The parameters are at a minimum, to within the tolerances.
+  /// True if the parameters are at a minimum within the tolerances.
   [[nodiscard]] bool converged() const noexcept {
     return termination <= BundleTermination::small_cost_change;
   }
-  /// The caller's arrays hold a finite result no worse than the start.
+  /// True if the caller's arrays contain a finite result no worse than the start.
   [[nodiscard]] bool usable() const noexcept { return termination <= BundleTermination::diverged; }
 };
 
 struct BundleCapacities {
-  std::size_t cameras = 2;  // 1 … kMaxCameras
+  /// 1 … kMaxCameras.
+  std::size_t cameras = 2;
   std::size_t poses = 12;
   std::size_t points = 500;
   std::size_t observations = 8000;
-  bool shared = true;  // room for θ_S; false: stereo_calibration is refused with `capacity`
-  std::size_t blocks =
-      0;  // pairs (eight points | pose) with an observation; 0: the worst case of the sizes above
+  /// Room for θ_S; without it stereo_calibration is rejected with `capacity`.
+  bool shared = true;
+  /// Number of pairs (eight points, pose) with an observation; 0 for the worst case.
+  std::size_t blocks = 0;
 };
 
 namespace detail {
@@ -202,10 +246,10 @@ struct BundleWorkspace;
 /// Partitioned bundle adjustment of Warren et al. (ICRA 2013): Levenberg–Marquardt on U − W P⁻¹ Wᵀ,
 /// poses and shared parameters dense.
 ///
-/// Parametrisation  pose: R ← Exp(φ) R, t ← Exp(φ) t + τ (about the camera, so that a far-away
-///            world origin costs no digits); camera k: R_k ← R_k Exp(φ), t_k ← t_k + R_k τ, with
-///            `exact` t_k kept at its length. Points: X ← X + δ, |δ| at most 0.8 of the point's
-///            least depth, so that no point passes through a camera.
+/// Parametrisation  pose: R ← Exp(φ) R, t ← Exp(φ) t + τ (about the camera, so that a distant world
+///                  origin costs no precision); camera k: R_k ← R_k Exp(φ), t_k ← t_k + R_k τ, with
+///                  `exact` at constant length. Points: X ← X + δ with |δ| at most 0.8 of the
+///                  point's minimum depth, so that no point passes through a camera.
 ///
 ///     const BundleCapacities capacities{.poses = poses.size(), .points = points.size()};
 ///     Arena arena(BundleAdjuster::memory_needed(capacities));
@@ -218,14 +262,14 @@ struct BundleWorkspace;
 ///     problem.observations = observations;
 ///     const BundleResult result = adjuster.solve(problem, BundleOptions{});  // stereo odometry
 ///
-/// Ownership  The problem's arrays are the caller's; nothing of them is kept after solve().
+/// Ownership  The problem's arrays are the caller's; no reference is kept after solve().
 /// Threads    solve() by one thread at a time; adjusters are independent of each other.
 /// Memory     memory_needed() bytes of the arena at construction, nothing in solve().
-/// Time       One pass over the observations a step; bounded by max_steps. Deterministic on one
-///            machine; between SIMD targets results agree to the rounding of sums.
-/// Errors     solve() never throws and never leaves a NaN; the status states what was changed. The
+/// Time       One pass over the observations per step, at most max_steps. Deterministic on one
+///            machine; SIMD targets differ by rounding.
+/// Errors     solve() never throws and never returns NaN; the status states what was changed. The
 ///            constructor throws std::length_error if the arena is too small and
-///            std::invalid_argument for impossible capacities.
+///            std::invalid_argument for invalid capacities.
 /// Source     Warren, McKinnon, Upcroft, ICRA 2013, with the corrected order of transforms
 ///            (core/README.md).
 class BundleAdjuster {

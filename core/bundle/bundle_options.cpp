@@ -26,7 +26,7 @@ bool valid(const BundleIntrinsics& i) noexcept {
 }  // namespace
 
 bool BundleOptions::valid() const noexcept {
-  // Larger values are mistakes: the longest solve of the program asks for 200 steps.
+  // Reject larger values as mistakes; the longest solve of the program takes 200 steps.
   constexpr int kMaxSteps = 1000;
   constexpr double kMaxDamping = 1e6;
   const auto each_valid = [](const auto& all) {

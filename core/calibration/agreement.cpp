@@ -11,7 +11,8 @@
 namespace vergence::calibration {
 
 RigCovariance noise_only(const RigCovariance& wide) noexcept {
-  constexpr double kNothingLeft = 1e-12;  // of a variance, given those before it
+  // Share of a variance below which earlier parameters determine this one.
+  constexpr double kNothingLeft = 1e-12;
   RigCovariance noise = wide;
   for (int held = intrinsic_row(0); held < intrinsic_row(0) + 4; ++held) {
     const double variance = noise(held, held);
@@ -52,7 +53,7 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
     result.depth[i] = normalised / seen;
     result.depth_percent[i] = 100 * std::sqrt(squared / seen);
   }
-  // The transform's five: rotation, and t along two directions across itself.
+  // The transform's five parameters: rotation, and t along two directions orthogonal to it.
   const Transform &Ta = a.T_camera_left[c], &Tb = b.T_camera_left[c];
   Eigen::Matrix<double, 6, 5> basis = Eigen::Matrix<double, 6, 5>::Zero();
   basis.topLeftCorner<3, 3>().setIdentity();

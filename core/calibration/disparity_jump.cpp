@@ -10,17 +10,28 @@ namespace {
 
 constexpr std::size_t kMinTracks = 25;
 constexpr int kReweightings = 6;
-constexpr double kMinScale = 0.05;    // px: corners are found no better
-constexpr double kDepthStep = 1e-3;   // of the depth, for the numeric derivatives
-constexpr double kMinJump = 0.6;      // px: twice what 95 % of untouched frames stay under
-constexpr double kJumpSigmas = 8.0;   // of the frame's own tracks
-constexpr double kJumpScatter = 5.0;  // times the root mean square of this drive's shifts
-constexpr int kFirstFrames = 5;       // measured, before the scatter is known
-constexpr int kScatterFrames = 20;    // that the mean square is reckoned over, about
-constexpr double kGoesBack = 0.5;  // of the shift: more taken back by the next frame is no change
-constexpr int kUnmeasured = 2;     // frames without enough tracks after it: it was a change
-constexpr int kMaxSkipped = 3;     // frames, over which the same points are compared
-constexpr double kMinParallax = 1e-4;  // rad: farther points have the same disparity at any depth
+// Minimum residual scale, in pixels; corners are not localised better.
+constexpr double kMinScale = 0.05;
+// Relative depth step of the numeric derivatives.
+constexpr double kDepthStep = 1e-3;
+// Minimum jump in pixels, twice the 95 % quantile of undisturbed frames.
+constexpr double kMinJump = 0.6;
+// Minimum jump in sigmas of the frame's own tracks.
+constexpr double kJumpSigmas = 8.0;
+// Minimum jump as a multiple of the rms shift of this run.
+constexpr double kJumpScatter = 5.0;
+// Number of measured frames until the rms shift is usable.
+constexpr int kFirstFrames = 5;
+// Length of the running mean square, in frames.
+constexpr int kScatterFrames = 20;
+// Share of a shift that the next frame must revert for it not to be a change.
+constexpr double kGoesBack = 0.5;
+// Number of frames without enough tracks after which a shift counts as a change.
+constexpr int kUnmeasured = 2;
+// Maximum number of skipped frames between two that are compared.
+constexpr int kMaxSkipped = 3;
+// Minimum parallax in rad; the disparity of farther points does not depend on depth.
+constexpr double kMinParallax = 1e-4;
 
 Vec3 ray(const Pinhole& k, const Vec2& pixel) noexcept {
   return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy, 1.0};
@@ -30,7 +41,8 @@ Vec2 project(const Pinhole& k, const Vec3& p) noexcept {
   return {k.fx * p.x() / p.z() + k.cx, k.fy * p.y() / p.z() + k.cy};
 }
 
-/// Depth of the left ray where it is nearest to the other camera's; not positive: it has none.
+/// Depth of the left ray where it is nearest to the other camera's ray; not positive if there is
+/// none.
 double depth_of(const Vec3& left, const Vec3& other, const Transform& T_other_left) noexcept {
   // other ∥ z R left + t, so other × (R left) z = − other × t.
   const Vec3 a = other.cross(T_other_left.R * left), b = -other.cross(T_other_left.t);
@@ -99,8 +111,7 @@ bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObs
   const double step = kDepthStep * moved.z();
   const Vec2 predicted = disparity(moved);
   const Vec2 by_depth = (disparity(moved + Vec3(0, 0, step)) - predicted) / step;
-  // Along the epipolar line: where a point of that left pixel goes in the other image with its
-  // depth.
+  // Direction of the epipolar line, along which the point moves in the other image with its depth.
   const Vec2 farther = project(camera_, T_camera_left_ * Vec3(moved * (1.0 + kDepthStep))) -
                        project(camera_, T_camera_left_ * moved);
   const double length = farther.norm();

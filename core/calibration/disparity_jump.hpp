@@ -8,50 +8,53 @@
 
 namespace vergence::calibration {
 
-/// Change of the disparities of one frame against their prediction from the frame before.
+/// Change of one frame's disparities against their prediction from the previous frame.
 struct DisparityJump {
-  bool measured = false;  // false: too few tracks
-  // Common to all tracks, along the epipolar lines; with `confirmed`, that of the onset frame.
+  /// False if there are too few tracks.
+  bool measured = false;
+  // Change common to all tracks, along the epipolar lines; with `confirmed`, that of the onset
+  // frame.
   double px = 0;
-  double sigma_px = 0;  // from the tracks' own scatter
+  /// Standard deviation, from the scatter of the tracks.
+  double sigma_px = 0;
   int tracks = 0;
-  bool suspected =
-      false;  // larger than chance and this drive's own scatter; the next frame decides
-  bool confirmed = false;         // it did not go back: the rig has changed
-  std::uint64_t onset_frame = 0;  // with `confirmed`: the first frame of the changed rig
+  /// True if the change exceeds the usual scatter; the next frame decides.
+  bool suspected = false;
+  /// True if the change did not revert: the rig has changed.
+  bool confirmed = false;
+  /// With `confirmed`, the first frame of the changed rig.
+  std::uint64_t onset_frame = 0;
 };
 
-/// Detects a sudden turn of a camera about the axis that epipolar lines do not show (yaw, for
-/// cameras side by side): it moves all disparities alike from one frame to the next.
+/// Detects a sudden rotation of a camera about the axis that epipolar lines do not show (yaw, for
+/// cameras side by side): it shifts all disparities equally from one frame to the next.
 ///
-/// A track's point is triangulated in the frame before, moved by the left camera's motion and
-/// projected again. What is left of its disparity is fitted, robustly, by a shift and by an error
-/// of the motion along the optical axis, which moves disparities as d/Z. A calibration that is
-/// wrong but does not change leaves errors that go with d/Z, which the fit takes out, so that the
-/// test holds while the calibration is not known yet. On recorded drives 95 % of the shifts are
-/// under 0.26 px, the largest is 0.68 px and goes back (build/bench/calibration_bench jumps); a
-/// turn of 0.1° moves KITTI's disparities by 1.25 px. An image that is spoilt for one frame goes
-/// back in the next, and is no change.
+/// A track's point is triangulated in the previous frame, moved by the left camera's motion and
+/// projected again. The residual disparity is fitted robustly by a shift and by an error of the
+/// motion along the optical axis, proportional to d/Z. A constant calibration error also has
+/// residuals proportional to d/Z, which the fit absorbs, so the test works before the calibration
+/// is known. On recorded sequences 95 % of the shifts are below 0.26 px, the largest is 0.68 px and
+/// reverts (build/bench/calibration_bench jumps); 0.1° shift KITTI's disparities by 1.25 px. The
+/// shift of a single distorted image reverts in the next frame.
 ///
 /// Memory   From the arena; tracks beyond `capacity` are left out.
-/// Threads  One caller. Time: linear but for a sort of the tracks.
+/// Threads  One caller. Time: linear, except for sorting the tracks.
 class DisparityJumpDetector {
  public:
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   DisparityJumpDetector(std::size_t capacity, Arena& arena);
 
-  /// Sets the transform and pinholes in use, and clears the frame before.
+  /// Sets the transform and pinholes in use, and clears the previous frame.
   void set_reference(const Transform& T_camera_left, const Pinhole& left,
                      const Pinhole& camera) noexcept;
-  /// Changes to another calibration of the same rig and to another scene; `stereo`, points of the
-  /// new scene, take the place of the frame before. A suspected shift still waits for the next
-  /// frame.
+  /// Changes to another calibration of the same rig and another map; `stereo`, points of the new
+  /// map, replace the previous frame. A suspected shift still waits for the next frame.
   void rebase(const Transform& T_camera_left, const Pinhole& left, const Pinhole& camera,
               std::span<const StereoObservation> stereo) noexcept;
-  /// Changes the transform and keeps the frame before: for a refined calibration, and for every
+  /// Changes the transform and keeps the previous frame: for a refined calibration, and for every
   /// frame while the cameras are not linked.
   void set_transform(const Transform& T_camera_left) noexcept { T_camera_left_ = T_camera_left; }
-  /// Call when the scene was lost: the next frame is compared with none.
+  /// Call when the map was lost: the next frame is not compared with earlier ones.
   void reset() noexcept {
     count_ = 0;
     pending_ = Pending{};
@@ -59,23 +62,25 @@ class DisparityJumpDetector {
     skipped_ = 0;
   }
 
-  /// Frames in order, each with the motion of the left camera since the one before.
+  /// Processes the next frame, with the motion of the left camera since the previous one.
   [[nodiscard]] DisparityJump next(std::uint64_t frame, std::span<const StereoObservation> stereo,
                                    const Transform& T_now_previous) noexcept;
-  /// Call instead of next() for a frame in which one of the two cameras showed nothing: the next
-  /// frame is compared with the one before it. If too many are skipped there is nothing to compare
-  /// with, and a suspected shift counts as a change.
+  /// Call instead of next() if one of the two cameras showed nothing: the next frame is compared
+  /// with the last processed one. After too many skipped frames no comparison is possible, and a
+  /// suspected shift counts as a change.
   void skip(const Transform& T_now_previous) noexcept;
 
  private:
   struct Row {
-    double e = 0;      // px, disparity found minus predicted
-    double along = 0;  // px/m: what an error of the motion along the optical axis does to it
+    // Measured minus predicted disparity, in px.
+    double e = 0;
+    // Derivative of `e` with respect to an error of the motion along the optical axis, in px/m.
+    double along = 0;
   };
   [[nodiscard]] bool row(const StereoObservation& before, const StereoObservation& now,
                          const Transform& T_now_previous, Row* out) const noexcept;
   [[nodiscard]] DisparityJump fit(std::span<Row> rows) noexcept;
-  /// Sorted by track; how many.
+  /// Copies observations sorted by track; returns their number.
   std::size_t take(std::span<const StereoObservation> stereo,
                    std::span<StereoObservation> into) noexcept;
   void evaluate(std::uint64_t frame, DisparityJump* jump) noexcept;
@@ -85,20 +90,25 @@ class DisparityJumpDetector {
     bool any = false;
     std::uint64_t frame = 0;
     double px = 0, sigma_px = 0;
-    int unmeasured = 0;  // frames since then that said nothing
+    // Number of frames since then without a measurement.
+    int unmeasured = 0;
   };
 
   Transform T_camera_left_{};
   Pinhole left_{}, camera_{};
-  std::span<StereoObservation> before_, now_;  // sorted by track
+  // Observations, sorted by track.
+  std::span<StereoObservation> before_, now_;
   std::span<Row> rows_;
   std::span<double> scratch_;
-  std::size_t count_ = 0;     // of before_
-  Transform T_now_before_{};  // over the frames skipped since then
+  std::size_t count_ = 0;
+  // Motion over the frames skipped since before_.
+  Transform T_now_before_{};
   int skipped_ = 0;
   Pending pending_{};
-  int measured_ = 0;        // frames, up to kScatterFrames
-  double mean_square_ = 0;  // px², of the shifts that were no jump
+  // Number of measured frames, at most kScatterFrames.
+  int measured_ = 0;
+  // Mean square of the shifts that were no jump, in px².
+  double mean_square_ = 0;
 };
 
 }  // namespace vergence::calibration

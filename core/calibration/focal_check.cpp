@@ -5,11 +5,10 @@
 namespace vergence::calibration {
 namespace {
 
-// Systematic error of the measured focal length: at most 3.2 % over the recorded
-// drives after 25 frames (docs/calibration.md), and on `sand_rover` it follows what was given from
-// 246 to 251 px of 258. What is certain lies beyond that and three sigmas of noise.
+// Systematic error of the measured focal length: at most 3.2 % on recorded sequences after 25
+// frames (docs/calibration.md). A contradiction must exceed it and kCertain sigmas of noise.
 constexpr double kSystematic = 0.04;
-constexpr double kCertain = 3.0;  // sigmas
+constexpr double kCertain = 3.0;
 
 }  // namespace
 
@@ -21,7 +20,7 @@ FocalMeasurement check_focal_length(const RigSolution& found,
   if (!(m.configured_px > 0)) return m;
   const double off = std::abs(lens.fx / m.configured_px - 1);
   if (found.status == RigSolveStatus::not_converged && off > kFocalPriorSigma) {
-    // Still on its way, and already far: the right one is farther.
+    // The solve has not converged but is already far off, and the true value is farther.
     m.measured_px = lens.fx;
     m.contradicted = true;
   } else if (found.status == RigSolveStatus::ok && lens.sigma[0] > 0) {

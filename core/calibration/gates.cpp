@@ -14,29 +14,29 @@
 namespace vergence::calibration {
 namespace {
 
-// Held-out frames below which no test is made.
+// Minimum number of held-out frames of a test.
 constexpr int kMinHeldOut = 3;
-// Median distance from the epipolar lines, px, above which held-out frames contradict a solution.
+// Median distance in px from the epipolar lines above which held-out frames contradict a solution.
 constexpr double kWorstFit = 1.5;
-// The distance on held-out frames may be kTimesUsed times that on the frames used, or kMinMisfit
-// px; on recorded drives both are 0.08 to 0.25 px.
+// On held-out frames the distance may be kTimesUsed times that on the frames used, or kMinMisfit
+// px; on recorded sequences both are 0.08 to 0.25 px.
 constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
-// Sigma of the rotation between two cameras that no epipolar line shows, rad: of a calibration
-// without sigmas that is the rig's, and of one that is not. The first lets every published
-// calibration of the seven recorded drives be verified (robustness_bench drives), the second is the
-// size of a mounting error; both are chosen.
+// Sigma in rad of the rotation that no epipolar line shows: for a calibration without sigmas that
+// is the rig's, and for one that is not. With the first, every published calibration of the seven
+// recorded sequences is verified (robustness_bench drives); the second is the size of a mounting
+// error.
 constexpr double kMakersTurn = 1e-3, kOtherTurn = 15e-3;
-// Prior probability that a supplied calibration is not the rig's, and the rate of wrong decisions
-// about it, either way; both are chosen.
+// Prior probability that a supplied calibration is not the rig's, and rate of wrong decisions about
+// it; both are chosen.
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
-// Ratio of sigmas below which a measurement may replace a supplied calibration: it then has nine
-// times the information, so the result rests on the drive.
+// Ratio of sigmas below which an estimate may replace a supplied calibration: it then has nine
+// times the information.
 constexpr double kShareOfCurrent = 1.0 / 3;
-// Path that a solve needs, in baselines.
+// Minimum path length of a solve, in baselines.
 constexpr double kMinBaselinesTravelled = 3.0;
 
-/// Median distance to the epipolar lines of one frame's matches of the left camera and camera k,
-/// px; negative: hardly a match.
+/// Median distance in px of one frame's matches between the left camera and camera k to the
+/// epipolar lines; negative if there are too few.
 double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int k) noexcept {
   const auto other = static_cast<std::size_t>(k);
   const Camera left(rig.intrinsics[0]), right(rig.intrinsics[other]);
@@ -58,7 +58,7 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
   return median(std::span(distance).first(n));
 }
 
-/// Calls `each` for the newest frames after a number.
+/// Calls `each` for at most kHeldOutFrames newest frames after frame number `after`.
 template <class Each>
 void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept {
   std::size_t n = 0;
@@ -67,7 +67,6 @@ void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept 
     each(log.frame(i));
 }
 
-/// Median of frames' medians; px.
 HeldOut fit_of(std::span<double> medians) noexcept {
   HeldOut h;
   h.frames = static_cast<int>(medians.size());
@@ -100,8 +99,8 @@ HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibrat
   return fit_of(std::span(medians).first(n));
 }
 
-/// Returns true if frames that were not used contradict camera k of `rig`, measured by the fit of
-/// `solved` on the frames it was solved from.
+/// Returns true if held-out frames contradict camera k of `rig`, compared with the fit of `solved`
+/// on its own frames.
 bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
                   std::uint64_t newest, int k) noexcept {
   const HeldOut fit = fit_of_held_out(log, newest, rig, k);
@@ -151,8 +150,7 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
     bool compared = false;
     for (int k = 1; k < better.cameras; ++k) {
       const double a = median_distance(f, worse, k), b = median_distance(f, better, k);
-      // Without a match by which to tell: the one that was searched with the other's band is no
-      // witness.
+      // A calibration without enough matches in this frame cannot be compared.
       if (a < 0 || b < 0) continue;
       gain += a - b;
       compared = true;
@@ -177,12 +175,12 @@ double log_odds_of(double difference, double measured, double current, double ot
   return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
 }
 
-/// Sigma of the relative depth of a calibration, if it is the rig's, percent.
+/// Sigma of the relative depth of a calibration that is the rig's, in percent.
 double current_percent(const RigCalibration& current, int k, double depth,
                        const CalibrationOptions& o) noexcept {
   const double own = depth_error_percent(current, k, depth);
   const double by_turn = 100 * depth / current.T_camera_left[static_cast<std::size_t>(k)].t.norm();
-  // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
+  // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
   return own > 0 ? std::hypot(own, 1e-3 * o.extrinsic_random_walk_mrad_per_sqrt_h * by_turn)
                  : kMakersTurn * by_turn;
 }
@@ -196,7 +194,8 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
                certain = std::log((1 - kErrorRate) / kErrorRate);
   Assessment a;
   a.verified = true;
-  bool sharper = true;  // every camera's depth is determined better than by the one in use
+  // True if every camera's depth is determined better than by the calibration in use.
+  bool sharper = true;
   double worst = 0;
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = reference_depth_m(measured, k, o, pixel_sigma);
@@ -228,8 +227,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
                   1e3 * turn};
   }
   a.worse = fits_better(log, after, current, measured);
-  // In a full window a misfit to the epipolar lines cannot be an accident of where the structure
-  // was.
+  // In a full window a misfit to the epipolar lines cannot be due to the position of the structure.
   const bool lines =
       misfits(log, after, measured, current) || (sharper && measured.frames >= o.max_frames);
   a.better =

@@ -12,11 +12,11 @@ namespace vergence::calibration {
 /// their epipolar lines.
 struct HeldOut {
   int frames = 0;
-  double median_px = 0;  // of the frames' medians
+  double median_px = 0;
 };
 
 /// Measures the fit on frames newer than frame number `after`: at most the newest kHeldOutFrames,
-/// and at most kHeldOutMatches of each. With more than one further camera the worst one counts, in
+/// and at most kHeldOutMatches of each. With several additional cameras the worst one counts, in
 /// its own pixels. Pure.
 inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 [[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after,
@@ -24,40 +24,40 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 
 /// Returns true if `better` fits those frames better than `worse` by more than chance: the mean
 /// over frames of the difference of medians exceeds `chance` of its standard errors. Also true if
-/// hardly any frame can be compared. With more than one further camera the gains are added, so that
-/// a knocked camera is not outweighed by another one that a short drive determines slightly less
-/// well. Pure.
+/// too few frames can be compared. The gains of several cameras are added, so that a knocked one
+/// outweighs one that is determined slightly less well. Pure.
 inline constexpr double kChance = 2.0;
-/// For a test that is repeated with every solve.
+/// Value of `chance` for a test that is repeated with every solve.
 inline constexpr double kRareChance = 3.0;
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;
 
-/// Comparison of the calibration in use with the drive's own measurement of the rig.
+/// Comparison of the calibration in use with the online estimate.
 ///
 /// The difference d of their depths at reference_depth_m() decides between two hypotheses: the rig
 /// is the one of the calibration in use, whose error is usual for its kind (sigma m), or it is
-/// another one (sigma M). With s, the sigma of the measurement,
+/// another one (sigma M). With s, the sigma of the estimate,
 ///
 ///     log_odds = log N(d; 0, m² + s²) − log N(d; 0, M² + s²).
 struct Assessment {
-  /// Depth of the comparison: reference_depth_m().
+  /// Depth of the comparison, from reference_depth_m().
   double depth_m = 0;
-  /// Sigma of the measured calibration's depth there.
   double sigma_percent = 0;
   /// Difference of the depths there, root mean square over the image.
   double difference_percent = 0;
+
   /// Log odds that the rig is the one of the calibration in use.
   double log_odds = 0;
-  /// Evidence for it, or against it if log_odds is negative.
+  /// Evidence for that, or against it if log_odds is negative.
   ChangeEvidence evidence;
-  /// True if the measured calibration is significantly nearer to the rig in depth.
+
+  /// True if the estimate's depths are significantly more accurate.
   bool nearer = false;
-  /// True if the measured calibration should replace the one in use: it is nearer and fits
-  /// held-out frames no worse, or it fits them better where the one in use misses them.
+  /// True if the estimate should replace the calibration in use: it is nearer and fits held-out
+  /// frames no worse, or it fits them better where the one in use misses them.
   bool better = false;
-  /// True if the measured calibration fits held-out frames worse.
+  /// True if the estimate fits held-out frames worse.
   bool worse = false;
   /// True if the rig is the one of the calibration in use, and its depths are within the tolerated
   /// error.
@@ -66,16 +66,17 @@ struct Assessment {
   bool contradicted = false;
 };
 
-/// Origin of the calibration in use. The sigma of one that was solved from this drive is not
-/// independent of the measurement and is not combined with it.
+/// Origin of the calibration in use. One that was solved from this run is not independent of the
+/// estimate, so the two are not averaged.
 enum class CalibrationOrigin : std::uint8_t { elsewhere, this_drive };
 
-/// Assesses the worst of the rig's further cameras. `log` holds frames newer than frame number
+/// Assesses the worst additional camera of the rig. `log` holds frames newer than frame number
 /// `after`, which `measured` was not solved from. Pure.
 [[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& current,
                                 CalibrationOrigin source, const TrackLog& log, std::uint64_t after,
                                 const CalibrationOptions& options, double pixel_sigma) noexcept;
 
+/// Result of checking a solution: `open`, or the first gate that rejects it.
 enum class Gate : std::uint8_t {
   open,
   not_solved,
@@ -85,15 +86,19 @@ enum class Gate : std::uint8_t {
   implausible_direction,
   implausible_rotation,
   out_of_sync,
-  does_not_fit,   // held-out frames contradict it
-  no_better,      // than the calibration in use: that one is kept
-  rig_changed,    // among the frames it was solved from
-  depth_unknown,  // the tracks do not determine the depth well enough yet
+  /// Held-out frames contradict the solution.
+  does_not_fit,
+  /// The solution is no better than the calibration in use, which is kept.
+  no_better,
+  /// The rig changed among the frames of the solve.
+  rig_changed,
+  /// The tracks do not determine the depth well enough yet.
+  depth_unknown,
 };
-/// Message for events.jsonl and calibrations.csv; empty for `open`. A constant.
+/// Returns the message for events.jsonl and calibrations.csv, a constant; empty for `open`.
 [[nodiscard]] const char* reason(Gate gate) noexcept;
 
-/// Returns true if a solution that this gate stopped still is a measurement of the present rig.
+/// Returns true if a solution that this gate rejected is still a measurement of the present rig.
 [[nodiscard]] constexpr bool of_this_rig(Gate gate) noexcept {
   switch (gate) {
     case Gate::not_solved:
@@ -117,28 +122,29 @@ enum class Gate : std::uint8_t {
 struct AcceptanceInput {
   const RigSolution* solution = nullptr;
   const RigCalibration* nominal = nullptr;
-  const RigCalibration* in_use = nullptr;  // null: there is none
-  /// Log with the frames since the snapshot; null: none to compare with.
+  /// Null if no calibration is in use.
+  const RigCalibration* in_use = nullptr;
+  /// Log with the frames since the snapshot; null to skip the tests on held-out frames.
   const TrackLog* log = nullptr;
-  double pixel_sigma = 0.15;  // px, of a tracked corner: reference_depth_m()
-  /// True if a change of the rig among the frames used closes the gate. It may do so once only:
-  /// a false one would close it indefinitely.
+  /// Standard deviation of a tracked corner in pixels, for reference_depth_m().
+  double pixel_sigma = 0.15;
+  /// True if a change of the rig among the frames closes the gate. Only one change may, because a
+  /// repeated false detection would close it indefinitely.
   bool may_have_changed = true;
   /// True if the solution must fit held-out frames better than `in_use`.
   bool must_be_better = true;
 };
 
-/// Decides whether a solution may be used. Returns the first gate that stops it, or
-/// `open`. Pure.
+/// Returns the first gate that rejects a solution, or `open`. Pure.
 [[nodiscard]] Gate check_acceptance(const AcceptanceInput& question,
                                     const CalibrationOptions& options) noexcept;
 
 /// Returns true if the log has enough frames newer than frame number `after` to test a solution.
 [[nodiscard]] bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept;
 
-/// Ratio of the sigma of a depth measured with `rig`, at reference_depth_m() and with the worst of
-/// its further cameras, to usable_depth_percent; a solution with more than 1 is not adopted. With
-/// fixed intrinsics it is the sigma by noise.
+/// Ratio of the depth's sigma, at reference_depth_m() and for the worst additional camera, to
+/// usable_depth_percent; a solution with more than 1 is not adopted. With fixed intrinsics only
+/// noise counts.
 [[nodiscard]] double depth_excess(const RigCalibration& rig, const CalibrationOptions& options,
                                   double pixel_sigma) noexcept;
 

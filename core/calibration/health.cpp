@@ -8,7 +8,8 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kRatingDepth = 20;  // m
+// Depth of the rating, in metres.
+constexpr double kRatingDepth = 20;
 
 }  // namespace
 
@@ -46,7 +47,8 @@ double depth_error_percent(const RigCalibration& measured, const RigCalibration&
 double reference_depth_m(const RigCalibration& rig, int k, const CalibrationOptions& options,
                          double pixel_sigma) noexcept {
   const auto c = static_cast<std::size_t>(k);
-  constexpr double kOfTolerance = 0.5;  // the share of it that a single match's noise takes
+  // Share of the tolerance for the noise of a single match.
+  constexpr double kOfTolerance = 0.5;
   const double tolerated_px =
       std::sqrt(2.0) * pixel_sigma / (kOfTolerance * 0.01 * options.max_depth_error_percent);
   return std::min(options.reference_depth_m,
@@ -57,7 +59,7 @@ double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept {
   double best = 0;
   for (int k = 1; k < rig.cameras; ++k) {
     const double error = depth_error_percent(rig, k, depth_m);
-    // Zero: no direction is seen by both, or the pair has no covariance.
+    // The error is zero if no direction is seen by both cameras, or the pair has no covariance.
     if (error > 0 && (best == 0 || error < best)) best = error;
   }
   return best;

@@ -8,29 +8,31 @@
 namespace vergence::calibration {
 
 enum class CalibrationRating : std::uint8_t { good, can_be_improved, recalibrate };
-/// `good`, `can be improved`, `recalibrate`.
+/// Returns `good`, `fair` or `poor`.
 [[nodiscard]] std::string_view to_string(CalibrationRating) noexcept;
 
-inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};  // m
+/// Depths at which errors are reported, in metres.
+inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};
 
 /// Sigma of a depth measured with camera 0 and camera `k` that the calibration's uncertainty
 /// causes, percent of the depth.
 ///
 /// Root mean square over a grid of directions that both cameras see. The relative depth's gradient
-/// is propagated through the first of these that the rig has: `covariance` (lenses included),
-/// covariance_total of the transform, the sigmas of the transform; 0 without any. Matching noise is
-/// not included. Pure.
+/// is propagated through the first of these that the rig has: `covariance` (intrinsics included),
+/// covariance_total of the transform, or its sigmas; 0 without any. Matching noise is not included.
+/// Pure.
 [[nodiscard]] double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept;
 
-/// Difference of the depths that two calibrations give to the same pairs of pixels, for points that
-/// `measured` puts at depth_m: root mean square over the image, percent of the inverse depth. Pure.
+/// Difference of the depths that two calibrations assign to the same pairs of pixels, for points
+/// that `measured` puts at depth_m: root mean square over the image, in percent of the inverse
+/// depth. Pure.
 [[nodiscard]] double depth_error_percent(const RigCalibration& measured,
                                          const RigCalibration& current, int k,
                                          double depth_m) noexcept;
 
-/// Depth at which a calibration must be within `max_depth_error_percent`, m:
-/// options.reference_depth_m, or nearer for short baselines, where the noise of one match with that
-/// pixel sigma is half of the tolerance.
+/// Depth in metres at which a calibration must be within `max_depth_error_percent`:
+/// options.reference_depth_m, or for short baselines the depth at which the noise of one match is
+/// half of that.
 [[nodiscard]] double reference_depth_m(const RigCalibration& rig, int k,
                                        const CalibrationOptions& options,
                                        double pixel_sigma) noexcept;

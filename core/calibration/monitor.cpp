@@ -13,9 +13,11 @@ namespace {
 
 using Kind = MonitorResult::Kind;
 
-constexpr int kStandingFrames = 3;       // in a row over the threshold while standing
-constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are
-                                         // less normal than the sum of many frames'
+// Number of consecutive frames above the threshold that raise a knock at standstill.
+constexpr int kStandingFrames = 3;
+// Factor of the threshold at standstill: the errors of a single frame are less Gaussian than the
+// sum over many frames.
+constexpr double kStandingFactor = 1.5;
 
 void check(bool good, const char* name, const char* range) {
   if (!good)
@@ -100,7 +102,7 @@ void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
   const bool missing = frame.expected_stereo >= options.collapse_expected &&
                        frame.found_stereo < options.collapse_share * frame.expected_stereo;
   if (missing && collapsed == 0) collapsed_from = frame.frame;
-  // A frame that expects nothing (night, a covered lens) neither adds nor takes away.
+  // A frame without expected matches (night, a covered lens) does not count.
   if (missing)
     ++collapsed;
   else if (frame.expected_stereo >= options.collapse_expected)
@@ -129,8 +131,8 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame,
                                     const detail::StereoResiduals& residuals) noexcept {
-  if (latest.kind != Kind::quiet && standing_over < kStandingFrames)
-    return;  // what moving frames have found stands
+  // Keep what moving frames have detected.
+  if (latest.kind != Kind::quiet && standing_over < kStandingFrames) return;
   latest.statistic = windows.single(residuals.evidence, residuals.spread_now) / kStandingFactor;
   latest.shift_px = detail::shift_px(residuals.evidence);
   if (latest.statistic > options.threshold) {

@@ -9,11 +9,11 @@
 
 namespace vergence::calibration {
 
-/// Options of `monitor:`; the configuration's schema has a row for each field. docs/design.md
-/// describes what the defaults achieve.
+/// Options of `monitor:`; the configuration's schema has a row for each. docs/design.md describes
+/// what the defaults achieve.
 struct MonitorOptions {
-  /// Value of the statistic that raises a knock or a drift, 20 … 500; the default gives at least
-  /// 80 h between false alarms.
+  /// Value of the statistic that raises a knock or a drift, 20 … 500; the default gives at least 80
+  /// h between false alarms.
   double threshold = 45.0;
   /// Minimum of the slowly varying error of vertical differences that is tolerated, px rms over the
   /// image, 0 … 1.
@@ -37,46 +37,58 @@ struct MonitorOptions {
   int collapse_expected = 40;
 };
 
-/// A point seen by the left camera and by camera k in one frame. Ideal pinhole pixels (distortion
-/// removed), each camera's own K. Searched for in a band wide enough that the calibration in use
-/// did not force the answer.
+/// A point seen by the left camera and camera k in one frame, in undistorted pixels of each
+/// camera's own K. Its match was searched for in a band wide enough not to depend on the
+/// calibration in use.
 struct StereoObservation {
   Vec2 left, right;
-  double sigma_px =
-      0;  // of one coordinate, > 0; a common factor does not matter, the spread is measured
-  std::uint32_t track = 0;  // the same number in every frame that sees the same point
+  /// Standard deviation of one coordinate, > 0. A common factor has no effect, because the spread
+  /// is measured.
+  double sigma_px = 0;
+  /// Number of the point, the same in all frames.
+  std::uint32_t track = 0;
 };
 
 /// Input of one frame. The views must stay valid until update() returns.
 struct MonitorFrame {
-  std::uint64_t frame = 0;  // strictly increasing
-  bool moving = false;      // false: the images repeat themselves, so their errors do not average
+  /// Frame number; strictly increasing.
+  std::uint64_t frame = 0;
+  /// False at standstill, where images repeat and their errors do not average out.
+  bool moving = false;
   std::span<const StereoObservation> stereo;
-  int expected_stereo =
-      0;  // matches a good pair of images would give; 0 where either image is poor by itself
-  int found_stereo = 0;  // matches there are
+  /// Number of matches that a good pair of images would give; 0 if either image is poor.
+  int expected_stereo = 0;
+  int found_stereo = 0;
 };
 
 /// Result of the monitor after one frame.
 struct MonitorResult {
-  enum class Kind : std::uint8_t {  // in order of weight
+  /// Kind of change, in order of severity.
+  enum class Kind : std::uint8_t {
     quiet,
-    drift,     // the transform has been changing steadily
-    knock,     // it has changed at a moment
-    collapse,  // matches are expected and not there: too far off to be measured
+    /// The transform has been changing steadily.
+    drift,
+    /// The transform has changed suddenly.
+    knock,
+    /// Expected matches are missing: the change is too large to be measured.
+    collapse,
   };
   Kind kind = Kind::quiet;
-  bool undecided = false;   // over the threshold in one frame, which may be an outlier
-  double statistic = 0;     // largest of all windows
-  double threshold = 0;     // the limit of `statistic`
-  ChangeEvidence evidence;  // of `kind`, if that is a knock or a drift
-  std::uint64_t onset_frame =
-      0;  // knock: first frame of the changed rig; drift: where it began; else `frame`
-  int frames_since_onset = 0;  // frames measured since then
+  /// True if a single frame exceeds the threshold, which may be an outlier.
+  bool undecided = false;
+  /// Largest statistic of all windows.
+  double statistic = 0;
+  double threshold = 0;
+
+  /// Evidence for a knock or a drift.
+  ChangeEvidence evidence;
+  /// First frame of the changed rig after a knock, start of a drift, else `frame`.
+  std::uint64_t onset_frame = 0;
+  /// Number of frames measured since the onset.
+  int frames_since_onset = 0;
 };
 
-/// Tests whether the transform of one further camera still holds. One Monitor per
-/// further camera.
+/// Tests whether the transform of one additional camera still holds.
 ///
 /// The distances of a frame's stereo matches from their epipolar lines give a gradient g and an
 /// information matrix A of θ = (φ, α, β), the five parameters of moved_on_sphere(). Over a window
@@ -85,15 +97,15 @@ struct MonitorResult {
 ///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²
 ///     statistic = gᵀ (A + A C A)⁻¹ g
 ///
-/// λ is the measured inflation: variance of the gradient with errors correlated along tracks, over
-/// the one of independent errors. b is MonitorOptions::bias_px or the measured scatter. C is the
-/// covariance of the reference. A turn about the axis that no epipolar line shows (yaw, for cameras
-/// side by side) is seen by DisparityJumpDetector and by solves.
+/// λ is the measured inflation of the gradient's variance by errors correlated along tracks. b is
+/// MonitorOptions::bias_px or the measured scatter. C is the covariance of the reference.
+/// DisparityJumpDetector and solves detect the rotation that no epipolar line shows (yaw, for
+/// cameras side by side).
 ///
-/// Small knocks are found by a second test: the window is compared with the estimate of the two
-/// minutes before it, whose covariance is smaller than the reference's. Windows have a few to
-/// several hundred moving frames; the largest statistic counts. Frames of a standing rig are tested
-/// one by one against a higher threshold, because their errors repeat.
+/// A second test finds small knocks: it compares the window with the two minutes before it, whose
+/// covariance is smaller than the reference's. Windows have a few to several hundred moving frames;
+/// the largest statistic counts. Frames of a standing rig are tested one by one against a higher
+/// threshold, because their errors repeat.
 ///
 ///     Arena arena(Monitor::memory_needed(options));
 ///     Monitor monitor(options, arena);
@@ -104,8 +116,8 @@ struct MonitorResult {
 /// Memory   All of it from the arena in the constructor. update() allocates nothing.
 /// Threads  One caller.
 /// Time     Under 0.1 ms for 300 stereo matches.
-/// Errors   The constructor throws (std::invalid_argument with a message, std::length_error). What
-///          is not a number is left out.
+/// Errors   The constructor throws (std::invalid_argument with a message, std::length_error).
+///          Values that are not finite are left out.
 class Monitor {
  public:
   [[nodiscard]] static std::size_t memory_needed(const MonitorOptions& options) noexcept;
@@ -113,24 +125,25 @@ class Monitor {
 
   /// Sets the calibration to test, X_k = T_camera_left X_left, and clears all evidence.
   /// `covariance` is of its left perturbation (rad, m) by noise alone: errors of the intrinsics
-  /// show in no residual, so the total covariance would make the monitor insensitive. False: |t| is
-  /// zero or something is not finite; then every update() is quiet.
+  /// show in no residual, so the total covariance would make the monitor insensitive. Returns false
+  /// if |t| is zero or a value is not finite; then every update() is quiet.
   bool set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right,
                      const Mat6& covariance) noexcept;
 
-  /// Sets the scatter that lens errors are expected to cause between stretches of a drive, px rms
-  /// over the image, until it is measured; at least monitor.bias_px, which is also the default. It
-  /// survives set_reference() and reset(), as the measured scatter does.
+  /// Sets the scatter that lens errors are expected to cause between stretches of a run until it is
+  /// measured, in px rms over the image; at least monitor.bias_px, the default. It survives
+  /// set_reference() and reset(), as the measured scatter does.
   void expect_scatter(double bias_px) noexcept;
 
   [[nodiscard]] MonitorResult update(const MonitorFrame& frame) noexcept;
 
-  /// Clears all evidence (the scene was lost); the reference stays.
+  /// Clears all evidence because the map was lost; the reference stays.
   void reset() noexcept;
 
  private:
   struct Parts;
-  Parts* parts_;  // in the arena
+  // Constructed in the arena.
+  Parts* parts_;
 };
 
 }  // namespace vergence::calibration

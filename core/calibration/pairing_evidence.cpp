@@ -10,15 +10,17 @@ namespace vergence::calibration {
 namespace {
 
 constexpr std::size_t kMinPoints = 25;
-constexpr double kNoise = 0.2;  // px: what two positions known to 0.15 px leave
-// Errors of one frame's points have causes in common (rolling shutter, a lens): they count for so
-// many independent ones, and for no more than one log-likelihood each.
+// Noise of the distance in px, from two positions known to 0.15 px.
+constexpr double kNoise = 0.2;
+// Number of independent points that a frame counts for, because its errors share causes (rolling
+// shutter, a lens). Each counts at most one log-likelihood.
 constexpr double kPointsOfAFrame = 5;
-// Page's reference value: what chance makes of the ratio of two widths, each known to a tenth, of a
-// rig that stands. Without it the sum would wander up to any bound.
+// Page's reference value: the log ratio by chance of two widths at standstill, each known to a
+// tenth. Without it the sum would drift above any bound.
 constexpr double kReference = 0.25;
-constexpr double kFollow = 0.1;  // of the usual width, a frame
-// A wrong decision once in a million times (Wald 1945): three frames at least.
+// Update rate of the usual width, per frame.
+constexpr double kFollow = 0.1;
+// Threshold for one wrong decision in a million (Wald 1945); takes at least three frames.
 constexpr double kDecided = 13.8;
 
 Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {

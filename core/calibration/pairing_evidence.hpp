@@ -9,36 +9,36 @@
 
 namespace vergence::calibration {
 
-/// Tests which images of two cameras are of the same instant: the left image and the
-/// camera's of one frame, or the left image of the frame before and the camera's (the camera is a
-/// frame late), or the other way round (the left one is late).
+/// Tests which images of two cameras are from the same instant: those of one frame, or the previous
+/// left image and the camera's (the camera is a frame late), or the other way round (the left
+/// camera is late).
 ///
 /// In the true pairing the points' distances from the epipolar lines have their usual spread w.
-/// With a and b the median distances in this frame's pairing and in the shifted one, the
-/// log-likelihood ratio of a point for the shifted pairing is ln(a / w) − (b²/w² − 1)/2: positive
-/// where the shifted distances are usual and this frame's are not, negative after a knock, when
-/// neither are, and zero for a rig that stands. With a and b exchanged it is the ratio for this
-/// frame's pairing. Sums that never fall below zero are Page's test (E. S. Page, Biometrika 41,
-/// 1954).
+/// With median distances a in this frame's pairing and b in the shifted one, a point's
+/// log-likelihood ratio for the shifted pairing is ln(a / w) − (b²/w² − 1)/2: positive if only the
+/// shifted distances are usual, negative after a knock, zero at standstill. Exchanging a and b
+/// gives the ratio for this frame's pairing. Sums that never fall below zero are Page's test (E. S.
+/// Page, Biometrika 41, 1954).
 ///
 /// Memory   From the arena; points beyond `capacity` are left out.
-/// Threads  One caller. Time: linear but for a sort of the points.
+/// Threads  One caller. Time: linear, except for sorting the points.
 class PairingEvidence {
  public:
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   PairingEvidence(std::size_t capacity, Arena& arena);
 
-  /// Frames in order, each with the points that both cameras show, which are put in order of their
-  /// tracks. X_k = T_camera_left X_left. Only successive frames, by their numbers, are compared.
+  /// Processes the next frame with the points that both cameras show, and sorts these by track. X_k
+  /// = T_camera_left X_left. Only frames with consecutive numbers are compared.
   void next(std::uint64_t frame, std::span<StereoObservation> points,
             const Transform& T_camera_left, const Pinhole& left, const Pinhole& camera) noexcept;
-  /// Median distance of the newest frame's points from their epipolar lines, px; 0 without any.
+  /// Median distance of the newest frame's points from their epipolar lines, in px; 0 without
+  /// points.
   [[nodiscard]] double distance_px() const noexcept { return distance_px_; }
-  /// Lag in frames: 1 if the camera is late, −1 if the left one is, 0 if no lag is known.
+  /// Lag in frames: 1 if the camera is late, −1 if the left one is, 0 if no lag is detected.
   [[nodiscard]] int lag_frames() const noexcept;
-  /// True if one or two frames speak for a lag: other conclusions from them are unreliable.
+  /// True if one or two frames indicate a lag, so other conclusions from them are unreliable.
   [[nodiscard]] bool suspected() const noexcept;
-  /// Call when an image came twice: a camera may be a frame late from now on.
+  /// Call when an image was repeated: a camera may be a frame late from now on.
   void question() noexcept {
     questioned_ = true;
     in_step_[0] = in_step_[1] = 0;
@@ -47,7 +47,7 @@ class PairingEvidence {
   [[nodiscard]] bool questioned() const noexcept { return questioned_; }
   /// True if motion since the last lag or question() has shown that the cameras are in sync.
   [[nodiscard]] bool cameras_in_sync() const noexcept;
-  /// Call when the scene was lost: clears all evidence.
+  /// Call when the map was lost: clears all evidence.
   void reset() noexcept {
     count_ = 0;
     usual_px_ = 0;
@@ -55,14 +55,15 @@ class PairingEvidence {
   }
 
  private:
-  std::span<StereoObservation> before_;  // in order of their tracks
-  std::size_t count_ = 0;                // of before_
+  // Points of the previous frame, sorted by track.
+  std::span<StereoObservation> before_;
+  std::size_t count_ = 0;
   std::span<float> now_, late_px_, early_px_;
-  std::uint64_t frame_ = 0;  // of before_
+  std::uint64_t frame_ = 0;
   double distance_px_ = 0, usual_px_ = 0;
   bool questioned_ = false;
-  // Log-likelihood ratios, not below zero: that the camera is late, or the left one, against in
-  // step, and the other way round.
+  // Log-likelihood ratios, at least zero, for and against a shifted pairing: [0] the camera is
+  // late, [1] the left one is.
   std::array<double, 2> shifted_{}, in_step_{};
 };
 

@@ -6,9 +6,11 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kAnyRotation = 0.2;   // rad, sigma of what may be anything
-constexpr double kAnyDirection = 0.2;  // of t, in baselines
-// Random walk of the lenses relative to that of the extrinsics; temperature causes both.
+// Sigma of an unknown rotation, in rad.
+constexpr double kAnyRotation = 0.2;
+// Sigma of an unknown translation, in baselines.
+constexpr double kAnyDirection = 0.2;
+// Random walk of the intrinsics relative to that of the extrinsics; temperature causes both.
 constexpr double kFocalOfDrift = 0.3, kCentreOfDrift = 0.3, kDistortionOfDrift = 1.0;
 
 void widen(RigCovariance* C, int row, double sigma) noexcept {

@@ -7,7 +7,7 @@ namespace vergence::calibration {
 /// Widens the joint covariance of a calibration by the random walk of `hours`. Pure.
 void let_drift(double hours, const CalibrationOptions& options, RigCalibration* rig) noexcept;
 
-/// Marks the transforms as unknown and keeps the lenses: for cameras that may have been moved.
+/// Marks the transforms as unknown and keeps the intrinsics, because cameras may have been moved.
 /// Pure.
 void clear_transforms(RigCalibration* rig) noexcept;
 

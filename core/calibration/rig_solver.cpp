@@ -9,24 +9,29 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kFramesATrack = 3;  // at least, on average: sizes the points
-constexpr std::size_t kLanesABlock = 2;   // of the eight, at least, on average: sizes the blocks;
-                                          // recorded drives fill 4.9 to 7.0
+// Minimum average number of frames per track, which determines the capacity for points.
+constexpr std::size_t kFramesATrack = 3;
+// Minimum average number of used lanes of a block's eight, which determines the capacity for
+// blocks; recorded sequences use 4.9 to 7.0.
+constexpr std::size_t kLanesABlock = 2;
 constexpr int kMinTracks = 60;
-constexpr int kMinCandidateMatches =
-    40;  // across, of the frame whose own transform begins the solve
-constexpr double kHuber = 2.0, kCauchy = 2.5;  // residual scales
-constexpr double kFirstCut = 6.0,
-                 kLastCut = 4.0;  // residual scales beyond which a observation is left out
-constexpr int kMaxSteps = 60, kMaxFocalSteps = 200;  // of the last adjustment
-constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
+// Minimum number of stereo matches of the frame whose transform initialises the solve.
+constexpr int kMinCandidateMatches = 40;
+// Loss thresholds, in residual scales.
+constexpr double kHuber = 2.0, kCauchy = 2.5;
+// Limits above which an observation is left out, in residual scales.
+constexpr double kFirstCut = 6.0, kLastCut = 4.0;
+// Maximum numbers of steps of the last adjustment.
+constexpr int kMaxSteps = 60, kMaxFocalSteps = 200;
+// Median length of a vector of two standard normal numbers.
+constexpr double kMedianOfTwo = 1.1774;
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
       .count();
 }
 
-/// A camera whose pose was not found yet lies where the left one is.
+/// True if the poses of all cameras were found; one without a pose is placed at the left camera.
 bool all_placed(const LoggedFrame& f, int cameras) noexcept {
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k)
     if (!f.T_camera_left[k].finite() || !(f.T_camera_left[k].t.norm() > 0)) return false;
@@ -103,7 +108,7 @@ bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
     T_camera_left_[c] = best->T_camera_left[c];
     T_camera_left_[c].R = normalised(T_camera_left_[c].R);
   }
-  // The known length is camera 1's; what the others were measured to goes with it.
+  // The known baseline is camera 1's; the other baselines are scaled with it.
   const double factor = rig.baseline / T_camera_left_[1].t.norm();
   for (int k = 1; k < count_; ++k) T_camera_left_[static_cast<std::size_t>(k)].t *= factor;
   T_camera_left_[0] = {};
@@ -117,7 +122,7 @@ bool RigSolver::begin_with(const RigSolveRequest& request) noexcept {
   return T_camera_left_[1].t.norm() > 0;
 }
 
-/// As many of the logged frames as there is room for, counted from the newest, so that it is in.
+/// Chooses every n-th frame counted back from the newest, as many as there is room for.
 void RigSolver::choose_frames() noexcept {
   std::size_t observations = 0;
   for (std::size_t i = 0; i < log_.size(); ++i) observations += log_.frame(i).observations.size();
@@ -159,7 +164,7 @@ void RigSolver::drop_outliers(double limit) noexcept {
     for (; i < observations_.size() && observations_[i].point == point; ++i)
       if (static_cast<double>(residuals_[i]) < limit * limit)
         observations_[kept++] = observations_[i];
-    // A point must keep three observations of at least two cameras, to be determined and to
+    // A point must keep three observations from at least two cameras, to be determined and to
     // constrain the rig.
     unsigned cameras = 0;
     for (std::size_t j = first; j < kept; ++j) cameras |= 1U << observations_[j].camera;
@@ -169,8 +174,8 @@ void RigSolver::drop_outliers(double limit) noexcept {
   observations_.truncate(kept);
 }
 
-/// Huber, then Cauchy twice, each time without what lies beyond some scales of the residuals;
-/// covariances with the last.
+/// Solves with Huber's loss, then twice with Cauchy's after removing outliers; the last solve
+/// computes covariances.
 BundleResult RigSolver::adjust_robustly(BundleOptions how, int max_steps, RigSolution* s) noexcept {
   how.loss = BundleLoss::huber;
   how.loss_threshold = kHuber;
@@ -213,18 +218,20 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   if (points_.size() < static_cast<std::size_t>(kMinTracks)) return s;
   hold_pieces();
   s.status = RigSolveStatus::not_converged;
-  // To a focal length that is a quarter off it is a hundred steps and more.
+  // A focal length with an error of a quarter takes more than a hundred steps.
   const int max_steps = request.measure_focal_lengths ? kMaxFocalSteps : kMaxSteps;
   const BundleResult r = adjust_robustly(options_of(request), max_steps, &s);
   if (!r.converged()) {
-    if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();  // how far it came
+    // Report the focal length reached so far.
+    if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();
     return s;
   }
   describe(&s);
   s.status = r.has_covariance ? RigSolveStatus::ok : RigSolveStatus::not_observable;
   if (s.status == RigSolveStatus::ok) {
     write_result(r, &s);
-    if (request.known != nullptr)  // over months: no sum beyond what it holds
+    // Limit the sum, which grows over months.
+    if (request.known != nullptr)
       s.rig.frames += std::min(request.known->frames, std::numeric_limits<int>::max() / 2);
     watch_frames(&s);
   }

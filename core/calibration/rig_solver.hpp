@@ -13,55 +13,63 @@ namespace vergence::calibration {
 
 enum class RigSolveStatus : std::uint8_t {
   ok,
-  too_few_tracks,  // hardly a point was seen by both cameras in two frames
-  no_candidate,    // in no frame the cameras' own poses were found
+  /// Hardly any point was seen by both cameras in two frames.
+  too_few_tracks,
+  /// The cameras' own poses were found in no frame.
+  no_candidate,
   not_converged,
-  not_observable,  // converged, but the tracks leave some direction of the transform open
+  /// The solve converged, but the tracks do not determine all directions of the transform.
+  not_observable,
 };
 
-/// Prior sigma of every focal length in a solve with `measure_focal_lengths`, as a share of it.
+/// Relative prior sigma of every focal length in a solve with `measure_focal_lengths`.
 inline constexpr double kFocalPriorSigma = 0.1;
 
 /// Start, prior and free parameters of a solve. `known` and `given` are read during solve() only.
-/// CalibrationOptions::intrinsics chooses the intrinsics that are estimated with the transforms:
-/// with `full`, those of the further cameras and the distortion of all.
+/// CalibrationOptions::intrinsics selects the intrinsics that are estimated.
 struct RigSolveRequest {
-  RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
-  /// Also estimates every focal length with the prior sigma kFocalPriorSigma, the left camera's
-  /// included.
+  /// Cameras, intrinsics and baseline; with from_rig also T_camera_left.
+  RigCalibration rig{};
+  /// True: also estimate every focal length, including the left camera's, with the prior sigma
+  /// kFocalPriorSigma.
   bool measure_focal_lengths = false;
-  bool from_rig = false;  // begin with T_camera_left of `rig`; false: with those of the logged
-                          // frame that fits best
-  const RigCalibration* known =
-      nullptr;  // posterior of earlier frames with its covariance; null: none
-  const RigCalibration* given = nullptr;  // whose lenses and sigmas are the priors where nothing is
-                                          // known; null: those of `rig`
+  /// True: start from T_camera_left of `rig`. False: start from that of the logged frame that fits
+  /// best.
+  bool from_rig = false;
+  /// Posterior of earlier frames with its covariance; null if there is none.
+  const RigCalibration* known = nullptr;
+  /// Calibration whose intrinsics and sigmas are the priors where `known` has none; null: `rig`.
+  const RigCalibration* given = nullptr;
 };
 
 struct RigSolution {
   RigSolveStatus status = RigSolveStatus::too_few_tracks;
-  RigCalibration rig{};  // the result: transforms, sigmas, intrinsics where they were estimated,
-                         // frames, rms, scale_sigma
-  std::uint64_t newest = 0;  // number of the newest frame used
+  /// Result: transforms, sigmas, estimated intrinsics, frames, rms and scale_sigma.
+  RigCalibration rig{};
+  std::uint64_t newest = 0;
   int frames = 0;
   int tracks = 0;
   int observations = 0;
   int steps = 0;
-  int near = 0;                  // tracks nearer than CalibrationOptions::near_baselines
-  double travelled_m = 0;        // along the frames used
-  int lag_frames = 0;            // that the images of a camera are late, else 0
-  std::uint64_t changed_at = 0;  // frame since which the tracks are of another transform than
-                                 // before, the latest of all cameras; 0: they are of one
-  double solve_ms = 0;           // wall time
+
+  /// Number of tracks nearer than CalibrationOptions::near_baselines.
+  int near = 0;
+  double travelled_m = 0;
+
+  /// Number of frames that a camera's images are late, else 0.
+  int lag_frames = 0;
+  /// Number of the first frame after the latest change of any camera during the frames used; 0 if
+  /// the rig did not change.
+  std::uint64_t changed_at = 0;
+  double solve_ms = 0;
 };
 
-/// Estimates the calibration from a snapshot of the track log: chooses the frame whose
-/// transforms fit best, re-initialises the further cameras through them, triangulates the points
-/// and adjusts everything with transforms shared by all frames. Sigmas are computed for noise alone
-/// and in total.
+/// Estimates the calibration from the track log: chooses the frame whose transforms fit best,
+/// places the additional cameras by them, triangulates the points and runs a bundle adjustment with
+/// transforms shared by all frames. Sigmas are computed for noise alone and in total.
 ///
 ///     RigSolver solver(options, monitor, 2, features, arena);
-///     solver.log().begin(frame);  // of each posed frame, and what it saw
+///     solver.log().begin(frame);  // each posed frame and its observations
 ///     for (const LoggedObservation& seen : observations) solver.log().push(seen);
 ///     const RigSolution solution = solver.solve(rig);
 ///     if (solution.status == RigSolveStatus::ok) use(solution.rig, solution.rig.covariance);
@@ -111,8 +119,7 @@ class RigSolver {
   void drop_outliers(double limit) noexcept;
   void write_result(const BundleResult& r, RigSolution* s) const noexcept;
   void describe(RigSolution* s) const noexcept;
-  /// Relative sigma by the noise of the tracks of the length driven, in the last piece that tracks
-  /// tie together.
+  /// Relative sigma of the path length by the noise of the tracks, in the last connected piece.
   [[nodiscard]] double length_noise(const BundleResult& r) const noexcept;
   void watch_frames(RigSolution* s) noexcept;
   /// Result of running the monitors of one camera over the frames used, with the solution as the
@@ -133,11 +140,14 @@ class RigSolver {
   std::size_t max_frames_;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
-  int count_ = 0;  // cameras
+  int count_ = 0;
   BoundedVector<Transform> poses_;
-  BoundedVector<std::uint8_t> held_;  // 1: the pose begins a piece that no track ties to the rest
-  std::span<int> ties_;               // scratch of hold_pieces()
-  BoundedVector<std::uint16_t> logged_;  // index in the log of each pose
+  // Per pose, 1 if it begins a piece that no track connects to earlier poses.
+  BoundedVector<std::uint8_t> held_;
+  // Buffer of hold_pieces().
+  std::span<int> ties_;
+  // Index of each pose in the log.
+  BoundedVector<std::uint16_t> logged_;
   BoundedVector<Vec3> points_;
   BoundedVector<BundleObservation> observations_;
   BoundedVector<Reference> references_;

@@ -6,19 +6,23 @@
 #include "core/calibration/rig_solver.hpp"
 #include "core/geometry/triangulate.hpp"
 
-/// The bundle adjustment that a snapshot of the track log makes: points, observations, options.
+/// Construction of the bundle adjustment from the track log: points, observations, options.
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kMaxViews = 12;   // of a track that its point is triangulated from
-constexpr double kWildResidual = 40.0;  // px at the start: not the same point
-constexpr int kMinTies = 10;            // points that tie a frame to those before it
-// Tracks share errors that a cluster a track does not see: clusters are cells of the image and
-// blocks of frames. What is left, variance of the transforms found on recorded and rendered drives
-// over the one by clusters (docs/calibration.md).
+// Maximum number of frames that a point is triangulated from.
+constexpr std::size_t kMaxViews = 12;
+// Initial residual in px above which an observation is of another point.
+constexpr double kWildResidual = 40.0;
+// Minimum number of points that connect a frame to earlier ones.
+constexpr int kMinTies = 10;
+// Tracks share errors that clusters by track do not capture, so clusters are image cells (kCells a
+// side) and blocks of frames. kSharedErrors is the remaining ratio of the true variance of
+// transforms, on recorded and rendered sequences, to that by clusters (docs/calibration.md).
 constexpr int kCells = 6;
 constexpr double kSharedErrors = 3.5;
-constexpr double kUsualInflation = 6;  // of a calibration that does not state its own
+// Inflation of a calibration that does not state its own.
+constexpr double kUsualInflation = 6;
 
 }  // namespace
 
@@ -42,7 +46,8 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
   int pairs = 0;
   for (const Reference& r : track)
     pairs += (observation(r).cameras & 1U) != 0 && (observation(r).cameras & ~1U) != 0 ? 1 : 0;
-  if (pairs < 2 || points_.full()) return true;  // four images see it, or it is none
+  // A point must be seen in at least four images.
+  if (pairs < 2 || points_.full()) return true;
 
   std::array<RayView, kMaxViews * kMaxCameras> views;
   std::size_t n = 0;
@@ -105,13 +110,13 @@ void RigSolver::make_points() noexcept {
   }
 }
 
-/// A frame that hardly a track ties to the ones before it (the scene was rebuilt there) begins a
-/// piece of its own: its pose is held, as the first one is, for nothing else would.
+/// Fixes the pose of each frame that hardly any track connects to earlier ones, where the map was
+/// rebuilt, because nothing else would constrain it.
 void RigSolver::hold_pieces() noexcept {
   held_.clear();
   for (std::size_t i = 0; i < poses_.size(); ++i) (void)held_.push(0);
-  // Points that are seen on both sides of a frame's beginning: +1 after the first of its frames, −1
-  // after the last.
+  // Number of points seen on both sides of a frame's beginning: +1 after the first of a point's
+  // frames, −1 after the last.
   std::fill_n(ties_.begin(), poses_.size() + 1, 0);
   for (std::size_t i = 0; i < observations_.size();) {
     const BundleObservation& first = observations_[i];
@@ -129,8 +134,8 @@ void RigSolver::hold_pieces() noexcept {
 }
 
 BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexcept {
-  constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111,
-                          kFourCoefficients = 0b1111'0000;  // k1 k2 p1 p2, or k1 … k4
+  // Bits of fx fy; of fx fy cx cy; and of k1 k2 p1 p2 or k1 … k4.
+  constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111, kFourCoefficients = 0b1111'0000;
   const RigCalibration& rig = request.rig;
   const bool focal_lengths = request.measure_focal_lengths;
   const bool lenses = options_.intrinsics == IntrinsicsEstimation::full;
@@ -173,7 +178,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
     }
     out.prior_mean[8] = lens.distortion[4];
     if (request.known == nullptr) continue;
-    // The covariance of the known lenses already contains their prior.
+    // The covariance of `known` already contains the prior.
     for (std::size_t i = 0; i < 8; ++i)
       if (request.known->covariance.known(intrinsic_row(k) + static_cast<int>(i)))
         out.prior_sigma[i] = 0;

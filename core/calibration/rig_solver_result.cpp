@@ -8,10 +8,10 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kCertainChange =
-    2;  // of the monitor's threshold: the frames have been used to find what they are held against
+// Factor of the monitor's threshold, because the reference was estimated from the same frames.
+constexpr double kCertainChange = 2;
 
-/// A lens with the sigmas of what was estimated; of the rest it keeps its own.
+/// Replaces the sigmas of the intrinsics that were estimated.
 Intrinsics with_sigmas(Intrinsics lens, const std::array<double, kIntrinsicsSize>& sigma) noexcept {
   for (std::size_t i = 0; i < sigma.size(); ++i)
     if (sigma[i] > 0) (i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4]) = sigma[i];
@@ -41,20 +41,19 @@ double RigSolver::length_noise(const BundleResult& r) const noexcept {
   for (; first > 0 && held_[first] == 0; --first)
     driven += (poses_[first].centre() - poses_[first - 1].centre()).norm();
   if (!(driven > 0)) return 0;
-  // The pose's τ are in the axes of its own camera, and so is this.
+  // The pose's τ is in the axes of its own camera, and so is this direction.
   const Vec3 way = (poses_[r.pose] * poses_[first].inverse()).t.normalized();
-  const double believed =
-      way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way);  // inverse_sigma taken as true
-  // A path's length hangs on the yaw between the cameras most of all: clusters make it as uncertain
-  // as that.
+  // Variance with inverse_sigma taken as true.
+  const double believed = way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way);
+  // The path length depends mainly on the yaw between the cameras, so it has the yaw's inflation.
   const double white = r.covariance_white[1](1, 1), clustered = r.covariance_noise[1](1, 1);
   const double inflation = white > 0 ? std::max(1.0, clustered / white) : 1.0;
   return std::sqrt(std::max(0.0, believed * r.sigma0_squared * inflation)) / driven;
 }
 
 void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexcept {
-  // Scale error of the path from uncertain intrinsics: half of the
-  // relative error of the focal lengths, and 0.31 % per mrad of error of the principal points.
+  // Scale error of the path from uncertain intrinsics: half of the relative error of the focal
+  // lengths, and 0.31 % per mrad of error of the principal points.
   constexpr double kScaleByFocal = 0.5, kScaleByRadian = 3.1;
   RigCalibration& rig = s->rig;
   for (int k = 0; k < count_; ++k) {
@@ -88,7 +87,7 @@ void RigSolver::watch_frames(RigSolution* s) noexcept {
   for (int k = 1; k < count_; ++k) {
     const Watch seen = watch_camera(k, s->rig);
     if (s->lag_frames == 0) s->lag_frames = seen.lag_frames;
-    // Since the latest change all cameras are where they are now.
+    // All cameras have been in place since the latest change.
     s->changed_at = std::max(s->changed_at, seen.changed_at);
   }
 }
@@ -117,7 +116,7 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
            Vec2(right.fx * r.x() / r.z() + right.cx, right.fy * r.y() / r.z() + right.cy),
            static_cast<double>(observation.sigma), observation.track});
     }
-    // Frames that did not move are not in the log.
+    // The log contains moving frames only.
     MonitorFrame shown;
     shown.frame = f.number;
     shown.moving = true;

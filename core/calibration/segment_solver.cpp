@@ -48,8 +48,8 @@ std::optional<RigSolution> SegmentSolver::solve() noexcept {
   request.from_rig = true;
   request.given = &given_;
   const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;
-  RigCalibration known =
-      known_;  // as old as it is now: a solve that fails must not age it for the next
+  // Drift is applied to a copy, because a failed solve must not age the prior.
+  RigCalibration known = known_;
   if (any_known_) {
     let_drift((newest - known.found).to_seconds() / 3600.0, options_, &known);
     request.known = &known;

@@ -5,18 +5,22 @@
 
 namespace vergence::calibration {
 
-/// Cuts a drive's tracks into stretches of `frames` moving frames and solves each when it is
+/// Splits the tracks of a run into stretches of `frames` moving frames and solves each when it is
 /// full.
 ///
-/// Ownership  `given`, whose lenses and sigmas are the priors, and `start`, where the first solve
-/// begins, are copied. Threads    One caller; solves happen in take() and end(), some hundred
-/// milliseconds each.
-///            Memory: from the arena.
+/// Ownership  `given`, whose intrinsics are the priors, and `start`, the initial values of the
+/// first
+///            solve, are copied.
+/// Threads    One caller; solves run in take() and end(), some hundred milliseconds each.
+/// Memory     From the arena.
 class SegmentSolver {
  public:
   enum class Kind : std::uint8_t {
-    alone,   // each is independent of the others, so that they can be compared
-    joined,  // each has the posterior of the one before as its prior: the last one is of all frames
+    /// Each solve is independent of the others, so that they can be compared.
+    alone,
+    /// The posterior of each solve is the prior of the next, so that the last one covers all
+    /// frames.
+    joined,
   };
   SegmentSolver(Kind kind, const RigCalibration& given, const RigCalibration& start,
                 std::size_t frames, const CalibrationOptions& options,
@@ -26,10 +30,10 @@ class SegmentSolver {
                                                  std::size_t features) noexcept;
 
   /// Adds the frames of `tracks` that are newer than those added before. Returns the solution if
-  /// that filled a stretch.
+  /// that completed a stretch.
   [[nodiscard]] std::optional<RigSolution> take(const TrackLog& tracks) noexcept;
-  /// Call after the last frame: solves what is left if it is enough. With Kind::joined less than a
-  /// full stretch suffices.
+  /// Call after the last frame: solves the remaining frames if they are at least
+  /// options.min_frames.
   [[nodiscard]] std::optional<RigSolution> end() noexcept;
   [[nodiscard]] std::uint64_t frames() const noexcept { return taken_; }
 

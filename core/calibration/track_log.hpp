@@ -10,11 +10,13 @@
 
 namespace vergence::calibration {
 
-/// One track in one rig frame: raw pixels, as the images have them.
+/// One track in one rig frame, in raw pixels.
 struct LoggedObservation {
   std::uint32_t track = 0;
-  std::uint8_t cameras = 0;  // bit k: camera k saw it
-  float sigma = 0;           // px, of one coordinate
+  /// Bit k is set if camera k saw the track.
+  std::uint8_t cameras = 0;
+  /// Standard deviation of one coordinate, in pixels.
+  float sigma = 0;
   std::array<Eigen::Vector2f, kMaxCameras> raw{};
 
   [[nodiscard]] bool by(int k) const noexcept {
@@ -22,16 +24,19 @@ struct LoggedObservation {
   }
 };
 
-/// One rig frame of the log. `T_camera_left`: as the cameras' own poses had it (unlinked) or the
-/// calibration in use (linked).
+/// One rig frame of the log. `T_camera_left` is from the cameras' own poses if unlinked, else from
+/// the calibration in use.
 struct LoggedFrame {
   std::uint64_t number = 0;
   Stamp stamp{};
   Transform T_left_world{};
   std::array<Transform, kMaxCameras> T_camera_left{};
-  bool unlinked = false;       // T_camera_left was measured in this frame
-  double reprojection_px = 0;  // rms of that frame's pose
-  int stereo = 0;              // tracks that both cameras hold
+  /// True if T_camera_left was measured in this frame.
+  bool unlinked = false;
+  /// Root mean square residual of the frame's pose.
+  double reprojection_px = 0;
+  /// Number of tracks that support the pose in both cameras.
+  int stereo = 0;
   std::span<LoggedObservation> observations;
 };
 
@@ -50,7 +55,6 @@ class TrackLog {
   void push(const LoggedObservation& observation) noexcept;
 
   void clear() noexcept { size_ = 0; }
-  /// Drops frames with a smaller number.
   void drop_before(std::uint64_t number) noexcept;
   /// Scales all poses about a point of the world, as the odometry scaled its world.
   void scale_about(const Vec3& centre, double factor) noexcept;
@@ -72,7 +76,7 @@ class TrackLog {
   }
 
   std::span<LoggedFrame> frames_;
-  std::span<LoggedObservation> observations_;  // as many a frame as capacity_
+  std::span<LoggedObservation> observations_;
   std::size_t capacity_;
   std::size_t first_ = 0, size_ = 0;
   std::uint64_t left_out_ = 0;

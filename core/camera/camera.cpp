@@ -8,13 +8,15 @@
 namespace vergence {
 namespace {
 
-constexpr double kUnprojectTolerance = 1e-12;  // normalised units; 1e-9 px
-// tan 76°: with distortion of either model nothing farther off the axis is projected.
+// Tolerance in normalised units, about 1e-9 px.
+constexpr double kUnprojectTolerance = 1e-12;
+// Maximum normalised radius of a projected point with distortion: tan 76°.
 constexpr double kMaxRadius = 4.0;
 
 struct Radial {
-  double factor;      // distorted radius over undistorted radius
-  double derivative;  // d factor / d(r²)
+  // Distorted over undistorted radius, and its derivative by r².
+  double factor;
+  double derivative;
 };
 
 Radial radtan_radial(const std::array<double, 5>& d, double r2) noexcept {
@@ -22,8 +24,9 @@ Radial radtan_radial(const std::array<double, 5>& d, double r2) noexcept {
 }
 
 struct Equidistant {
-  double theta_d;     // distorted angle
-  double derivative;  // dθ_d/dθ
+  // Distorted angle, and its derivative by θ.
+  double theta_d;
+  double derivative;
 };
 
 Equidistant equidistant_angle(const std::array<double, 5>& d, double theta) noexcept {
@@ -32,8 +35,8 @@ Equidistant equidistant_angle(const std::array<double, 5>& d, double theta) noex
           1.0 + t2 * (3.0 * d[0] + t2 * (5.0 * d[1] + t2 * (7.0 * d[2] + t2 * 9.0 * d[3])))};
 }
 
-/// Radius (squared) up to which the distorted radius grows with the undistorted one, kMaxRadius at
-/// most: beyond it the model folds back.
+/// Squared radius, at most kMaxRadius², up to which the distorted radius grows with the undistorted
+/// one; beyond it the model folds back.
 double monotonic_radius2(const Intrinsics& k) noexcept {
   constexpr int kSteps = 400;
   for (int i = 1; i <= kSteps; ++i) {
@@ -71,7 +74,8 @@ bool Camera::distort(const Vec2& n, Vec2* out, Mat2* J) const noexcept {
     return true;
   }
   const double r = std::sqrt(r2);
-  if (r < 1e-9) {  // θ_d/r → 1
+  // θ_d/r tends to 1.
+  if (r < 1e-9) {
     *out = n;
     if (J != nullptr) J->setIdentity();
     return true;
@@ -87,11 +91,12 @@ bool Camera::distort(const Vec2& n, Vec2* out, Mat2* J) const noexcept {
 }
 
 ProjectStatus Camera::project(const Vec3& p, Vec2* pixel, Mat23* J) const noexcept {
-  if (!(p.z() >= kMinDepth)) return ProjectStatus::behind;  // also refuses NaN
+  // The negated comparison also rejects NaN.
+  if (!(p.z() >= kMinDepth)) return ProjectStatus::behind;
   const double iz = 1.0 / p.z();
   const Vec2 n(p.x() * iz, p.y() * iz);
-  if (!(n.squaredNorm() <= max_radius2_))
-    return ProjectStatus::folded;  // also where x or y is not a number
+  // The negated comparison also rejects NaN.
+  if (!(n.squaredNorm() <= max_radius2_)) return ProjectStatus::folded;
   Vec2 d = n;
   Mat2 D = Mat2::Identity();
   if (distorted_ && !distort(n, &d, J != nullptr ? &D : nullptr)) return ProjectStatus::folded;
@@ -111,8 +116,8 @@ bool Camera::unproject(const Vec2& pixel, Vec3* ray) const noexcept {
     *ray = {target.x(), target.y(), 1.0};
     return true;
   }
-  // The equidistant model maps a half plane into a disc: start where the angle, not the tangent, is
-  // the radius.
+  // The equidistant model maps a half plane to a disc, so start with the radius as the angle, not
+  // its tangent.
   Vec2 n = target;
   if (k_.kind == CameraModelKind::pinhole_equidistant) {
     const double radius = target.norm();
@@ -121,9 +126,9 @@ bool Camera::unproject(const Vec2& pixel, Vec3* ray) const noexcept {
   for (int i = 0; i < kUnprojectSteps; ++i) {
     Vec2 d;
     Mat2 J;
-    while (!distort(
-        n, &d,
-        &J)) {  // a step left the monotonic range: come back; ends because each turn shrinks n
+    while (!distort(n, &d,
+                    // A step has left the monotonic range; shrink n, which terminates.
+                    &J)) {
       n *= 0.8;
       if (n.squaredNorm() < 1e-12) return false;
     }
@@ -148,8 +153,8 @@ Eigen::Matrix<double, 2, 9> Camera::intrinsics_jacobian(const Vec3& p) const noe
   J(0, 2) = 1;
   J(1, 3) = 1;
   const double r2 = n.squaredNorm();
-  Eigen::Matrix<double, 2, 5> by_coefficient =
-      Eigen::Matrix<double, 2, 5>::Zero();  // of the normalised distorted point
+  // Derivatives of the normalised distorted point.
+  Eigen::Matrix<double, 2, 5> by_coefficient = Eigen::Matrix<double, 2, 5>::Zero();
   if (k_.kind == CameraModelKind::pinhole_radtan) {
     by_coefficient.col(0) = n * r2;
     by_coefficient.col(1) = n * (r2 * r2);

@@ -7,14 +7,15 @@
 namespace vergence {
 
 void AttitudeCheck::add(const Vec2& place, double sigma, double yaw) noexcept {
-  // A step four sigmas long has a course good to some 15 degrees; longer steps cut bends.
-  constexpr double kSigmas = 4, kShortest = 2, kLongest = 10;  // m
-  // Twice the course error of the shortest step.
+  // A step of four sigmas has a course accurate to about 15 degrees; longer steps cut corners.
+  // Limits are in metres.
+  constexpr double kSigmas = 4, kShortest = 2, kLongest = 10;
+  // Maximum difference, twice the course error of the shortest step.
   constexpr double kMaxOff = 30 * std::numbers::pi / 180;
   if (!anchor_) anchor_ = place;
   const Vec2 step = place - *anchor_;
-  // A position jump or an outage counts as one long step: twice the longest ordinary one.
-  constexpr double kMaxOfStep = 20;  // m
+  // A position jump or an outage counts as a step of at most twice the longest ordinary one.
+  constexpr double kMaxOfStep = 20;
   const double length = std::min(step.norm(), kMaxOfStep);
   if (length < std::clamp(kSigmas * sigma, kShortest, kLongest)) return;
   anchor_ = place;

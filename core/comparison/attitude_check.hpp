@@ -12,25 +12,26 @@ namespace vergence {
 /// Not thread-safe. Does not allocate.
 class AttitudeCheck {
  public:
-  /// Call once per fix, in order. `place`: position in enu, m; `sigma`: of the position, m; `yaw`:
-  /// of the camera's optical axis according to the attitude, rad counter-clockwise from east.
+  /// Call once per fix, in order. `place`: position in enu, in m; `sigma`: its standard deviation,
+  /// in m; `yaw`: of the camera's optical axis by the attitude, in rad counter-clockwise from east.
   void add(const Vec2& place, double sigma, double yaw) noexcept;
   /// True once heading and course have differed by more than 30 degrees over kDistance, until they
   /// have agreed over the same distance.
   [[nodiscard]] bool contradicted() const noexcept { return contradicted_; }
   /// True if heading and course differed over most of the distance travelled.
   [[nodiscard]] bool mostly_off() const noexcept { return all_against_ > all_with_; }
-  /// Course of the newest step, rad counter-clockwise from east; empty before the first step.
+  /// Course of the newest step, in rad counter-clockwise from east; empty before the first.
   [[nodiscard]] std::optional<double> course() const noexcept { return course_; }
 
  private:
-  // Longer than a manoeuvre in reverse; m.
+  // Distance in metres, longer than a manoeuvre in reverse.
   static constexpr double kDistance = 50;
 
   std::optional<Vec2> anchor_;
   std::optional<double> course_;
-  double against_ = 0, with_ = 0;          // m in a row
-  double all_against_ = 0, all_with_ = 0;  // m
+  // Distances in metres with and against the course, uninterrupted and in total.
+  double against_ = 0, with_ = 0;
+  double all_against_ = 0, all_with_ = 0;
   bool contradicted_ = false;
 };
 

@@ -10,7 +10,7 @@ namespace {
 
 double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * std::numbers::pi); }
 
-/// Forward-left-up from right-down-forward.
+/// Rotation from right-down-forward to forward-left-up axes.
 Mat3 body_from_camera() noexcept {
   Mat3 R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -68,7 +68,7 @@ void Comparison::take(const ComparedPose& c, const InsHistory::Reference& refere
     builder_.add({c.pose.stamp, T_world_left.t, T_enu_left.t,
                   T_enu_left.R * T_world_left.R.transpose(), reference.sigmas.position,
                   reference.sigmas.height, reference.sigmas.tilt, options_.heading_sigma_rad});
-  // A height that begins or ends to be measured is no way.
+  // A step between measured and unmeasured height is not part of the path.
   if (std::exchange(flat_, reference.flat) != reference.flat) ratio_.interrupt();
   ratio_.add(T_world_left.t, T_enu_left.t, reference.sigmas.position, options_);
 }
@@ -94,8 +94,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
   } else {
     ++counters_.without_ins;
   }
-  // Samples before and after a jump do not fit together, also when no frame fell
-  // between the two readings.
+  // Samples before and after a jump do not fit together, even if no frame was between the two.
   if (ins_.pop_leap(pose.stamp)) {
     ratio_.interrupt();
     if (builder_.collecting()) builder_.restart();
@@ -108,7 +107,8 @@ bool Comparison::next(ComparedPose* out) noexcept {
   if (posed && c.ins_valid) {
     take(c, reference);
   } else {
-    builder_.interrupt();  // a path across a hole is not a path driven with a fix
+    // A path across a gap does not count as driven with a fix.
+    builder_.interrupt();
     ratio_.interrupt();
   }
   c.path_ratio = ratio_.value();

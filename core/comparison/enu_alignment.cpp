@@ -8,15 +8,16 @@
 namespace vergence {
 namespace {
 
-// rad: a heading known worse than this is no heading (a standing rig, or a way far shorter than the
-// receiver's error).
+// Maximum standard deviation of a heading in rad; it is larger at standstill or on a path much
+// shorter than the receiver's error.
 constexpr double kWorstHeading = 1.0;
-constexpr double kNoMount = 0.1;  // rad: no mount that was measured is off by six degrees
-constexpr double kConverged =
-    1e-9;  // rad and m: a thousandth of what any receiver or reader can tell
+// Maximum heading difference in rad of a measured INS-to-camera rotation.
+constexpr double kNoMount = 0.1;
+// Convergence limit in rad and m, a thousandth of any receiver's resolution.
+constexpr double kConverged = 1e-9;
 
-/// Mean of the attitudes' rotations, then rotated about up to the heading of the positions,
-/// whatever the INS's heading was.
+/// Initial rotation: mean of the attitudes' rotations, rotated about up to the heading by
+/// positions, whatever the INS's heading.
 Mat3 start(std::span<const EnuAlignmentPair> pairs, const Vec3& middle_world,
            const Vec3& middle_enu) noexcept {
   const Eigen::Quaterniond first(pairs.front().R_enu_world);
@@ -38,10 +39,12 @@ Mat3 start(std::span<const EnuAlignmentPair> pairs, const Vec3& middle_world,
 }
 
 struct Normal {
-  Mat6 H = Mat6::Zero();  // rotation φ (left, enu axes), then position of the middle
+  // Rotation φ (left, enu axes), then position of the middle.
+  Mat6 H = Mat6::Zero();
   Vec6 g = Vec6::Zero();
-  double squares = 0;   // of the positions' residuals, m²
-  double weighted = 0;  // the same over their variances
+  // Σ of squared position residuals, in m² and over their variances.
+  double squares = 0;
+  double weighted = 0;
 };
 
 Normal normal_equations(std::span<const EnuAlignmentPair> pairs, const Mat3& R,
@@ -54,7 +57,7 @@ Normal normal_equations(std::span<const EnuAlignmentPair> pairs, const Mat3& R,
     const Vec3 r = p.p_enu_left - middle_enu - d;
     const Vec3 sigma(p.position_sigma, p.position_sigma, p.height_sigma);
     const Vec3 w = (independent / n) * sigma.cwiseAbs2().cwiseInverse();
-    // r(φ, τ) = y − (m + τ) − Exp(φ) d:  ∂r/∂φ = [d]×, ∂r/∂τ = −I
+    // r(φ, τ) = y − (m + τ) − Exp(φ) d: ∂r/∂φ = [d]×, ∂r/∂τ = −I.
     Eigen::Matrix<double, 3, 6> J;
     J << skew(d), -Mat3::Identity();
     out.H += J.transpose() * w.asDiagonal() * J;
@@ -62,16 +65,16 @@ Normal normal_equations(std::span<const EnuAlignmentPair> pairs, const Mat3& R,
     out.squares += r.squaredNorm();
     out.weighted += r.cwiseAbs2().dot(sigma.cwiseAbs2().cwiseInverse());
 
-    // Up of the world as the INS's attitude has it; under the alignment it must point up: r = (ẑ −
-    // R v) in east and north.
+    // The world's up direction by the INS's attitude must point up after the alignment: r = (ẑ − R
+    // v) in east and north.
     const Vec3 up = R * (p.R_enu_world.transpose() * Vec3::UnitZ());
     const Eigen::Matrix<double, 2, 3> J_tilt = skew(up).topRows<2>();
     const double w_tilt = 1.0 / (n * p.tilt_sigma * p.tilt_sigma);
     out.H.topLeftCorner<3, 3>() += w_tilt * J_tilt.transpose() * J_tilt;
     out.g.head<3>() -= w_tilt * J_tilt.transpose() * up.head<2>();
 
-    // The rest of the attitude's rotation is a rotation about up: r(φ) = turn − φ_z. A turn of many
-    // sigmas is an unknown INS-to-camera rotation.
+    // The remaining rotation of the attitude is about up: r(φ) = turn − φ_z. A large one means an
+    // unknown INS-to-camera rotation.
     const double turn = log_so3(p.R_enu_world * R.transpose()).z();
     if (!(p.heading_sigma > 0) || std::abs(turn) > kNoMount) continue;
     const double w_heading = 1.0 / (n * p.heading_sigma * p.heading_sigma);
@@ -108,8 +111,8 @@ EnuAlignmentStatus fit_enu_alignment(std::span<const EnuAlignmentPair> pairs, Du
     if (delta.norm() < kConverged) break;
   }
 
-  // Residuals larger than their sigmas make the result worse by as much; smaller ones do not make
-  // it better: they share their error.
+  // Residuals larger than their sigmas widen the result; smaller ones do not narrow it, because
+  // they share errors.
   const double excess = std::max(1.0, normal.weighted / (3.0 * n));
   const Mat6 covariance = excess * ldlt_inverse(normal.H);
   const Vec6 sigma = covariance.diagonal().cwiseSqrt();

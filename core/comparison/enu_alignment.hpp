@@ -7,52 +7,62 @@
 
 namespace vergence {
 
-/// One moment at which both are known: the odometry in its world, the INS (brought to the left
-/// camera) in enu.
+/// Odometry pose in its world and INS position (of the left camera) in enu at one time.
 struct EnuAlignmentPair {
   Stamp stamp{};
-  Vec3 p_world_left = Vec3::Zero();  // m
-  Vec3 p_enu_left = Vec3::Zero();    // m
-  /// Rotation from the INS's attitude alone: R_enu_left · R_left_world. Its roll and pitch are
-  /// used, its heading where it has a sigma.
+  /// Positions in metres.
+  Vec3 p_world_left = Vec3::Zero();
+  Vec3 p_enu_left = Vec3::Zero();
+  /// Rotation R_enu_left · R_left_world by the INS's attitude. Its roll and pitch are used, and its
+  /// heading if it has a sigma.
   Mat3 R_enu_world = Mat3::Identity();
-  double position_sigma = 0;  // m, horizontal, each axis; > 0
-  double height_sigma = 0;    // m; > 0
-  double tilt_sigma = 0;      // rad; > 0
-  double heading_sigma =
-      0;  // rad, of the INS and of how the camera is turned against it; 0: its heading is not used
+  /// Horizontal standard deviation per axis, in m, > 0.
+  double position_sigma = 0;
+  /// Standard deviation of the height, in m, > 0.
+  double height_sigma = 0;
+  /// Standard deviation of roll and pitch, in rad, > 0.
+  double tilt_sigma = 0;
+  /// Standard deviation of the heading in rad, including the INS-to-camera rotation; 0 if it is not
+  /// used.
+  double heading_sigma = 0;
 };
 
-/// Where the odometry's world lies on the earth. Rigid, no scale.
+/// Rigid transform, without scale, from the odometry's world to the earth.
 struct EnuAlignment {
-  std::uint32_t revision = 0;  // 0: there is none; counts up with each fit
+  /// Number of fits so far; 0 if there is none.
+  std::uint32_t revision = 0;
   Transform T_enu_world{};
-  Vec3 rotation_sigma = Vec3::Zero();  // rad about east, north, up
-  Vec3 position_sigma = Vec3::Zero();  // m, of the stretch's middle
-  double residual = 0;                 // m, root mean square of the positions' residuals
-  double distance = 0;                 // m driven on the stretch
+  /// Standard deviations about east, north and up, in rad.
+  Vec3 rotation_sigma = Vec3::Zero();
+  /// Standard deviation at the middle of the stretch, in m.
+  Vec3 position_sigma = Vec3::Zero();
+  /// Root mean square of the positions' residuals, in m.
+  double residual = 0;
+  /// Length of the stretch, in m.
+  double distance = 0;
   int pairs = 0;
   Stamp first{}, last{};
 };
 
 enum class EnuAlignmentStatus : std::uint8_t {
   ok,
-  too_few,   // fewer than three pairs
-  not_held,  // the path is too short to hold a heading
+  /// There are fewer than three pairs.
+  too_few,
+  /// The path is too short to determine a heading.
+  not_held,
 };
 
-/// Least squares for T_enu_world on positions, with the INS's roll and pitch, and its heading where
-/// it has a sigma, as one more measurement.
+/// Least squares for T_enu_world on positions, the INS's roll and pitch, and its heading if it has
+/// a sigma.
 ///
-/// An INS's errors wander slowly: neighbouring samples repeat one another. `correlation` states for
-/// how long; n pairs over a time T count as 1 + T / correlation independent ones, the attitude as
-/// one. So the sigma is what 100 m with such a receiver can tell.
-/// Memory: none. Time: linear in the pairs, at most kAlignmentSteps passes. Not `ok`: *alignment as
-/// it was.
+/// INS errors are correlated over the time `correlation`: n pairs over a time T count as 1 + T /
+/// correlation independent ones, and the attitude as one. Does not allocate. Time: linear in the
+/// pairs. If the result is not `ok`, *alignment is unchanged.
 [[nodiscard]] EnuAlignmentStatus fit_enu_alignment(std::span<const EnuAlignmentPair> pairs,
                                                    Duration correlation,
                                                    EnuAlignment* alignment) noexcept;
 
-inline constexpr int kAlignmentSteps = 20;  // Gauss–Newton from the closed-form start takes four
+/// Maximum number of Gauss–Newton steps; four suffice from the closed-form start.
+inline constexpr int kAlignmentSteps = 20;
 
 }  // namespace vergence

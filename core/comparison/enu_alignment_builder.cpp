@@ -5,7 +5,7 @@
 namespace vergence {
 namespace {
 
-// m: smaller steps are the odometry's noise at a standstill, no path.
+// Minimum step in metres; smaller ones are noise at standstill.
 constexpr double kMinStep = 0.05;
 
 }  // namespace
@@ -25,14 +25,14 @@ void EnuAlignmentBuilder::add(const EnuAlignmentPair& pair) noexcept {
   }
   last_world_ = pair.p_world_left;
   if (driven_ >= next_pair_at_) {
-    if (!pairs_.push(pair))
-      pairs_.back() = pair;  // full: the newest is the farthest, it holds the heading best
+    // If full, keep the newest, which is farthest away and best determines the heading.
+    if (!pairs_.push(pair)) pairs_.back() = pair;
     next_pair_at_ = driven_ + options_.alignment_distance_m / static_cast<double>(kPairs);
   }
   if (driven_ < options_.alignment_distance_m) return;
   fit();
-  if (status_ != EnuAlignmentStatus::ok)
-    restart();  // a path that holds no heading: the next one may
+  // The path does not determine a heading; try the next one.
+  if (status_ != EnuAlignmentStatus::ok) restart();
 }
 
 void EnuAlignmentBuilder::restart() noexcept {

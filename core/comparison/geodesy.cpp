@@ -3,7 +3,7 @@
 namespace vergence {
 namespace {
 
-/// Columns: east, north, up at a place, in earth-centred axes. Up is the ellipsoid's normal.
+/// East, north and up at a position as columns in earth-centred axes. Up is the ellipsoid's normal.
 Mat3 earth_axes(const Geodetic& place) noexcept {
   const double phi = place.latitude_deg * (std::numbers::pi / 180.0),
                lambda = place.longitude_deg * (std::numbers::pi / 180.0);

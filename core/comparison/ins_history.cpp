@@ -9,15 +9,20 @@
 namespace vergence {
 namespace {
 
-constexpr double kFastest = 60.0;  // m/s: no vehicle that carries this rig
-// An INS whose clock has gone back and stays there: its refused stamps go on for so long, whatever
-// its rate.
+// Maximum speed of a vehicle with this rig, in m/s.
+constexpr double kFastest = 60.0;
+// Duration of rejected stamps, at any rate, after which the INS's clock counts as set back
+// permanently.
 constexpr Duration kBackForGood = Duration::seconds(1);
-constexpr int kMinBack = 3;  // samples: two stamps are a mistake as soon as a clock
+// Minimum number of those samples; two may be a mistake.
+constexpr int kMinBack = 3;
 constexpr double kQuaternionLength = 0.1;
-constexpr double kHorizontal = 0.5;      // of a unit vector: less does not determine a heading
-constexpr double kUnknownHeight = 1000;  // m: sigma of a height that is not measured
-constexpr double kLevelSigma = 0.05;  // rad: slopes and suspension, without a measurement of tilt
+// Minimum horizontal part of a unit vector that determines a heading.
+constexpr double kHorizontal = 0.5;
+// Standard deviation in m of an unmeasured height.
+constexpr double kUnknownHeight = 1000;
+// Standard deviation in rad of an unmeasured tilt, by slopes and suspension.
+constexpr double kLevelSigma = 0.05;
 
 bool positive(double v) noexcept { return std::isfinite(v) && v > 0; }
 
@@ -28,7 +33,7 @@ bool attitude_of(const InsSample& s, Mat3* R) noexcept {
   return true;
 }
 
-/// A vehicle on a road, at this yaw: level but for its slope, which kLevelSigma covers.
+/// Attitude of a level vehicle at this yaw; kLevelSigma covers slopes.
 Mat3 level_at(double yaw) noexcept { return exp_so3({0, 0, yaw}); }
 
 double or_default(double sigma, double fallback) noexcept {
@@ -76,7 +81,8 @@ void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {
     if (sample.heading_source != HeadingSource::none && std::isfinite(sample.yaw_enu))
       yaw_ = sample.yaw_enu;
     if (sample.attitude_valid && attitude_check_.contradicted()) yaw_ = attitude_check_.course();
-    R_local_ins = level_at(yaw_.value_or(0));  // at a standstill the last heading holds
+    // At standstill the last heading is used.
+    R_local_ins = level_at(yaw_.value_or(0));
   }
   if (!fixed || !sample.position.plausible() || !(attitude || yaw_)) return;
   begin_plane(sample.position);
@@ -106,7 +112,8 @@ void InsHistory::begin_plane(const Geodetic& position) noexcept {
 bool InsHistory::agrees(const InsSample& sample, const Mat3& R_local_ins) noexcept {
   begin_plane(sample.position);
   const Vec3 view = R_local_ins * options_.T_ins_left.R.col(2);
-  if (view.head<2>().norm() < kHorizontal) return true;  // a view up or down has no heading
+  // A vertical optical axis has no heading.
+  if (view.head<2>().norm() < kHorizontal) return true;
   attitude_check_.add(plane_.to_enu(sample.position).head<2>(),
                       or_default(sample.position_sigma, options_.position_sigma_m),
                       std::atan2(view.y(), view.x()));
@@ -115,8 +122,8 @@ bool InsHistory::agrees(const InsSample& sample, const Mat3& R_local_ins) noexce
   return false;
 }
 
-/// A receiver often has no fix for a reading or more where its position leaps: the last place it
-/// had counts, and a vehicle may have driven since.
+/// A receiver often has no fix for some samples when its position jumps, so compare with the last
+/// fix and allow for driving since.
 bool InsHistory::leapt(const Reading& r) noexcept {
   const std::optional<Fix> before = std::exchange(last_fix_, Fix{r.stamp, r.p_enu_ins, r.flat});
   if (!before) return false;
@@ -154,7 +161,7 @@ bool InsHistory::pop_leap(Stamp now) noexcept {
 
 InsMatch InsHistory::reference_at(Stamp stamp, Reference* out) const noexcept {
   if (!reaches(stamp) || reading(begin_).stamp > stamp) return InsMatch::none;
-  // The first reading not before the stamp; at most log2(capacity) turns.
+  // Find the first reading not before the stamp.
   std::uint64_t low = begin_, high = end_ - 1;
   while (low < high) {
     const std::uint64_t middle = low + (high - low) / 2;

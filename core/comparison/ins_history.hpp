@@ -14,46 +14,53 @@ struct ComparisonOptions;
 struct ComparisonCounters;
 enum class InsMatch : std::uint8_t;
 
-/// The newest samples of an INS, in `enu`, and what it said at an instant between two of them.
+/// Newest samples of an INS, in `enu`, with interpolation between them.
 ///
-/// Threads one. Memory from the arena at construction; full: the oldest sample goes.
+/// Not thread-safe. Memory from the arena at construction; if full, the oldest sample is dropped.
 class InsHistory {
  public:
-  /// Sigmas of a sample, m and rad: its own, else those of the options.
+  /// Standard deviations of a sample in m and rad: its own, else those of the options.
   struct Sigmas {
     double position = 0, height = 0, tilt = 0;
   };
-  /// Between two samples.
+  /// Interpolation between two samples.
   struct Reference {
     Transform T_enu_left{};
-    Sigmas sigmas{};    // the larger of both
-    bool flat = false;  // one of them has no height: its height is the last measured one
+    /// The larger ones of both samples.
+    Sigmas sigmas{};
+    /// True if one of the samples has no height, so its height is the last measured one.
+    bool flat = false;
   };
 
-  /// Counts refused samples and jumps in `counters`, which outlive this, as `options` do.
+  /// Counts rejected samples and jumps in `counters`; `counters` and `options` must outlive this
+  /// object.
   InsHistory(const ComparisonOptions& options, ComparisonCounters& counters, Arena& arena);
   [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
 
-  /// Samples in order of their stamps; others are refused and counted.
+  /// Adds a sample. Samples that are not in order of their stamps are rejected and counted.
   void add(const InsSample& sample) noexcept;
-  /// Where the INS has the left camera at this stamp. Not `ok`: *out as it was.
+  /// Interpolates the left camera's pose at this stamp. If the result is not `ok`, *out is
+  /// unchanged.
   [[nodiscard]] InsMatch reference_at(Stamp stamp, Reference* out) const noexcept;
-  /// The newest sample is not older than this.
+  /// True if the newest sample is not older than this.
   [[nodiscard]] bool reaches(Stamp stamp) const noexcept;
-  /// Returns true if the position has jumped, by `now` at the latest; once for a leap, or for
-  /// several before one `now`. Between the first and the last of several it is true whenever it is
-  /// asked: no two places there need fit together.
+  /// Returns true if the position has jumped by the time `now`; once per jump or series of jumps.
+  /// Within a series it returns true on every call, because no two positions there need to fit
+  /// together.
   [[nodiscard]] bool pop_leap(Stamp now) noexcept;
 
   [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
   [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return plane_; }
 
  private:
-  struct Reading {  // an InsSample in enu
+  // An InsSample in enu.
+  struct Reading {
     Stamp stamp{};
     bool valid = false;
-    bool jumped = false;  // against the last fix before
-    bool flat = false;    // a fix in two dimensions
+    // True if it jumped relative to the previous fix.
+    bool jumped = false;
+    // True for a 2D fix.
+    bool flat = false;
     Vec3 p_enu_ins = Vec3::Zero();
     Mat3 R_enu_ins = Mat3::Identity();
     Sigmas sigmas{};
@@ -63,7 +70,8 @@ class InsHistory {
     Vec3 p_enu_ins = Vec3::Zero();
     bool flat = false;
   };
-  struct Refused {  // in a row for their stamps, which ascend among themselves
+  // Consecutive rejected samples, in ascending order of stamps among themselves.
+  struct Refused {
     int count = 0;
     Stamp first{}, last{};
   };
@@ -74,15 +82,16 @@ class InsHistory {
   [[nodiscard]] const Reading& reading(std::uint64_t i) const noexcept {
     return readings_[static_cast<std::size_t>(i) & (readings_.size() - 1)];
   }
-  /// False: its stamp goes back.
+  /// Returns false if the stamp goes back.
   [[nodiscard]] bool accept_stamp(Stamp stamp) noexcept;
-  /// With this refused stamp, too.
+  /// Returns true if the stamps have gone back permanently, counting this rejected one.
   [[nodiscard]] bool back_for_good(Stamp stamp) noexcept;
-  /// Returns true if a valid sample is farther from the last one than a vehicle can drive; counted.
+  /// Returns true, and counts it, if a valid sample is farther from the last one than a vehicle can
+  /// drive.
   [[nodiscard]] bool leapt(const Reading& r) noexcept;
   void begin_plane(const Geodetic& position) noexcept;
   [[nodiscard]] bool agrees(const InsSample& sample, const Mat3& R_local_ins) noexcept;
-  /// The sample's place in enu, if it has one.
+  /// Sets the sample's position in enu, if it has one.
   void locate(const InsSample& sample, Reading* r) noexcept;
 
   const ComparisonOptions& options_;
@@ -90,13 +99,17 @@ class InsHistory {
   LocalTangentPlane plane_{};
   bool has_origin_ = false;
   std::span<Reading> readings_;
-  std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
+  std::uint64_t begin_ = 0, end_ = 0;
   Refused refused_{};
-  std::optional<Fix> last_fix_;   // since the INS began or began anew
-  std::optional<double> yaw_;     // rad, the newest of a sample without attitude
-  std::optional<double> height_;  // m, the newest that was measured
+  // Last fix since the start or restart of the INS.
+  std::optional<Fix> last_fix_;
+  // Newest yaw in rad of a sample without attitude.
+  std::optional<double> yaw_;
+  // Newest measured height, in m.
+  std::optional<double> height_;
   AttitudeCheck attitude_check_;
-  std::optional<Leaps> leaps_;  // not yet taken
+  // Jumps not yet returned by pop_leap().
+  std::optional<Leaps> leaps_;
 };
 
 }  // namespace vergence

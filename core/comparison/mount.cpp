@@ -23,7 +23,7 @@ enum Index : int {
   world_rotation = 7,
   world_translation = 10
 };
-// Errors of a moment: tilt x y, heading, place x y, height, velocity x y z.
+// Errors of a moment: tilt x y, heading, position x y, height, velocity x y z.
 constexpr int kErrors = 9;
 constexpr std::array<int, kErrors> kChannel{0, 0, 1, 2, 2, 3, 4, 4, 4};
 constexpr int kChannels = 5;
@@ -32,18 +32,20 @@ using Parameters = Eigen::Matrix<double, kParameters, 1>;
 using Information = Eigen::Matrix<double, kParameters, kParameters>;
 using Errors = Eigen::Matrix<double, kErrors, 1>;
 
-/// A reading of the reference, at its own stamp: interpolating it would calm its noise by where
-/// between two readings a stamp falls, and the clock offset would be drawn to the middle. The
-/// estimate, which has next to no noise, is interpolated instead.
+/// A reference sample at its own stamp. Interpolating it would reduce its noise depending on the
+/// stamp and bias the clock offset to the middle, so the estimate, which has hardly any noise, is
+/// interpolated instead.
 struct Moment {
   MountReference reference{};
-  bool follows = false;  // one step after the moment before it
+  // True if it is one step after the previous moment.
+  bool follows = false;
 };
 
 struct State {
   Mat3 R_m = Mat3::Identity(), R_enu_world = Mat3::Identity();
   Vec3 lever = Vec3::Zero(), translation = Vec3::Zero();
-  double offset = 0;  // s
+  // Clock offset, in s.
+  double offset = 0;
 };
 
 State moved(const State& s, const Parameters& d) {
@@ -56,9 +58,10 @@ State moved(const State& s, const Parameters& d) {
   return out;
 }
 
-/// Between two readings, as most are.
+/// Median interval between samples.
 Duration interval_of(std::span<const MountReference> reference) {
-  std::vector<std::int64_t> intervals;  // ns
+  // In ns.
+  std::vector<std::int64_t> intervals;
   intervals.reserve(reference.size());
   for (std::size_t i = 1; i < reference.size(); ++i)
     intervals.push_back((reference[i].stamp - reference[i - 1].stamp).ns());
@@ -67,21 +70,23 @@ Duration interval_of(std::span<const MountReference> reference) {
   return Duration::nanoseconds(std::max<std::int64_t>(1, *middle));
 }
 
-/// Between two moments: as many readings as come nearest to the step, one at least.
+/// Spacing of moments: the whole number of samples nearest to the step, at least one.
 Duration spacing_of(Duration interval, Duration step) {
   return interval * std::max<std::int64_t>(1, (step + interval / 2).ns() / interval.ns());
 }
 
-/// Readings a step of `o` apart, which is of whole intervals, with an estimate around each.
+/// Samples at the step of `o`, a multiple of the interval, with an estimate around each.
 std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
                                std::span<const MountReference> reference, Duration interval,
                                const MountOptions& o) {
-  constexpr Duration kRoom = Duration::milliseconds(500);  // for the clock offset
+  // Range for the clock offset.
+  constexpr Duration kRoom = Duration::milliseconds(500);
   std::vector<Moment> moments;
   Transform unused;
   Stamp next = reference.front().stamp;
   for (const MountReference& r : reference) {
-    if (r.stamp < next - interval / 2) continue;  // stamps jitter
+    // Allow for jitter of the stamps.
+    if (r.stamp < next - interval / 2) continue;
     if (!detail::pose_at(estimate, r.stamp - kRoom, o.max_gap, &unused) ||
         !detail::pose_at(estimate, r.stamp, o.max_gap, &unused) ||
         !detail::pose_at(estimate, r.stamp + kRoom, o.max_gap, &unused))
@@ -93,18 +98,20 @@ std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
   return moments;
 }
 
-constexpr Duration kBlock = Duration::milliseconds(3'000);  // in which errors stay alike
-constexpr std::size_t kBlocks = 8;                          // fewer do not determine their scatter
+// Duration over which errors are similar.
+constexpr Duration kBlock = Duration::milliseconds(3'000);
+// Minimum number of blocks that determine their scatter.
+constexpr std::size_t kBlocks = 8;
 
-/// Evidence of a block of the drive about the parameters.
+/// Information and score of the parameters from one block.
 struct Block {
   Information information = Information::Zero();
   Parameters score = Parameters::Zero();
 };
 
-/// Covariance of the sum of the blocks' scores, from their scatter; zero where there are too few.
-/// A parameter seen by one block alone is fitted by it: its score is as if the others had been
-/// fitted without it (jackknife: Bell and McCaffrey 2002).
+/// Covariance of the sum of the blocks' scores from their scatter; zero if there are too few. A
+/// parameter seen by one block only is fitted to it, so its score is that of a fit to the others
+/// (jackknife: Bell and McCaffrey 2002).
 Information scatter_of(std::span<const Block> blocks, const Information& whole) {
   Information sum = Information::Zero();
   if (blocks.size() < kBlocks) return sum;
@@ -127,9 +134,10 @@ class Fit {
   [[nodiscard]] MountStatus run(const Mat3& nominal, Mount* mount);
 
  private:
-  /// Gauss–Markov, per channel: e_k = memory · e_{k−1} + white.
+  /// Gauss–Markov process per channel: e_k = memory · e_{k−1} + white, with `white` a standard
+  /// deviation.
   struct Noise {
-    double memory = 0.98, white = 1;  // white: standard deviation
+    double memory = 0.98, white = 1;
   };
 
   [[nodiscard]] bool start(const Mat3& nominal);
@@ -145,19 +153,22 @@ class Fit {
   MountOptions options_;
   State state_;
   std::array<Noise, kChannels> noise_{};
-  bool velocity_ = true;  // every moment has one
+  // True if every moment has a velocity.
+  bool velocity_ = true;
   Information information_ = Information::Zero();
-  Information scatter_ = Information::Zero();  // of the blocks' scores
+  // Scatter of the blocks' scores.
+  Information scatter_ = Information::Zero();
 };
 
 bool Fit::errors_at(const State& s, const Moment& m, Errors* e) const {
-  constexpr Duration kAround = Duration::milliseconds(50);  // velocity and rate: from both sides
+  // Half interval of the differences for velocity and rate.
+  constexpr Duration kAround = Duration::milliseconds(50);
   const Stamp at = m.reference.stamp - Duration::seconds(s.offset);
   Transform here, before, after;
   if (!detail::pose_at(estimate_, at, options_.max_gap, &here)) return false;
   const MountReference& r = m.reference;
   const Mat3& R = r.T_enu_ref.R;
-  // In the reference's axes: there a tilt stays a tilt when the vehicle turns.
+  // Use the reference's axes, in which a tilt is constant when the vehicle turns.
   e->segment<3>(0) = R.transpose() * log_so3(R * s.R_m * (s.R_enu_world * here.R).transpose());
   e->segment<3>(3) = r.T_enu_ref.t + R * s.lever - s.R_enu_world * here.t - s.translation;
   e->segment<3>(6).setZero();
@@ -180,7 +191,8 @@ bool Fit::all_errors(const State& s, std::vector<Errors>* all) const {
   return true;
 }
 
-/// Rotation by Wahba's problem over turns and ways, the rest from it. False: nothing moved.
+/// Solves Wahba's problem over rotations and translations, and initialises the rest from it.
+/// Returns false without motion.
 bool Fit::start(const Mat3& nominal) {
   Mat3 B = Mat3::Zero();
   Transform e0, e1;
@@ -197,19 +209,20 @@ bool Fit::start(const Mat3& nominal) {
                turn_est = log_so3(e0.R.transpose() * e1.R);
     const Vec3 way_est = e0.R.transpose() * (e1.t - e0.t),
                way_ref = R_ref_enu * (r1.T_enu_ref.t - r0.T_enu_ref.t);
-    B += 20 * turn_ref * turn_est.transpose() +
-         way_ref * way_est.transpose();  // a radian weighs as 20 m
+    // One radian has the weight of 20 m.
+    B += 20 * turn_ref * turn_est.transpose() + way_ref * way_est.transpose();
     way += way_est.norm();
   }
-  // Chosen, not measured.
-  constexpr double kMinWay = 10;  // m
+  // Minimum path length in m; chosen.
+  constexpr double kMinWay = 10;
   if (way < kMinWay) return false;
   const auto rotation_of = [](const Mat3& M) {
     const Svd3 s = svd(M);
     const Vec3 d(1, 1, (s.U * s.V.transpose()).determinant());
     return Mat3(s.U * d.asDiagonal() * s.V.transpose());
   };
-  // A thousandth of what was seen for the drawing: it decides only what nothing else does.
+  // The design rotation has a thousandth of the weight, so it only decides what is otherwise
+  // undetermined.
   state_.R_m = rotation_of(B + 1e-3 * B.norm() * nominal);
   Mat3 sum = Mat3::Zero();
   for (const Moment& m : moments_) {
@@ -237,11 +250,10 @@ void Fit::estimate_noise(const std::vector<Errors>& all) {
         n += 1;
       }
     }
-    constexpr double kMax =
-        0.998;  // a random walk as good as: beyond it the mean is lost to rounding
+    // Almost a random walk; above it the mean is lost to rounding.
+    constexpr double kMax = 0.998;
     double memory = now > 0 ? lagged / now : 0;
-    // A short series seems to forget faster than it does (Kendall 1954), and fitted parameters have
-    // taken their share.
+    // Correct the bias of a short series' correlation (Kendall 1954) and of fitted parameters.
     memory = std::clamp(memory + (1 + 3 * memory) / std::max(8.0, static_cast<double>(all.size())),
                         0.0, kMax);
     constexpr int kVelocity = 4;
@@ -256,13 +268,15 @@ void Fit::estimate_noise(const std::vector<Errors>& all) {
           white += std::pow(all[i][k] - memory * all[i - 1][k], 2) / n;
     }
     constexpr std::array<double, kChannels> kMin{
-        1e-5, 1e-5, 1e-4, 1e-4, 1e-4};  // rad, m, m/s: an ideal reference has some noise, too
+        // Minimum noise in rad, m and m/s, also of an ideal reference.
+        1e-5, 1e-5, 1e-4, 1e-4, 1e-4};
     noise_[static_cast<std::size_t>(c)] = {
         memory, std::max(std::sqrt(white), kMin[static_cast<std::size_t>(c)])};
   }
 }
 
-/// One Gauss–Newton step on the whitened errors. False: the reference does not reach that far.
+/// One Gauss–Newton step on the whitened errors. Returns false if the reference does not cover the
+/// stamps.
 bool Fit::step(Parameters* d) {
   std::vector<Errors> at;
   if (!all_errors(state_, &at)) return false;
@@ -282,7 +296,7 @@ bool Fit::step(Parameters* d) {
       columns[static_cast<std::size_t>(p)][i] =
           (columns[static_cast<std::size_t>(p)][i] - minus[i]) / (2 * h);
   }
-  // Next to nothing, so that a drive that shows nothing of a parameter leaves it where it is.
+  // Weak priors keep unobserved parameters at their values.
   constexpr std::array<double, kParameters> kPrior{1, 1, 1, 100, 100, 100, 0.3,
                                                    4, 4, 4, 1e6, 1e6, 1e6};
   Information H = Information::Zero();
@@ -323,8 +337,8 @@ bool Fit::step(Parameters* d) {
 }
 
 void Fit::report(const Mat3& nominal, Mount* mount) const {
-  // By the model of the errors, or by how far blocks of the drive disagree, whichever is more: what
-  // an estimate drifts by is no Gauss–Markov process.
+  // Use the larger of the error model's sigma and the scatter between blocks, because the
+  // estimate's drift is not a Gauss–Markov process.
   const Information covariance = ldlt_inverse(information_);
   const Information by_blocks = covariance * scatter_ * covariance;
   const auto sigma = [&](int p) {
@@ -358,17 +372,19 @@ void Fit::report(const Mat3& nominal, Mount* mount) const {
   *mount = m;
 }
 
-/// False: the fit does not come to rest, or only where the clocks are farther apart than it can
-/// see.
+/// Iterates the fit. Returns false if it does not converge or its clock offset is at the limit.
 bool Fit::settle() {
-  constexpr double kLargest = 0.3;   // s: the room that moments have for the offset
-  constexpr double kSettled = 1e-2;  // of a sigma
+  // Maximum clock offset in s, within the range of the moments.
+  constexpr double kLargest = 0.3;
+  // Convergence limit, in sigmas.
+  constexpr double kSettled = 1e-2;
   for (int round = 0; round < kMountRounds; ++round) {
     Parameters d;
     if (!step(&d)) return false;
     state_ = moved(state_, d);
     state_.offset = std::clamp(state_.offset, -kLargest, kLargest);
-    constexpr int kMinRounds = 6;  // for the correlations
+    // Minimum number of rounds, to estimate correlations.
+    constexpr int kMinRounds = 6;
     if (round >= kMinRounds && d.dot(information_ * d) < kSettled * kSettled)
       return std::abs(state_.offset) < kLargest;
   }
@@ -380,8 +396,8 @@ MountStatus Fit::run(const Mat3& nominal, Mount* mount) {
   if (!settle()) return MountStatus::not_converged;
   Mount found;
   report(nominal, &found);
-  // Errors are taken as small turns: the half square that this leaves out has to be less than what
-  // counts as seen.
+  // Errors are linearised as small rotations; the neglected half square must be below the limit of
+  // an observable rotation.
   if (found.residual_rotation * found.residual_rotation / 2 > options_.rotation_sigma)
     return MountStatus::not_converged;
   *mount = found;
@@ -398,8 +414,7 @@ MountStatus estimate_ins_extrinsics(std::span<const StampedPose> estimate,
   MountOptions spaced = options;
   spaced.step = spacing_of(interval, options.step);
   std::vector<Moment> moments = moments_of(estimate, reference, interval, spaced);
-  // Error correlation is estimated between successive moments: of too few they would seem to be
-  // none.
+  // Error correlation is estimated between consecutive moments; too few would show none.
   const auto following =
       std::count_if(moments.begin(), moments.end(), [](const Moment& m) { return m.follows; });
   if (static_cast<std::size_t>(following) < kMountMoments) return MountStatus::too_few;

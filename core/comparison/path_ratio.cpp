@@ -8,7 +8,8 @@
 namespace vergence {
 namespace {
 
-constexpr double kSigmas = 4.0;  // of the ratio, before it disagrees
+// Number of sigmas by which the ratio must differ.
+constexpr double kSigmas = 4.0;
 
 }  // namespace
 
@@ -33,8 +34,7 @@ void PathRatio::measure(double position_sigma, const ComparisonOptions& options)
     sum.ins += step.ins;
   }
   ratio_ = sum.ins > 0 ? sum.ours / sum.ins : 0.0;
-  // Errors of neighbouring fixes go together: what remains over the stretch is the difference of
-  // its two ends.
+  // Errors of neighbouring fixes are correlated, so only those of both ends of the stretch matter.
   const double sigma = std::numbers::sqrt2 * position_sigma / options.scale_stretch_m;
   disagrees_ =
       ratio_ > 0 && std::abs(ratio_ - 1.0) > std::max(options.scale_tolerance, kSigmas * sigma);

@@ -9,24 +9,25 @@ namespace vergence {
 
 struct ComparisonOptions;
 
-/// Length of our path over that of the INS, on the newest ComparisonOptions::scale_stretch_m. A
-/// value; threads one.
+/// Ratio of the estimate's path length to that of the INS over the newest
+/// ComparisonOptions::scale_stretch_m. A value; not thread-safe.
 class PathRatio {
  public:
-  /// A pose, where the INS has it, and the INS's position sigma (m).
+  /// Adds a pose's position, that by the INS, and the INS's standard deviation (m).
   void add(const Vec3& ours, const Vec3& ins, double position_sigma,
            const ComparisonOptions& options) noexcept;
-  /// Poses or fixes are missing here: no step across.
+  /// Call if poses or fixes are missing: no step is added across the gap.
   void interrupt() noexcept { last_.reset(); }
 
-  /// 0: not yet that far.
+  /// The ratio; 0 before that distance.
   [[nodiscard]] double value() const noexcept { return ratio_; }
-  /// It is not 1, beyond the tolerance and four sigmas.
+  /// True if the ratio differs from 1 by more than the tolerance and four sigmas.
   [[nodiscard]] bool disagrees() const noexcept { return disagrees_; }
 
  private:
   static constexpr std::size_t kSteps = 40;
-  struct Step {  // along both paths, m
+  // Lengths along both paths, in m.
+  struct Step {
     double ours = 0, ins = 0;
   };
   struct Place {

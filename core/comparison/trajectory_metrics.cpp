@@ -9,10 +9,9 @@
 namespace vergence {
 namespace {
 
-// rad: a rotation about the direction of travel that the positions leave this uncertain is not
-// worth comparing.
+// Maximum uncertainty in rad of a rotation about the direction of travel that is worth comparing.
 constexpr double kMaxRollUncertainty = 0.1;
-// Ratio of extents: straighter than this is rounding, whatever the residuals.
+// Minimum ratio of extents; below it the path is straight up to rounding.
 constexpr double kStraight = 1e-6;
 
 [[maybe_unused]] bool ascending(std::span<const StampedPose> poses) {
@@ -24,7 +23,7 @@ constexpr double kStraight = 1e-6;
 
 bool earlier(Stamp stamp, const StampedPose& pose) { return stamp < pose.stamp; }
 
-/// The reference at a stamp within its span; false: in a hole.
+/// Computes the reference at a stamp within its span. Returns false in a gap.
 bool reference_at(Stamp stamp, std::span<const StampedPose> reference,
                   const EvaluationOptions& options, Transform* T) {
   const auto next = std::upper_bound(reference.begin(), reference.end(), stamp, earlier);
@@ -83,8 +82,8 @@ HeadingErrors heading_errors(const MatchedTrajectories& m, const Mat3& R, BodyAx
   for (std::size_t i = 0; i < m.estimate.size(); ++i) {
     const Vec3 f_estimate = R * (m.estimate[i].T_world_body.R * forward);
     const Vec3 f_reference = m.reference[i].T_world_body.R * forward;
-    // Both directions projected to the plane across `up`; the signed angle from one to the other is
-    // in (−π, π] by itself.
+    // Project both directions to the plane orthogonal to `up`; atan2 gives the signed angle in (−π,
+    // π].
     const Vec3 e = f_estimate - up.dot(f_estimate) * up;
     const Vec3 r = f_reference - up.dot(f_reference) * up;
     const double error = std::atan2(up.dot(r.cross(e)), r.dot(e));
@@ -135,7 +134,7 @@ MatchedTrajectories associate(std::span<const StampedPose> estimate,
   m.estimate.reserve(estimate.size());
   m.reference.reserve(estimate.size());
   const Stamp first = reference.front().stamp, last = reference.back().stamp;
-  // A reference pose within max_difference is a match also just outside the reference's span.
+  // A reference pose within max_difference is also a match just outside the reference's span.
   const Duration margin =
       options.association == Association::nearest ? options.max_difference : Duration{};
   for (const StampedPose& pose : estimate) {
@@ -183,15 +182,15 @@ Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPo
   Alignment a;
   if (variance_e > 0 && variance_r > 0) {
     const Svd3 s = svd(covariance);
-    Vec3 sign = Vec3::Ones();  // the reflection of a best fit with det −1 is undone on the weakest
-                               // direction
+    // If the best fit is a reflection, flip the weakest direction.
+    Vec3 sign = Vec3::Ones();
     if (s.U.determinant() * s.V.determinant() < 0) sign.z() = -1.0;
     a.R_reference_estimate = s.U * sign.asDiagonal() * s.V.transpose();
     const double trace = s.singular.dot(sign);
     if (scale == AlignmentScale::free) a.scale = trace / variance_e;
     a.lateral_extent = std::sqrt(s.singular[1]);
-    // A roll about the main direction moves what is off it along the second into the third. What
-    // the fit leaves there, against the lever arm, is about how far the roll may be wrong.
+    // A roll about the main direction moves offsets along the second direction into the third. The
+    // residual there over the lever arm is about the uncertainty of the roll.
     const Vec3 third = s.U.col(2);
     double squares = 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -233,7 +232,8 @@ TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate,
   out.before = m.before;
   out.after = m.after;
   out.gap = m.gap;
-  constexpr std::size_t kMin = 3;  // positions that can hold a rotation
+  // Minimum number of positions that determine a rotation.
+  constexpr std::size_t kMin = 3;
   out.status = out.matched == 0                             ? EvaluationStatus::no_match
                : out.matched < kMin                         ? EvaluationStatus::too_few
                : !(moves(m.estimate) && moves(m.reference)) ? EvaluationStatus::no_motion

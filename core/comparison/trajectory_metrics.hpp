@@ -9,142 +9,168 @@
 #include "core/types/stamped_pose.hpp"
 #include "core/types/time.hpp"
 
-/// Errors of an estimated trajectory against a reference, as in the literature.
+/// Errors of an estimated trajectory relative to a reference, as in the literature.
 ///
 /// Trajectories  Strictly ascending stamps, finite poses (precondition, asserted; the readers
-///               refuse other files). Body of estimate and reference is the same point and the same
-///               axes; their worlds may differ by a rigid motion.
-/// Threads       Pure functions. Memory: the heap; this is not for the real-time path.
-/// Units         Metres, radians, ratios (1 is 100 %). Scale is reported, never applied but where
-///               an option selects it.
-/// Errors        A status by value. A figure that does not exist (no segment of that length) is
-///               NaN, never zero.
+///               reject other files). Estimate and reference are of the same point and axes of the
+///               body; their worlds may differ by a rigid motion.
+/// Threads       Pure functions. They allocate; not for the real-time path.
+/// Units         Metres, radians, ratios (1 is 100 %). Scale is reported, and applied only if an
+///               option selects it.
+/// Errors        A status by value. A metric that does not exist (no segment of that length) is
+///               NaN.
 /// Sources       Umeyama 1991 (alignment); Sturm et al. 2012 (ATE); the KITTI odometry devkit
 ///               (segments).
 namespace vergence {
 
 enum class Association : std::uint8_t {
-  interpolate,  // the reference at the estimate's stamp: position linear, rotation by slerp
-  nearest,      // the reference pose nearest in time, as it is
+  /// Interpolates at the estimate's stamp: position linearly, rotation by slerp.
+  interpolate,
+  /// Uses the nearest reference pose in time.
+  nearest,
 };
 
 /// Axes of the body whose heading is compared.
 enum class BodyAxes : std::uint8_t {
-  camera,           // x right, y down, z forward
-  forward_left_up,  // x forward, y left, z up
+  /// x right, y down, z forward.
+  camera,
+  /// x forward, y left, z up.
+  forward_left_up,
 };
 
-/// One table of KITTI segment errors.
+/// Options of one table of KITTI segment errors.
 struct SegmentOptions {
-  std::vector<double> lengths{100, 200, 300, 400, 500, 600, 700, 800};  // m, > 0
-  int step = 10;        // a segment begins at every step-th matched pose; > 0
-  bool scaled = false;  // multiply the estimate's positions by the Sim(3) scale first
+  /// Segment lengths in m, > 0.
+  std::vector<double> lengths{100, 200, 300, 400, 500, 600, 700, 800};
+  /// A segment begins at every step-th matched pose; > 0.
+  int step = 10;
+  /// True: multiply the estimate's positions by the Sim(3) scale first.
+  bool scaled = false;
 };
 
 struct EvaluationOptions {
   Association association = Association::interpolate;
-  Duration max_gap =
-      Duration::milliseconds(200);  // interpolate: the widest hole of the reference that is bridged
-  Duration max_difference =
-      Duration::milliseconds(5);  // nearest: the largest difference of stamps that is a match
+  /// With `interpolate`, the maximum gap of the reference that is interpolated.
+  Duration max_gap = Duration::milliseconds(200);
+  /// With `nearest`, the maximum difference of stamps of a match.
+  Duration max_difference = Duration::milliseconds(5);
   BodyAxes axes = BodyAxes::camera;
   std::vector<SegmentOptions> segments{SegmentOptions{}};
 };
 
-/// Poses of both at the same times, in order: estimate[i] belongs to reference[i]. The stamps are
-/// the estimate's.
+/// Poses of both at the same times, in order: estimate[i] belongs to reference[i]. Stamps are the
+/// estimate's.
 struct MatchedTrajectories {
   std::vector<StampedPose> estimate;
   std::vector<StampedPose> reference;
-  std::size_t before = 0;  // estimates left out: earlier than the reference
-  std::size_t after = 0;   // … later than the reference
-  std::size_t gap = 0;     // … in a hole of the reference, or without a neighbour near enough
+  /// Number of estimates before the reference.
+  std::size_t before = 0;
+  /// Number of estimates after the reference.
+  std::size_t after = 0;
+  /// Number of estimates in a gap of the reference, or without a near enough neighbour.
+  std::size_t gap = 0;
 };
 
 /// reference ≈ scale · R · estimate + t, least squares over positions, det R = +1.
 struct Alignment {
   Mat3 R_reference_estimate = Mat3::Identity();
-  Vec3 t_reference_estimate = Vec3::Zero();  // m
+  /// In metres.
+  Vec3 t_reference_estimate = Vec3::Zero();
   double scale = 1.0;
-  /// Root mean square extent, m, of the path across its main direction: √ of the second singular
-  /// value of the cross-covariance.
+  /// Root mean square extent of the path across its main direction, in m: square root of the second
+  /// singular value of the cross-covariance.
   double lateral_extent = 0.0;
-  /// The path is so straight that positions do not hold the rotation about it: rotation and heading
-  /// after this fit mean nothing.
+  /// True if the path is so straight that positions do not determine the rotation about it;
+  /// rotation and heading after this fit are then meaningless.
   bool roll_unobservable = false;
 };
 
 struct ErrorStatistics {
-  double rmse = 0, mean = 0, median = 0,
-         max = 0;  // the median of an even number is the mean of the middle two
+  /// The median of an even number of values is the mean of the middle two.
+  double rmse = 0, mean = 0, median = 0, max = 0;
 };
 
-/// Signed heading errors, estimate − reference, counter-clockwise from above positive, each in (−π,
-/// π].
+/// Signed heading errors, estimate − reference, positive counter-clockwise seen from above, each in
+/// (−π, π], in rad.
 struct HeadingErrors {
-  double rms = 0, mean = 0, max_abs = 0, last = 0;  // rad
+  double rms = 0, mean = 0, max_abs = 0, last = 0;
 };
 
 struct LengthError {
-  double length = 0;                                              // m, nominal
-  std::size_t count = 0;                                          // segments
-  double translation = std::numeric_limits<double>::quiet_NaN();  // ratio to the nominal length
-  double rotation = std::numeric_limits<double>::quiet_NaN();     // rad/m
+  /// Nominal length, in m.
+  double length = 0;
+  std::size_t count = 0;
+  /// Ratio to the nominal length.
+  double translation = std::numeric_limits<double>::quiet_NaN();
+  /// In rad/m.
+  double rotation = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct SegmentErrors {
   int step = 0;
-  std::vector<LengthError> per_length;  // in the order of the option
-  std::size_t count = 0;  // of all lengths together; 0: the path is shorter than every length
-  double translation = std::numeric_limits<double>::quiet_NaN();  // mean over all segments, not
-                                                                  // over the lengths' means
-  double rotation = std::numeric_limits<double>::quiet_NaN();     // rad/m
+  std::vector<LengthError> per_length;
+  /// Number of segments of all lengths; 0 if the path is shorter than every length.
+  std::size_t count = 0;
+  /// Mean over all segments, not over the lengths' means.
+  double translation = std::numeric_limits<double>::quiet_NaN();
+  /// In rad/m.
+  double rotation = std::numeric_limits<double>::quiet_NaN();
 };
 
 enum class EvaluationStatus : std::uint8_t {
   ok,
-  no_match,   // no estimate has a reference at its time
-  too_few,    // fewer than three matched poses: nothing to align
-  no_motion,  // the matched positions of one of the two are all the same: nothing to align
+  /// No estimate has a reference at its time.
+  no_match,
+  /// There are fewer than three matched poses.
+  too_few,
+  /// The matched positions of one of the two are all equal.
+  no_motion,
 };
 
-/// Everything that `evaluate` and summary.json report. Unless `status` is ok only the counts mean
-/// something.
+/// All results that `evaluate` and summary.json report. Unless `status` is ok only the counts are
+/// valid.
 struct TrajectoryEvaluation {
   EvaluationStatus status = EvaluationStatus::no_match;
   std::size_t matched = 0;
-  std::size_t before = 0, after = 0, gap = 0;  // estimates left out, as in MatchedTrajectories
+  /// See MatchedTrajectories.
+  std::size_t before = 0, after = 0, gap = 0;
 
-  double path_reference = 0;  // m, over the matched poses; holes bridged by a straight line
-  double path_estimate = 0;   // m
-  double path_ratio = 0;      // estimate / reference
+  /// Path lengths in m over the matched poses, with straight lines across gaps.
+  double path_reference = 0;
+  double path_estimate = 0;
+  /// Ratio estimate / reference.
+  double path_ratio = 0;
 
-  Alignment se3;            // scale 1
-  Alignment sim3;           // its `scale` is the Sim(3) scale s
-  ErrorStatistics ate_se3;  // m
+  Alignment se3;
+  Alignment sim3;
+  /// Absolute trajectory errors, in m.
+  ErrorStatistics ate_se3;
   ErrorStatistics ate_sim3;
   ErrorStatistics ate_unaligned;
 
-  Vec3 up_world = Vec3::UnitZ();        // up of the reference's world that headings are taken about
-  HeadingErrors heading_se3;            // the estimate's rotations turned by se3
-  HeadingErrors heading_start_aligned;  // the estimate moved so that its first matched pose is the
-                                        // reference's
-  ErrorStatistics rotation_se3;         // rad, whole rotation
+  /// Up direction of the reference's world, about which headings are measured.
+  Vec3 up_world = Vec3::UnitZ();
+  /// Heading errors after the SE(3) alignment.
+  HeadingErrors heading_se3;
+  /// Heading errors after aligning the first matched poses.
+  HeadingErrors heading_start_aligned;
+  /// Angle of the whole rotation error, in rad.
+  ErrorStatistics rotation_se3;
 
-  double end_error_se3 = 0;               // m, of the last matched pose
-  double end_error_start_aligned = 0;     // m
-  double end_error_ratio = 0;             // the same over path_reference
-  double end_rotation_start_aligned = 0;  // rad
+  /// Errors of the last matched pose: in m, in m, as a ratio to path_reference, and in rad.
+  double end_error_se3 = 0;
+  double end_error_start_aligned = 0;
+  double end_error_ratio = 0;
+  double end_rotation_start_aligned = 0;
 
-  std::vector<SegmentErrors> segments;  // one for each SegmentOptions, same order
+  /// One for each SegmentOptions, in the same order.
+  std::vector<SegmentErrors> segments;
 };
 
-/// All of it. Two trajectories without overlap are a status, not an error.
+/// Computes all results. Trajectories without overlap give a status, not an error.
 [[nodiscard]] TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate,
                                             std::span<const StampedPose> reference,
                                             const EvaluationOptions& options);
-
-/// The parts, for callers that need one of them.
 
 [[nodiscard]] MatchedTrajectories associate(std::span<const StampedPose> estimate,
                                             std::span<const StampedPose> reference,
@@ -152,23 +178,22 @@ struct TrajectoryEvaluation {
 
 enum class AlignmentScale : std::uint8_t { one, free };
 
-/// Closed form of Horn and Umeyama. Precondition: as many estimates as references, at least one.
-/// Points that all coincide leave R = I.
+/// Closed form of Horn and Umeyama. Precondition: as many estimates as references, at least one. If
+/// all points coincide, R = I.
 [[nodiscard]] Alignment align(std::span<const StampedPose> estimate,
                               std::span<const StampedPose> reference, AlignmentScale scale);
 
-/// Σ‖x_(i+1) − x_i‖, metres.
+/// Path length Σ‖x_(i+1) − x_i‖, in m.
 [[nodiscard]] double path_length(std::span<const StampedPose> trajectory);
 
-/// `estimate_scale` multiplies the estimate's translations. Precondition: matched, i.e. of equal
-/// size.
+/// `estimate_scale` multiplies the estimate's translations. Precondition: matched trajectories.
 [[nodiscard]] SegmentErrors segment_errors(std::span<const StampedPose> estimate,
                                            std::span<const StampedPose> reference,
                                            const SegmentOptions& options,
                                            double estimate_scale = 1.0);
 
-/// Up of the world a body moves in: +z (enu, laser trackers) or −y (a camera's world), whichever
-/// the body's mean up is nearer to.
+/// Up direction of the body's world: +z (enu, laser trackers) or −y (a camera's world), whichever
+/// is nearer to the body's mean up.
 [[nodiscard]] Vec3 world_up(std::span<const StampedPose> reference, BodyAxes axes);
 
 }  // namespace vergence

@@ -15,7 +15,7 @@ struct Sum {
     translation += t;
     rotation += r;
   }
-  /// NaN stays where nothing was added.
+  /// Leaves NaN if nothing was added.
   void mean(std::size_t* n, double* t, double* r) const {
     *n = count;
     if (count == 0) return;
@@ -36,7 +36,8 @@ SegmentErrors segment_errors(std::span<const StampedPose> estimate,
                              std::span<const StampedPose> reference, const SegmentOptions& options,
                              double estimate_scale) {
   assert(estimate.size() == reference.size() && options.step > 0);
-  std::vector<double> distance(reference.size(), 0.0);  // m, along the reference
+  // Distance along the reference, in m.
+  std::vector<double> distance(reference.size(), 0.0);
   for (std::size_t i = 1; i < distance.size(); ++i)
     distance[i] =
         distance[i - 1] + (reference[i].T_world_body.t - reference[i - 1].T_world_body.t).norm();
@@ -49,11 +50,12 @@ SegmentErrors segment_errors(std::span<const StampedPose> estimate,
     Sum sum;
     for (std::size_t first = 0; first < distance.size();
          first += static_cast<std::size_t>(options.step)) {
-      // Strictly longer than the nominal length, as the devkit takes it; dividing by the nominal
-      // length is the devkit's, too.
+      // As in the devkit, the segment is strictly longer than the nominal length, by which errors
+      // are divided.
       const auto end = std::upper_bound(distance.begin() + static_cast<std::ptrdiff_t>(first),
                                         distance.end(), distance[first] + length);
-      if (end == distance.end()) break;  // later starts have even less way left
+      // Later starts have even less path left.
+      if (end == distance.end()) break;
       const auto last = static_cast<std::size_t>(end - distance.begin());
       const Transform R =
           relative(reference[first].T_world_body, reference[last].T_world_body, 1.0);

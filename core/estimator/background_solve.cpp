@@ -6,7 +6,7 @@
 namespace vergence {
 namespace {
 
-// Frames after a snapshot, for the gates to have frames that were not in it.
+// Minimum number of frames after a snapshot, on which the gates test the solution.
 constexpr int kMinHeldOut = 6;
 
 }  // namespace
@@ -46,8 +46,8 @@ void BackgroundSolve::run() noexcept {
   calibration::RigSolveRequest request;
   request.rig = start_.rig;
   request.from_rig = start_.from_rig;
-  // Intrinsics have the priors of the calibration supplied: what the frames have shown since must
-  // not be its own witness.
+  // The prior of the intrinsics is the initial calibration, not earlier results of these frames, so
+  // that no measurement counts twice.
   request.given = &given_;
   request.known = start_.prior;
   solved_ = solver_.solve(request);

@@ -6,8 +6,8 @@
 
 namespace vergence {
 
-/// One solve for the rig at a time, beside the frames: takes a snapshot of the tracks, hands it to
-/// the background runner, and has the solution when that is done.
+/// Runs one rig calibration at a time in the background: copies the tracks, hands them to the
+/// background runner and provides the solution once the runner has finished.
 ///
 ///     solve.start(log, start);
 ///     if (solve.running() && solve.next_frame()) {  // each frame
@@ -16,17 +16,20 @@ namespace vergence {
 ///     }
 ///
 /// Threads  One caller. The task runs on the BackgroundRunner's thread and writes into this object
-/// until it is done; the destructor waits for it. Memory from the arena at construction.
+///          until it is done; the destructor waits for it. Memory from the arena at construction.
 class BackgroundSolve {
  public:
-  /// Where a solve begins and what is known before it.
+  /// Initial values, mode and prior of a solve.
   struct Start {
     RigCalibration rig{};
-    bool from_rig = false;     // begin with the transforms of `rig`
-    bool for_new_rig = false;  // estimates a new calibration; false: refines the one in use
-    const RigCalibration* prior = nullptr;  // what earlier frames have shown; copied
+    /// True: start from the transforms of `rig`.
+    bool from_rig = false;
+    /// True: estimate a new calibration. False: refine the one in use.
+    bool for_new_rig = false;
+    /// Posterior of earlier frames, copied by start(); null if there is none.
+    const RigCalibration* prior = nullptr;
   };
-  /// `given`: the calibration that the drive began with.
+  /// `given`: initial calibration; its intrinsics are the prior of every solve.
   BackgroundSolve(const EstimatorOptions& options, const RigCalibration& given, std::size_t tracks,
                   Arena& arena, BackgroundRunner& runner);
   ~BackgroundSolve() { finish(); }
@@ -37,33 +40,30 @@ class BackgroundSolve {
 
   /// Precondition: !running().
   void start(const calibration::TrackLog& log, const Start& start) noexcept;
-  /// True from start() to close().
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] bool for_new_rig() const noexcept { return start_.for_new_rig; }
-  /// Call once per frame while running(). Returns true if the solver has finished and a decision
-  /// about its solutions is due at this frame. Waits for the solver with
-  /// Adoption::after_fixed_frames only; with Adoption::when_ready it returns false until the solver
-  /// has finished.
+  /// Call once per frame while running(). Returns true if the solver has finished and a decision is
+  /// due. Waits for the solver with Adoption::after_fixed_frames only.
   [[nodiscard]] bool next_frame() noexcept;
-  /// True if this is the last frame to decide at: the solution has to be adopted or rejected.
+  /// Returns true at the last frame for a decision: the solution must be adopted or rejected.
   [[nodiscard]] bool last_turn() const noexcept;
-  /// Puts the decision off by some frames, so that more of them are not in the solve.
+  /// Postpones the decision, so that more frames are held out of the solve.
   void postpone() noexcept;
-  /// Time that the last next_frame() waited for the solver, ms; 0 with Adoption::when_ready.
+  /// Time that the last next_frame() waited for the solver, in ms; 0 with Adoption::when_ready.
   [[nodiscard]] float waited_ms() const noexcept { return waited_ms_; }
   void clear_waited() noexcept { waited_ms_ = 0; }
-  /// Waits for the task.
   void finish() noexcept;
-  /// Marks the running solve, if any, as outdated: its frames no longer describe the rig.
+  /// Marks a running solve as outdated, because its frames no longer describe the rig.
   void discard() noexcept { discarded_ = running_; }
-  /// True if the solve was discarded, or was started for another purpose than `estimating` states.
+  /// Returns true if the solve was discarded or does not match the present mode. `estimating`: a
+  /// new calibration is wanted, not a refinement.
   [[nodiscard]] bool outdated(bool estimating) const noexcept {
     return discarded_ || start_.for_new_rig != estimating;
   }
   /// Ends the solve after its solutions have been used; another one may start.
   void close() noexcept { running_ = false; }
   [[nodiscard]] const calibration::RigSolution& solved() const noexcept { return solved_; }
-  /// Focal length measurements of the same snapshots. Read it only while no solve runs.
+  /// Focal lengths measured from the same snapshots. Access it only while no solve is running.
   [[nodiscard]] calibration::FocalCheck& focal_check() noexcept { return focal_check_; }
   [[nodiscard]] const calibration::FocalCheck& focal_check() const noexcept { return focal_check_; }
 
@@ -85,7 +85,8 @@ class BackgroundSolve {
   calibration::RigSolution solved_;
   bool running_ = false, discarded_ = false;
   int frames_since_start_ = 0;
-  int next_turn_ = 0;  // frames after the start
+  // Number of frames after start() at which the next decision is due.
+  int next_turn_ = 0;
   float waited_ms_ = 0;
 };
 

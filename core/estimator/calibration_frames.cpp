@@ -8,11 +8,13 @@ namespace {
 
 using odometry::MapPoint;
 
-// px, mean of the tracks since the last frame taken: less repeats the same errors.
+// Minimum mean displacement of the tracks between two logged frames, in pixels; closer frames
+// repeat the same errors.
 constexpr double kMovedPixels = 1.0;
-// For so long without another frame in the log: the rig stands.
+// Number of frames without a logged one after which the rig counts as standing still.
 constexpr int kStillFrames = 15;
-constexpr std::size_t kNewFrames = 5;  // at least, between two solves
+// Minimum number of new frames between two solves.
+constexpr std::size_t kNewFrames = 5;
 
 double pixels_moved(const odometry::Map& map) noexcept {
   double sum = 0;
@@ -52,8 +54,9 @@ void CalibrationFrames::take(odometry::Odometry& odometry, const odometry::Frame
   f.stereo = outcome.stereo_inliers;
   log_.begin(f);
   for (MapPoint& p : odometry.map().points()) {
-    // A track is taken if it agrees with the left camera's pose. Linked, the others' observations
-    // are taken as they were found: the calibration in use must not choose its own witnesses.
+    // A track is logged if it agrees with the left camera's pose. With linked cameras the other
+    // cameras' observations are logged even if they disagree, so that the calibration in use does
+    // not select the observations that test it.
     if (!p.followed() || !p.now.by(0)) continue;
     calibration::LoggedObservation s;
     s.track = p.id;
@@ -107,7 +110,7 @@ std::size_t CalibrationFrames::most() const noexcept {
 }
 
 std::size_t CalibrationFrames::min_to_solve() const noexcept {
-  // With the six frames held out, a calibration that is given is judged in frame 25.
+  // With six held-out frames, a supplied calibration is evaluated in frame 25.
   constexpr std::size_t kFewest = 20;
   return std::min(kFewest, least());
 }

@@ -6,20 +6,30 @@ namespace vergence {
 
 /// State of the calibration in use.
 enum class CalibrationState : std::uint8_t {
-  none,        // there is none; one is sought
-  unverified,  // in use, and not yet compared with an own measurement
-  verified,    // in use, and its depths are within the tolerated error
-  suspect,     // the rig seems to have changed; another one is sought
+  /// No calibration is in use; one is being estimated.
+  none,
+  /// In use, but not yet compared with an online estimate.
+  unverified,
+  /// In use, and its depths are within the tolerated error.
+  verified,
+  /// The rig seems to have changed; another calibration is being estimated.
+  suspect,
 };
 
-/// Event that changes the state of the calibration in use.
+/// Event that can change the state of the calibration in use.
 enum class CalibrationTrigger : std::uint8_t {
-  adopted,           // what was sought is found
-  adopted_verified,  // the same, by a drive that holds its depths to the tolerated error
-  verified,          // by a measurement, while it was in use
-  contradicted,      // the same
-  suspected,         // an alarm, or a recalibration was requested
-  kept,              // what was sought is no better, or the images fit the one before again
+  /// An estimated calibration is adopted.
+  adopted,
+  /// An estimated calibration is adopted whose depths are within the tolerated error.
+  adopted_verified,
+  /// An online estimate verified the calibration in use.
+  verified,
+  /// An online estimate contradicts the calibration in use.
+  contradicted,
+  /// The monitor raised an alarm, or a recalibration was requested.
+  suspected,
+  /// The estimate is no better than the calibration in use, or the images fit an earlier one again.
+  kept,
 };
 
 struct CalibrationTransition {
@@ -28,7 +38,8 @@ struct CalibrationTransition {
   CalibrationState to;
 };
 
-/// All edges; a trigger without an edge from the current state changes nothing.
+/// All edges of the state machine; a trigger without an edge from the current state changes
+/// nothing.
 inline constexpr std::array kCalibrationTransitions = {
     CalibrationTransition{CalibrationState::none, CalibrationTrigger::adopted,
                           CalibrationState::unverified},

@@ -8,40 +8,52 @@
 
 namespace vergence {
 
-/// Reasons for which poses are `degraded`, strongest first: where several stand, the first of them
-/// names the reason.
+/// Causes of `degraded` poses, strongest first: if several apply, the first one determines the
+/// reason.
 enum class Degradation : std::uint8_t {
-  pairing,        // this frame's images are contradicted to have been exposed together
-  scene,          // the map was rebuilt
-  frame,          // this frame's images, matches or geometry: FrameOutcome::reason
-  out_of_sync,    // a camera's images are of another instant
-  late_image,     // a camera may be an exposure behind
-  rig,            // something is wrong with the rig, or it is being recalibrated
-  calibration,    // the calibration that poses depend on is not verified
-  dynamic_scene,  // points of this frame or the last ones do not move as one rigid scene
-  window,         // the window still holds degraded frames
-  motion,         // this motion is less certain than the drive's others
+  /// The timing contradicts that this frame's images were exposed together.
+  pairing,
+  /// The map was rebuilt in this frame or shortly before.
+  scene,
+  /// This frame's images, matches or geometry are weak; see FrameOutcome::reason.
+  frame,
+  /// A camera's images are from another instant.
+  out_of_sync,
+  /// A camera may lag by one exposure.
+  late_image,
+  /// The rig may have changed, or is being recalibrated.
+  rig,
+  /// The calibration that poses depend on is not verified.
+  calibration,
+  /// Points of this frame or of recent ones do not move as one rigid scene.
+  dynamic_scene,
+  /// The window still contains degraded frames.
+  window,
+  /// This motion is unusually uncertain, or the window corrected it strongly.
+  motion,
 };
 inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradation::motion) + 1;
 
-/// The degradations that apply, each with its reason, its first frame, and the number of frames of
-/// evidence that ends it. A pose is `ok` while the ledger is empty; else it is
-/// `degraded` for the strongest reason.
+/// The degradations that apply, each with its reason, first frame, and number of frames of evidence
+/// that ends it. A pose is `ok` while there are none, otherwise `degraded` for the strongest
+/// reason.
 ///
 ///     ledger.enter(Degradation::scene, Reason::map_reset, frame.number, 10);
 ///     if (const DegradationLedger::Entry* why = ledger.strongest(true)) use(why->reason);
-///     ledger.weaken(Degradation::scene);  // a frame that speaks against it
+///     ledger.weaken(Degradation::scene);  // one frame of evidence against it
 ///
-/// Threads  One. Memory: none of the heap.
+/// Not thread-safe. Does not allocate.
 class DegradationLedger {
  public:
   /// Value of `left` for a degradation that only strike() ends.
   static constexpr int kUntilStruck = std::numeric_limits<int>::max();
 
   struct Entry {
-    Reason reason = Reason::none;  // none: it does not stand
-    std::uint64_t since = 0;       // frame number
-    int left = 0;                  // frames of evidence that end it
+    /// Reason::none if the degradation does not apply.
+    Reason reason = Reason::none;
+    std::uint64_t since = 0;
+    /// Number of frames of evidence that end the degradation.
+    int left = 0;
   };
 
   /// Enters a degradation, or renews it and keeps its first frame.
@@ -51,7 +63,7 @@ class DegradationLedger {
     e = {reason, e.reason == Reason::none ? frame : e.since, left};
   }
   void strike(Degradation degradation) noexcept { at(degradation) = {}; }
-  /// Enters the degradation if `so`, else ends it.
+  /// Enters the degradation if `so`, otherwise ends it.
   void hold(Degradation degradation, bool so, Reason reason, std::uint64_t frame) noexcept {
     if (so)
       enter(degradation, reason, frame);
@@ -72,8 +84,8 @@ class DegradationLedger {
   [[nodiscard]] bool stands(Degradation degradation) const noexcept {
     return (*this)[degradation].reason != Reason::none;
   }
-  /// The strongest degradation that applies; nullptr if none does. `late_image` does not count
-  /// while the rig stands (`moves` false): an image that is an exposure late shows the same then.
+  /// Returns the strongest degradation that applies, or nullptr. `late_image` does not count while
+  /// the rig stands still (`moves` false), because a late image then looks the same.
   [[nodiscard]] const Entry* strongest(bool moves) const noexcept {
     for (std::size_t i = 0; i < kDegradations; ++i)
       if (entries_[i].reason != Reason::none &&

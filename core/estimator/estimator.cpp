@@ -41,7 +41,7 @@ void check(const EstimatorOptions& options, const RigCalibration& rig) {
         "everything");
 }
 
-/// The frame as it may be used: where the pairing is contradicted, its first image alone.
+/// Returns the frame, with only its first image if the pairing is contradicted.
 RigFrame usable(const RigFrame& frame) noexcept {
   RigFrame usable = frame;
   if (frame.pairing != Pairing::contradicted) return usable;
@@ -93,7 +93,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   p.last_number = frame.number;
   if (p.state == State::initialising && p.calibrator.calibrated())
     p.transition(Trigger::calibration_given, frame.stamp);
-  // Asked for while there is no pose, it waits until there is one.
+  // A request made while there is no pose waits until there is one.
   const bool can_be_asked = p.state != State::lost && p.state != State::initialising;
   if (can_be_asked && p.requested.exchange(false, std::memory_order_relaxed) &&
       p.state == State::stereo_odometry && p.options.online)
@@ -108,7 +108,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
       if (!linked && (p.calibrator.estimating() || p.calibrator.monitor().map_reset_pending()))
         p.watch_estimate(out, frame);
-      // Images of cameras out of sync cannot be calibrated from, even where no lag shows for a
+      // Images that are out of sync cannot be used for calibration, even if no lag is visible for a
       // while.
       if (!p.degradations.stands(Degradation::out_of_sync) || p.state != State::stereo_odometry)
         p.calibrator.frames().take(p.odometry, out, frame);
@@ -141,8 +141,8 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   sample.keyframe = out.keyframe;
   sample.effort = out.effort;
   sample.stage_ms = out.stage_ms;
-  // Waiting for the solver makes a replay the same on every machine; it is no part of a frame's
-  // work.
+  // Waiting for the solver makes replays deterministic; it is not part of the frame's processing
+  // time.
   sample.estimate_ms =
       std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count() -
       p.calibrator.solve().waited_ms();
@@ -154,8 +154,8 @@ void Estimator::finish() noexcept {
   p.events.clear();
   p.decisions.clear();
   if (!p.options.online) return;
-  // One solve may be under way, what it lacked the frames since then may give, and what is known by
-  // then all frames can make better.
+  // At most: the solve that is running, one with the frames logged since, and a refinement with all
+  // frames.
   constexpr int kLastSolves = 3;
   for (int attempt = 0; attempt < kLastSolves; ++attempt) {
     if (!p.calibrator.solve().running()) {

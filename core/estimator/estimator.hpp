@@ -19,15 +19,20 @@ namespace vergence {
 
 /// Origin of the calibration handed to the estimator.
 enum class CalibrationTrust : std::uint8_t {
-  given,       // in use from the first frame; poses are `degraded` until it is verified
-  state_file,  // from the state file of the last run: handled like `given`
-  none,        // from scratch: only intrinsics and baseline length of the rig are read
+  /// Used from the first frame; poses are `degraded` until it is verified.
+  given,
+  /// From the last run's state file; handled like `given`.
+  state_file,
+  /// None: only intrinsics and baseline length of the rig are used.
+  none,
 };
 
 /// Time at which a solution is adopted or rejected.
 enum class Adoption : std::uint8_t {
-  after_fixed_frames,  // deterministic: the estimator waits for the solver
-  when_ready,          // live: when the solver has finished
+  /// After a fixed number of frames, for which the estimator waits for the solver: deterministic.
+  after_fixed_frames,
+  /// As soon as the solver has finished: for live operation.
+  when_ready,
 };
 
 struct EstimatorOptions {
@@ -36,34 +41,49 @@ struct EstimatorOptions {
   calibration::MonitorOptions monitor{};
   CalibrationTrust trust = CalibrationTrust::given;
   Adoption adoption = Adoption::after_fixed_frames;
-  /// By camera, of its images' size; no point is placed where a mask is 0. Empty: no mask.
+  /// Mask of each camera, as large as its images; no point is placed where a mask is 0. An empty
+  /// view means no mask.
   std::array<ImageView, kMaxCameras> masks{};
-  /// Live: time of a frame above which work is left out (docs/deployment.md); zero: no limit.
+  /// Time limit per frame for live operation, above which work is left out (docs/deployment.md);
+  /// zero means no limit.
   Duration frame_budget{};
-  /// False: the rig is not monitored, and the calibration given is used throughout.
+  /// If false, the rig is not monitored and the supplied calibration is used throughout.
   bool online = true;
 };
 
-/// Event of the estimator: a line of events.jsonl. `why` points to a constant.
+/// Event of the estimator, written as a line of events.jsonl. `why` points to a constant.
 struct EstimatorEvent {
-  /// The comment names the unit of `value`; where there is none it is 0.
+  /// Kind of an event. Each comment describes `value`, which is 0 for other kinds.
   enum class Kind : std::uint8_t {
     state,
-    map_reset,  // s, of the gap
-    time_gap,   // s
+    /// Duration of the gap, in s.
+    map_reset,
+    /// Duration of the gap, in s.
+    time_gap,
     relocalised,
-    dropped,                    // s that the frame is older than the one before
-    rig_changed,                // frames since the onset; also when a calibration was requested
-    out_of_sync,                // lag in frames; 0 if it is not known
-    cameras_in_sync,            // after out_of_sync
-    calibration_verified,       // sigma of the depth, percent
-    calibration_contradicted,   // depth error of the one in use, percent
-    focal_length_contradicted,  // focal length measured, px
-    calibration_accepted,       // frames it was solved from
-    calibration_rejected,       // frames it was solved from
-    calibration_taken_up,  // share of the map's points that fit the calibration accepted, percent
-    calibration_pending,   // `why` names what is missing
-    calibration_resumed,   // tracking was lost, and the images fit an earlier calibration
+    /// Time by which the frame is older than the previous one, in s.
+    dropped,
+    /// Number of frames since the onset. Also recorded for a requested calibration.
+    rig_changed,
+    /// Lag in frames; 0 if unknown.
+    out_of_sync,
+    cameras_in_sync,
+    /// Standard deviation of depths, in percent.
+    calibration_verified,
+    /// Depth error of the calibration in use, in percent.
+    calibration_contradicted,
+    /// Measured focal length, in px.
+    focal_length_contradicted,
+    /// Number of frames in the solve.
+    calibration_accepted,
+    /// Number of frames in the solve.
+    calibration_rejected,
+    /// Share of map points that fit the accepted calibration, in percent.
+    calibration_taken_up,
+    /// None; `why` names what is missing.
+    calibration_pending,
+    /// None; the images fit an earlier calibration after tracking was lost.
+    calibration_resumed,
   };
   Kind kind = Kind::state;
   Stamp stamp{};
@@ -71,12 +91,11 @@ struct EstimatorEvent {
   State to = State::initialising;
   const char* why = "";
   double value = 0;
-  /// Of a change, a verification or a contradiction that was measured.
   ChangeEvidence evidence;
 };
 
-/// Estimates the pose of each rig frame, and the rig's calibration while it drives. This is the
-/// entry point of core.
+/// Estimates the pose of each rig frame, and calibrates the rig online. This is the entry point of
+/// core.
 ///
 ///     Arena arena(Estimator::memory_needed(options, rig));
 ///     SequentialRunner runner;
@@ -90,20 +109,20 @@ struct EstimatorEvent {
 /// Ownership  Keeps references to the arena and the runners; images are read during process() only,
 ///            masks in the constructor only.
 /// Threads    One caller; process() uses `runner` for the other images' front end and `solver` for
-///            calibration, which runs beside the frames. Same poses whatever the runners, with
-///            Adoption::after_fixed_frames. request_recalibration(): any thread.
+///            calibration in the background. With Adoption::after_fixed_frames, poses do not depend
+///            on the runners. request_recalibration(): any thread.
 /// Memory     All of it from the arena in the constructor. process() allocates nothing, nor does
 ///            the solver's task.
 /// Errors     The constructor throws (std::invalid_argument with a message, std::length_error).
 ///            process() never does.
 class Estimator {
  public:
-  /// Bytes that the arena must have free for these options and this rig.
   [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
                                                  const RigCalibration& rig);
 
-  /// `rig`: intrinsics, baseline length and, but for CalibrationTrust::none, T_camera_left.
-  /// `nominal`: what the gates compare a new calibration with (rig.nominal of the configuration).
+  /// `rig`: intrinsics, baseline length and, except with CalibrationTrust::none, T_camera_left.
+  /// `nominal`: design values of the rig, which the gates compare a new calibration with
+  /// (rig.nominal of the configuration).
   Estimator(const EstimatorOptions& options, const RigCalibration& rig,
             const RigCalibration& nominal, Arena& arena, PairRunner& runner,
             BackgroundRunner& solver);
@@ -117,9 +136,9 @@ class Estimator {
   /// is degraded. T_world_left is continuous except across a marked gap.
   [[nodiscard]] PoseSample process(const RigFrame& frame) noexcept;
 
-  /// Call after the last frame. Solves for and decides about a calibration that is still being
-  /// estimated, from the frames there are; events() and calibrations() have the outcome. Waits for
-  /// the solver.
+  /// Call after the last frame. Solves and decides on a calibration that is still being estimated,
+  /// using the frames logged so far; events() and calibrations() have the outcome. Waits for the
+  /// solver.
   void finish() noexcept;
 
   /// Requests a new calibration, whatever the monitor's result; acts at the next frame.
@@ -128,16 +147,15 @@ class Estimator {
 
   /// Events of the last process() or finish() call, oldest first; valid until the next call.
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept;
-  /// Calibrations decided about in the last process() or finish() call, each a line of
-  /// calibrations.csv. An accepted one is in use from then on and belongs into the state file.
+  /// Calibrations decided on in the last process() or finish() call, each a line of
+  /// calibrations.csv. An accepted one is used from then on and belongs in the state file.
   [[nodiscard]] std::span<const CalibrationDecision> calibrations() const noexcept;
 
   [[nodiscard]] State state() const noexcept;
-  /// The calibration in use; before there is one, the rig given, without T_camera_left.
+  /// The calibration in use; before there is one, the supplied rig without T_camera_left.
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
   [[nodiscard]] bool calibrated() const noexcept;
-  /// True if depths of the calibration in use were measured to be within the tolerated error
-  ///.
+  /// True if the depths of the calibration in use were measured to be within the tolerated error.
   [[nodiscard]] bool verified() const noexcept;
   /// The newest moving frames with their tracks; empty without `online`. Valid until the next
   /// process().
@@ -145,7 +163,8 @@ class Estimator {
 
  private:
   struct Parts;
-  Parts* parts_;  // in the arena
+  // Constructed in the arena.
+  Parts* parts_;
 };
 
 }  // namespace vergence

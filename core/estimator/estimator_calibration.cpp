@@ -8,13 +8,15 @@
 namespace vergence {
 namespace {
 
-constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
+// Number of newest frames of a drifting rig that are used as frames of one rig.
+constexpr std::uint64_t kDriftFrames = 60;
 
-/// From which frame on the tracks tell of the rig as it is now.
+/// Number of the first frame whose tracks describe the present rig.
 std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now) noexcept {
   using K = calibration::MonitorResult::Kind;
-  if (v.kind == K::collapse) return now;  // until now there were wrong matches only
-  // Of a drifting rig only the newest frames describe the present one.
+  // Until now there were only wrong matches.
+  if (v.kind == K::collapse) return now;
+  // Only the newest frames describe a drifting rig.
   if (v.kind == K::drift) return std::max(v.onset_frame, now - std::min(now, kDriftFrames));
   return v.onset_frame;
 }
@@ -50,14 +52,14 @@ const char* cause_message(CalibrationCause cause) noexcept {
     case CalibrationCause::contradicted:
       return "left and right hardly match: the calibration in use does not fit the rig";
     case CalibrationCause::refinement:
-      break;  // no reason to seek one
+      break;
   }
   return "";
 }
 
 }  // namespace
 
-/// Another calibration is sought: the rig has changed at `onset`, or is thought to have.
+/// Starts estimating another calibration, because the rig has or may have changed at `onset`.
 void Estimator::Parts::start_estimation(CalibrationCause cause, std::uint64_t onset,
                                         const RigFrame& frame) noexcept {
   transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed,
@@ -76,8 +78,8 @@ void Estimator::Parts::suspect_rig(CalibrationCause cause, std::uint64_t onset,
   start_estimation(cause, onset, frame);
 }
 
-/// Left and right hardly match with the calibration in use. One that was never verified was
-/// not the rig's from the start; one that it did was knocked away.
+/// Handles frames in which left and right hardly match: a verified calibration indicates a large
+/// knock, an unverified one was wrong from the start.
 void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames) noexcept {
   const CalibrationCause cause =
       calibrator.verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
@@ -86,8 +88,8 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
   else
     record(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, cause_message(cause), 0);
   start_estimation(cause, frame.number, frame);
-  // Where the cameras were is where they no longer are: what is found from there, on a facade that
-  // repeats itself, is chance.
+  // The previous extrinsics are not a starting point: on repetitive structure, matches near them
+  // are chance.
   odometry.reset_extrinsics();
 }
 
@@ -97,8 +99,8 @@ void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexce
            lag_frames);
   degradations.enter(Degradation::out_of_sync, Reason::out_of_sync, last_number, 1);
   calibrator.monitor().question_pairing();
-  // Frames out of step would speak for a lag in the monitor's windows long after its end; those
-  // logged for a calibration are dropped with them.
+  // Frames out of sync would indicate a lag in the monitor's windows long after its end, and must
+  // not enter a calibration.
   calibrator.clear_frames();
 }
 
@@ -130,8 +132,8 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   }
 }
 
-/// A rig that changes while it is sought: frames before and after are never one solve, and those
-/// after do not confirm those before.
+/// Detects a change of the rig during an estimation. Frames before and after the change must not
+/// enter one solve, nor may later frames confirm a solution from earlier ones.
 void Estimator::Parts::watch_estimate(const odometry::FrameOutcome& out,
                                       const RigFrame& frame) noexcept {
   const auto onset = calibrator.monitor().update_unlinked(odometry, out, frame.number);
@@ -144,15 +146,15 @@ void Estimator::Parts::watch_estimate(const odometry::FrameOutcome& out,
       frame);
 }
 
-/// Restarts the estimation because its frames are of another rig. Without a cause, the estimation's
-/// own is kept.
+/// Restarts the estimation because its frames are of another rig. Without a cause, the estimation
+/// keeps its own.
 void Estimator::Parts::restart_estimation(std::optional<CalibrationCause> cause,
                                           std::uint64_t onset, const RigFrame& frame) noexcept {
   calibrator.start_estimation(cause, onset, frame.number);
   if (state == State::calibrating) transition(Trigger::calibration_rejected, frame.stamp);
 }
 
-/// Solves are started and decided.
+/// Starts solves and acts on their decisions.
 void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
   if (const auto decision = calibrator.decide(frame.stamp, frame.number))
     take(*decision, frame.stamp);
@@ -165,8 +167,8 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
   notify_missing(frame.stamp);
 }
 
-/// Updates the relative sigma of lengths: for an adopted calibration its own sigma, for one that
-/// stays also its difference from the drive's measurement.
+/// Updates the relative sigma of lengths: an adopted calibration's own sigma; for one that stays,
+/// combined with its difference from the online estimate.
 void Estimator::Parts::record_length_sigma(const CalibrationDecision& decision) noexcept {
   if (!(decision.depth_sigma_percent > 0)) return;
   if (decision.accepted)
@@ -175,8 +177,8 @@ void Estimator::Parts::record_length_sigma(const CalibrationDecision& decision) 
     length_sigma_percent = std::hypot(decision.depth_sigma_percent, decision.depth_error_percent);
 }
 
-/// A calibration is adopted. Poses stand on it once the scene is seen through it; until then what
-/// is known against the one before it counts.
+/// Adopts a calibration. Poses depend on it once the map is rebuilt with it; until then the status
+/// of the previous one applies.
 void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
   degradations.strike(Degradation::rig);
   verified_percent = decision.depth_sigma_percent;
@@ -203,7 +205,7 @@ void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Sta
     adopt(decision);
   }
   if (decision.verified && !contradicted) {
-    // The calibration before a refinement is verified, too.
+    // The calibration before the refinement is verified as well.
     degradations.strike(Degradation::calibration);
     verified_percent = decision.depth_sigma_percent;
     if (!decision.accepted) verified_by = decision.evidence;

@@ -7,18 +7,20 @@
 namespace vergence {
 namespace {
 
-constexpr int kLostAfter = 3;  // consecutive frames without a pose before the state is `lost`
-// Frames with good images from which no map can be made with the calibration in use.
+// Number of consecutive frames without a pose after which the state is `lost`.
+constexpr int kLostAfter = 3;
+// Number of consecutive good images without a map after which the calibration in use is given up.
 constexpr int kUnmatchedAfter = 15;
-// Moving frames after a repeated image until that camera counts as in sync, if the rig is not
-// monitored.
+// Number of moving frames after a repeated image until the camera counts as in sync, if the rig is
+// not monitored.
 constexpr int kLagShownAfter = 12;
-// Frames marked after the map was rebuilt.
+// Number of frames marked after the map was rebuilt.
 constexpr int kRestartedFrames = 10;
-// Frames for which a dynamic scene is reported, the first one included: for single frames a passing
-// vehicle looks static.
+// Number of frames for which a dynamic scene is reported, because a passing vehicle looks static in
+// single frames.
 constexpr int kMovingFrames = 10;
-// Frames of a window, by the default of odometry.window_keyframes: at speed each is a keyframe.
+// Number of frames in a window at speed, where each is a keyframe; the default of
+// odometry.window_keyframes.
 constexpr int kWindowFrames = 10;
 
 Covariance6 upper_triangle(const Mat6& C) noexcept {
@@ -31,15 +33,14 @@ Covariance6 upper_triangle(const Mat6& C) noexcept {
 
 }  // namespace
 
-/// States that follow from whether there is a pose.
+/// Updates the state from whether there is a pose.
 void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
-  // Once a gap: covered cameras give frame after frame that lies behind it.
+  // Report a gap once: with covered cameras every frame lies behind it.
   if (out.gap_s > 0 && !in_gap)
     record(EstimatorEvent::Kind::time_gap, frame.stamp,
            "no frame for longer than motion can be predicted", out.gap_s);
   in_gap = out.gap_s > 0 && !out.posed;
-  // Images of two instants match by no calibration: cameras that are or may be out of step say
-  // nothing against it.
+  // Images of different instants match with no calibration, so they are no evidence against it.
   const bool unmatched =
       !out.posed && out.images_good && !degradations.stands(Degradation::out_of_sync) &&
       !degradations.stands(Degradation::late_image) && out.reason == Reason::no_stereo_matches &&
@@ -53,7 +54,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     degradations.enter(Degradation::late_image, Reason::image_repeated, frame.number,
                        kLagShownAfter);
     calibrator.monitor().question_pairing();
-    // Frames from before and frames out of step would be one solve, and a rig that is neither's.
+    // A solve must not mix frames from before with frames that may be out of sync.
     if (calibrator.estimating()) restart_estimation(std::nullopt, frame.number, frame);
   }
   moves = out.posed && !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_of(out));
@@ -74,9 +75,8 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
                : !calibrator.calibrated()                  ? Trigger::pose_found_uncalibrated
-               : calibrator.estimating()
-                   ? Trigger::pose_found_suspect
-                   : Trigger::pose_found,  // found, and linked with this frame
+               : calibrator.estimating()                   ? Trigger::pose_found_suspect
+                                                           : Trigger::pose_found,
                frame.stamp);
   if (state == State::initialising) {
     transition(Trigger::pair_found, frame.stamp);
@@ -92,7 +92,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
            "relocalised against the points of the window", 0);
 }
 
-/// The rig was not monitored during the missed frames: the calibration must be verified again.
+/// Marks the calibration as unverified, because the rig was not monitored during the missed frames.
 void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
   calibrator.map_lost();
   if (options.online && !degradations.stands(Degradation::calibration))
@@ -104,7 +104,7 @@ Mat6 Estimator::Parts::motion_of(const odometry::FrameOutcome& out) const noexce
   return odometry::motion_covariance(out.fit_covariance, out.expected, out.unseen_s);
 }
 
-/// The frame's pose, and how uncertain it is by now.
+/// Fills in the frame's pose and covariances.
 void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept {
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;
@@ -118,8 +118,8 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
   sample->length_sigma = static_cast<float>(length_sigma);
 }
 
-/// Against the drive's other motions and what the window made of it, where nothing else is known to
-/// be wrong.
+/// Checks the motion against the usual uncertainty and the window's correction, unless a stronger
+/// degradation explains it.
 void Estimator::Parts::check_motion(const odometry::FrameOutcome& out, const Mat6& motion,
                                     double step_m) noexcept {
   degradations.strike(Degradation::motion);
@@ -147,9 +147,9 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
   if (out.moving && !degradations.any_up_to(Degradation::rig))
     degradations.enter(Degradation::dynamic_scene, Reason::dynamic_scene, last_number,
                        kMovingFrames);
-  // Errors of degraded frames stay in the window's keyframes and points; the window corrects them
-  // over the next frames, whose motions are off by the corrections. So poses stay degraded for as
-  // many frames as were degraded, at most for a window's length.
+  // Errors of degraded frames stay in the window's keyframes and points, and correcting them
+  // disturbs later motions. So poses stay degraded for as many frames as were degraded, at most for
+  // a window's length.
   if (out.relinked || out.restarted)
     degradations.strike(Degradation::window);
   else if (out.gap_s > 0 || out.renewed)
@@ -165,9 +165,9 @@ void Estimator::Parts::weaken_degradations(const odometry::FrameOutcome& out,
   for (const Degradation degradation :
        {Degradation::scene, Degradation::dynamic_scene, Degradation::window})
     (void)degradations.weaken(degradation);
-  // A rig that stands looks the same with a camera an exposure behind.
+  // At standstill, an image that is late by an exposure looks the same.
   if (moves && !out.uneven && !options.online) (void)degradations.weaken(Degradation::late_image);
-  // The next pose stands on the calibration that was adopted.
+  // The next pose depends on the adopted calibration.
   if (out.relinked && degradations.weaken(Degradation::calibration)) notify_verified(stamp);
 }
 

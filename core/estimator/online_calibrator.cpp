@@ -13,20 +13,22 @@ namespace {
 using calibration::Gate;
 using calibration::RigSolution;
 
-constexpr int kMaxDoublings = 4;  // of the frames between two solves
-constexpr double kGrow = 1.3;     // at least, of the frames between two solves
+// Maximum number of doublings of the frames between two solves.
+constexpr int kMaxDoublings = 4;
+// Minimum growth factor of the frames between two solves.
+constexpr double kGrow = 1.3;
 
 std::size_t max_tracks(const EstimatorOptions& o) noexcept {
   return static_cast<std::size_t>(o.odometry.features);
 }
 
-/// Misfit of the calibration in use beyond the noise of the matches, px from the epipolar lines.
+/// Misfit of the calibration in use beyond the noise of the matches, in px from the epipolar lines.
 double misfit_px(const CalibrationDecision& d) noexcept {
   const double before = d.held_out_before_px, after = d.held_out_after_px;
   return std::sqrt(std::max(0.0, before * before - after * after));
 }
 
-/// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
+/// Clears the extrinsics of the prior when another rig is adopted; the intrinsics stay.
 void clear_rig(std::optional<RigCalibration>* refined) noexcept {
   if (*refined) calibration::clear_transforms(&**refined);
 }
@@ -158,12 +160,10 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
                                                             std::uint64_t number) noexcept {
   solve_.clear_waited();
   if (!solve_.running() || !solve_.next_frame()) return std::nullopt;
-  // Frames that stand are not logged: who stops then waits with the decision, for frames that were
-  // not used have to speak for it.
+  // The decision waits for enough held-out frames. At standstill none are logged.
   if (!solve_.outdated(estimating()) && !review().held_out_enough()) return std::nullopt;
   // An estimate is adopted as soon as the frames after its snapshot confirm it, and rejected only
-  // when more of them would not help. A refinement waits only for the frames that it is evaluated
-  // with.
+  // when more of them would not help. A refinement waits only for its held-out frames.
   if (solve_.for_new_rig() && !solve_.outdated(estimating()) && !solve_.last_turn()) {
     if (review().gate() != Gate::open) {
       solve_.postpone();
@@ -191,7 +191,7 @@ std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::
                                                               bool last) noexcept {
   solve_.close();
   if (solve_.outdated(estimating())) return std::nullopt;
-  // Frames of two rigs, or out of sync, do not measure a focal length.
+  // Frames of two rigs or out of sync cannot measure a focal length.
   const Gate gate = review().gate(false);
   if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
     solve_.focal_check().take(frames_.solved_frames() >= frames_.most());
@@ -218,7 +218,7 @@ void OnlineCalibrator::plan_search() noexcept {
   const RigSolution& found = solve_.solved();
   if (gate_ == Gate::depth_unknown || gate_ == Gate::needs_motion ||
       gate_ == Gate::needs_near_structure) {
-    // More of the same helps: sigmas fall with the root of the number of frames.
+    // More frames help: sigmas fall with the root of their number.
     const double excess = gate_ == Gate::depth_unknown
                               ? calibration::depth_excess(found.rig, options_.calibration,
                                                           options_.odometry.pixel_sigma)
@@ -230,21 +230,20 @@ void OnlineCalibrator::plan_search() noexcept {
     search_.change_believed = true;
     frames_.begin_segment(found.changed_at);
   } else {
-    // Solving the same frames again gives the same result, so they are dropped. After each
-    // rejection the next solve waits for twice as many frames, at most 16 times.
+    // Solving the same frames again gives the same result, so drop them. Each rejection doubles the
+    // frames until the next solve, up to 16 times.
     frames_.drop_before(found.newest + 1);
     frames_.want_new(frames_.least() << std::min(search_.rejections, kMaxDoublings));
     ++search_.rejections;
   }
 }
 
-/// Applies a verification or contradiction; the scatter that the monitor expects follows from it.
+/// Applies a verification or contradiction and sets the monitor's expected scatter accordingly.
 void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_px) noexcept {
   const CalibrationState before = std::exchange(state_, after(state_, what));
   if (state_ == before) return;
   monitor_.watch(rig_, verified() && found());
-  // A supplied calibration that is verified keeps its intrinsics, whose errors differ from place to
-  // place.
+  // A verified supplied calibration keeps its intrinsics, whose errors vary over the image.
   if (verified() && !found())
     monitor_.expect_scatter(std::max(options_.monitor.verified_bias_px, misfit_px));
 }
@@ -266,7 +265,7 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
     d.depth_error_percent = a.difference_percent;
     d.evidence = a.evidence;
     if (a.contradicted) d.cause = CalibrationCause::contradicted;
-    // At the end of a drive no frame is left that was not used; the solve of more frames is better.
+    // At the end no held-out frames are left; the solution of more frames is better.
     const calibration::TrackLog& log = frames_.log();
     const bool better = last && log.frame(log.size() - 1).number == found.newest
                             ? source_ == calibration::CalibrationOrigin::this_drive
@@ -275,7 +274,7 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
     // A verified calibration is not replaced by one that would not be.
     const bool certain = a.sigma_percent <= options_.calibration.max_depth_error_percent;
     if (gate_ == Gate::open && verified() && !certain && !a.contradicted) gate_ = Gate::no_better;
-    // Frames that contradict what was measured before them confirm nothing.
+    // Frames that contradict earlier measurements verify nothing.
     d.verified = gate_ == Gate::open
                      ? certain
                      : a.verified && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
@@ -292,8 +291,8 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
   return d;
 }
 
-/// A full segment is closed: what it has shown is the next one's prior. So is one that the frames
-/// after it contradict: they are of another rig, and not to be solved with it.
+/// Closes a full segment, whose result is the prior of the next one. A segment that later frames
+/// contradict is closed as well, because its frames are of another rig.
 void OnlineCalibrator::plan_refinement() noexcept {
   const RigSolution& found = solve_.solved();
   const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;

@@ -12,23 +12,21 @@ namespace vergence {
 
 class SolutionReview;
 
-/// Calibrates the rig while it drives: collects frames, monitors the calibration in
-/// use, has calibrations solved in the background and decides about them. The estimator hands in
-/// posed frames and acts on the decisions. The state of the calibration in use is one of the table
-/// in calibration_states.hpp; the states of the odometry belong to the estimator.
+/// Calibrates the rig online: collects frames, monitors the calibration in use, runs solves in the
+/// background and decides on their solutions. The estimator passes posed frames and acts on the
+/// decisions. calibration_states.hpp has the states of the calibration in use.
 ///
 /// There are two modes. *Estimating*: there is no calibration, or the one in use is suspect; the
-/// frames since the onset are solved until a solution passes the gates. *Refining*: at all other
-/// times; the solution verifies, contradicts or refines the calibration in use. A refinement solves
-/// repeatedly while its segment of frames grows; a full segment is closed, and its result is the
-/// prior of the next.
+/// frames since the onset are solved until a solution passes the gates. *Refining* otherwise:
+/// solutions verify, contradict or refine the calibration in use. They are from a growing segment
+/// of frames; a full one is closed, and its result is the prior of the next.
 ///
 ///     calibrator.frames().take(odometry, out, frame);  // every posed frame
 ///     if (calibrator.can_solve()) calibrator.start_solve();
 ///     if (const auto decision = calibrator.decide(frame.stamp, frame.number))
 ///       if (decision->accepted) calibrator.use(*decision);
 ///
-/// Threads one, but for the solver's task. Memory from the arena at construction.
+/// Not thread-safe, apart from the solver's task. Memory from the arena at construction.
 class OnlineCalibrator {
  public:
   OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
@@ -42,40 +40,40 @@ class OnlineCalibrator {
   [[nodiscard]] RigMonitor& monitor() noexcept { return monitor_; }
 
   /// Starts estimating a new calibration. Frames before frame number `onset` belong to another rig
-  /// and are dropped, and a running solve of them is discarded. Without a cause, that of the
-  /// estimation before is kept.
+  /// and are dropped, and a running solve of them is discarded. Without a cause, the previous
+  /// estimation's cause is kept.
   void start_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
                         std::uint64_t now) noexcept;
   [[nodiscard]] bool estimating() const noexcept {
     return state_ == CalibrationState::none || state_ == CalibrationState::suspect;
   }
-  /// True if there are frames enough to solve from and no solve is running.
+  /// True if there are enough frames and no solve is running.
   [[nodiscard]] bool can_solve() const noexcept;
-  /// Takes a snapshot and starts the solver on it.
+  /// Copies the logged frames and starts the solver on them.
   void start_solve() noexcept;
-  /// The background solve: whether it is running, and how long the last decide() waited for it.
+  /// The background solve, with the time that the last decide() waited for it.
   [[nodiscard]] const BackgroundSolve& solve() const noexcept { return solve_; }
-  /// Call after every frame. Returns the decision if the solve is over and was decided about.
+  /// Call after every frame. Returns the decision if a solve has finished and was evaluated.
   [[nodiscard]] std::optional<CalibrationDecision> decide(Stamp stamp,
                                                           std::uint64_t number) noexcept;
   /// Call after the last frame: waits for the running solve and decides.
   [[nodiscard]] std::optional<CalibrationDecision> decide_now(Stamp stamp,
                                                               std::uint64_t number) noexcept;
-  /// Starts a last solve with all that is logged. Returns false if that is too little.
+  /// Starts a last solve with all logged frames. Returns false if they are too few.
   [[nodiscard]] bool start_last_solve() noexcept;
   [[nodiscard]] calibration::Gate last_gate() const noexcept { return gate_; }
 
-  /// What the estimation lacks: needs_motion or needs_near_structure; `none` if nothing is known to
-  /// be missing.
+  /// Reason why the estimation makes no progress, needs_motion or needs_near_structure; `none` if
+  /// nothing is known to be missing.
   [[nodiscard]] Reason missing() const noexcept;
 
-  /// Call when the scene of the calibration in use was made; the rig is monitored from here on.
+  /// Call when the map was built with the calibration in use; monitoring of the rig starts here.
   void map_rebuilt(const odometry::Odometry& odometry) noexcept;
-  /// Drops all frames and restarts the monitors; the calibration in use stays. For when earlier
-  /// frames no longer describe the rig.
+  /// Drops all frames and restarts the monitors, because earlier frames no longer describe the rig.
+  /// The calibration in use stays.
   void clear_frames() noexcept;
-  /// Call when the scene was lost. Logged tracks end there, and earlier measurements of the rig do
-  /// not show that it was left alone meanwhile.
+  /// Call when the map was lost. Logged tracks end there, and earlier measurements no longer apply,
+  /// because the rig may have changed meanwhile.
   void map_lost() noexcept;
   /// Puts the estimated calibration of this decision into use.
   void use(const CalibrationDecision& found) noexcept;
@@ -93,17 +91,19 @@ class OnlineCalibrator {
   /// Cause and progress of an estimation.
   struct Search {
     CalibrationCause cause = CalibrationCause::from_scratch;
-    std::uint64_t onset = 0, since = 0;  // frame numbers
-    /// Frames before a change were dropped once; the rest count as frames of one rig.
+    // Numbers of the first frame of the changed rig and of the frame in which the estimation
+    // started.
+    std::uint64_t onset = 0, since = 0;
+    /// Frames before a change were dropped once; the remaining ones count as frames of one rig.
     bool change_believed = false;
-    /// Rejections for other reasons than too few frames.
+    /// Number of rejections for other reasons than too few frames.
     int rejections = 0;
   };
 
   /// `misfit_px`: median distance of matches from the epipolar lines beyond their noise.
   void apply_assessment(CalibrationTrigger what, double misfit_px) noexcept;
-  /// True if the calibration in use was solved from images, this drive's or an earlier one's, with
-  /// its intrinsics; its epipolar lines are more accurate than those of a supplied one.
+  /// True if the calibration in use was solved from images together with its intrinsics, in this
+  /// run or an earlier one; its epipolar lines are more accurate than those of a supplied one.
   [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }
   [[nodiscard]] SolutionReview review() const noexcept;
   /// `last`: no more frames follow.
@@ -120,7 +120,8 @@ class OnlineCalibrator {
   RigCalibration rig_, nominal_;
   CalibrationState state_;
   calibration::CalibrationOrigin source_ = calibration::CalibrationOrigin::elsewhere;
-  std::optional<RigCalibration> refined_;  // posterior of the closed segments
+  // Posterior of the closed segments.
+  std::optional<RigCalibration> refined_;
   CalibrationFrames frames_;
   BackgroundSolve solve_;
   RigMonitor monitor_;

@@ -11,28 +11,30 @@ namespace {
 using calibration::MonitorResult;
 using odometry::MapPoint;
 
-constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
-// Sigmas of an unknown reference: of rotation (rad) and of t in baselines. An offset from the first
-// frame on is a calibration that does not fit; a change against the frames before is a knock.
+// Margin of the image in which a track need not be found, in pixels.
+constexpr double kImageMargin = 12.0;
+// Sigmas of an unverified or supplied reference: rotation in rad, translation in baselines. They
+// are wide, so that only a change against earlier frames counts as a knock.
 constexpr std::array kReference = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
-// Sigmas of a calibration that was solved from images and is verified: the residual lens error in
-// one stretch. The solve's own sigmas cannot be used, because rotations and principal points are
-// determined together only.
+// Sigmas of a verified calibration solved from images: the residual lens error in one stretch. The
+// solve's own sigmas do not apply, because it determines rotations and principal points only
+// together.
 constexpr std::array kFound = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
-constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
-                             // calibration in use
-// Frames after a new reference until the spread of matches is known: until then a result makes
-// poses `degraded` and does not raise a knock. The same holds for a median distance of matches from
-// their epipolar lines of kFarFromLines px, which shows a knock in its first frame; those of the
-// recorded drives stay below 0.3 px.
+// Minimum number of frames in which a point was found. A new point's match was searched for in the
+// band of the calibration in use and cannot test it.
+constexpr int kWitness = 2;
+// Number of frames after a new reference until the spread of matches is known. Until then a result
+// makes poses `degraded` and raises no knock; so does a median distance to the epipolar lines above
+// kFarFromLines px. On recorded sequences it stays below 0.3 px.
 constexpr int kGraceFrames = 5;
 constexpr double kFarFromLines = 0.5;
-// Ratio to the distance in the frame before from which an image counts as distorted: 2.5 rows of
-// skew on `sand_rover` give 28 (1.77 px after 0.06).
+// Ratio to the previous frame's distance from which an image counts as distorted; 2.5 rows of skew
+// on `sand_rover` give 28 (1.77 px after 0.06).
 constexpr double kSpoilt = 2;
-constexpr double kMovingSpeed = 0.5;  // m/s: slower, and neighbouring images are nearly the same
+// Minimum speed of a moving rig, in m/s; below it, consecutive images are nearly the same.
+constexpr double kMovingSpeed = 0.5;
 
-/// `length`: unit of the last three, m.
+/// Covariance from sigmas; the last three are in units of `length`, in metres.
 Mat6 squares(const std::array<double, 6>& sigma, double length) noexcept {
   Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
   spread.tail<3>() *= length;
@@ -48,13 +50,13 @@ const Transform& transform(const RigCalibration& rig, int k) noexcept {
   return rig.T_camera_left[static_cast<std::size_t>(k)];
 }
 
-/// A rotation of σ about the axis that epipolar lines do not show moves all points by f σ.
+/// A rotation by σ about the axis that epipolar lines do not show moves all points by f σ.
 ChangeEvidence evidence_of(const calibration::DisparityJump& jump, double focal_px) noexcept {
   const double sigmas = jump.px / jump.sigma_px, px = std::abs(jump.px);
   return {0.5 * sigmas * sigmas, px, 1e3 * px / focal_px};
 }
 
-/// The left camera and camera k.
+/// True if the left camera and camera k gave structured images.
 bool both_show(const odometry::FrameOutcome& outcome, int k) noexcept {
   return (outcome.structured & 1U) != 0 &&
          ((outcome.structured >> static_cast<unsigned>(k)) & 1U) != 0;
@@ -115,7 +117,7 @@ void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig
   map_renewed(map);
 }
 
-/// Points made in this frame are where the next begins: no frame is between two that are compared.
+/// The next frame is compared with the points created in this one.
 void RigMonitor::map_renewed(const odometry::Map& map) noexcept {
   for (int k = 1; k < cameras_; ++k) {
     (void)collect_stereo(map, k, 1);
@@ -220,7 +222,7 @@ MonitorResult RigMonitor::monitor_verdict(int k, const odometry::Odometry& odome
   MonitorResult v = w.monitor.update(f);
   if (w.grace > 0) {
     --w.grace;
-    // A new reference that is wrong is no knock; no pose based on it is `ok`.
+    // A wrong new reference is not a knock, but no pose based on it is `ok`.
     const bool suspect =
         solved_and_verified_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
                                  w.pairing.distance_px() > kFarFromLines);
@@ -248,7 +250,7 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
                  pinhole(rig_, k));
     rig.cameras_in_sync = rig.cameras_in_sync && pairing.cameras_in_sync();
     if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
-    // A pose that a spoilt image has drawn off moves the disparities of the frames on both sides.
+    // A pose biased by a distorted image changes the disparities of the frames before and after it.
     const bool spoilt =
         pairing.distance_px() > kFarFromLines && pairing.distance_px() > kSpoilt * before;
     calibration::DisparityJump jump;
@@ -258,8 +260,8 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
       camera(k).jumps.skip(step);
     MonitorResult v;
     if (!map_reset_pending_) v = monitor_verdict(k, odometry, outcome, frame, found, moving);
-    // A lag moves the epipolar lines, and with every change of speed the disparities: while cameras
-    // may be out of sync, no change of the rig is reported.
+    // A lag moves matches off the epipolar lines, and changes disparities whenever the speed
+    // changes. So no change of the rig is reported while cameras may be out of sync.
     const bool may_lag = pairing.suspected() || pairing.questioned();
     const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
     if (may_lag || (!verified && change)) {

@@ -16,7 +16,7 @@ Gate SolutionReview::gate(bool must_be_better) const noexcept {
   q.must_be_better = must_be_better;
   const Gate gate = calibration::check_acceptance(q, context_.options.calibration);
   if (gate != Gate::no_better) return gate;
-  // A yaw hardly changes the distances to epipolar lines that the gate compares, but the depths.
+  // A yaw changes depths, but hardly the distances to epipolar lines that the gate compares.
   const calibration::Assessment a = assess(*context_.in_use, context_.source);
   return (a.nearer || a.log_odds < 0) && !a.worse ? Gate::open : gate;
 }
@@ -38,7 +38,7 @@ void SolutionReview::assess_next(CalibrationDecision* decision) const noexcept {
       assess(solved_.rig, calibration::CalibrationOrigin::this_drive);
   decision->reference_depth_m = then.depth_m;
   decision->depth_sigma_percent = then.sigma_percent;
-  // All distances are off by what the focal length is off by.
+  // An error of the focal length scales all distances.
   decision->verified = then.verified && !decision->focal.contradicted;
   if (context_.in_use != nullptr)
     decision->depth_error_percent = assess(*context_.in_use, context_.source).difference_percent;

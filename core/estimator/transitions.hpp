@@ -7,18 +7,29 @@ namespace vergence {
 
 /// Event that can change the estimator's state.
 enum class Trigger : std::uint8_t {
-  calibration_given,     // one is in use from the first frame
-  pair_found,            // the first pair gave the cameras' transform
-  frames_enough,         // the tracks since then are thought to hold a calibration
-  calibration_accepted,  // through the gates
-  calibration_rejected,  // not through
-  calibration_saved,     // a new one is no better than the one in use
-  rig_changed,           // the monitor raised
-  requested,             // a recalibration was requested
+  /// A calibration is supplied at the start.
+  calibration_given,
+  /// The first stereo pair gave the transform between the cameras.
+  pair_found,
+  /// Enough tracks are logged to calibrate from.
+  frames_enough,
+  /// The solution passed the gates.
+  calibration_accepted,
+  /// A gate rejected the solution.
+  calibration_rejected,
+  /// The solution is no better than the calibration in use.
+  calibration_saved,
+  /// The monitor detected a change of the rig.
+  rig_changed,
+  /// A recalibration was requested.
+  requested,
   pose_lost,
-  pose_found,               // with a calibration in use
-  pose_found_suspect,       // with one in use that is suspect
-  pose_found_uncalibrated,  // without one
+  /// A pose was found while a calibration is in use.
+  pose_found,
+  /// A pose was found while the calibration in use is suspect.
+  pose_found_suspect,
+  /// A pose was found without a calibration.
+  pose_found_uncalibrated,
 };
 
 /// One edge of the state machine; `why` is written to events.jsonl unchanged.
@@ -61,7 +72,7 @@ inline constexpr std::array kTransitions = {
                "relocalised, without a calibration"},
 };
 
-/// Returns the edge of this trigger in this state; nullptr if there is none, and nothing happens.
+/// Returns the edge of this trigger in this state, or nullptr if the trigger has no effect.
 [[nodiscard]] constexpr const Transition* find_transition(State state, Trigger trigger) noexcept {
   for (const Transition& t : kTransitions)
     if (t.from == state && t.on == trigger) return &t;

@@ -9,10 +9,10 @@
 namespace vergence::features {
 namespace {
 
-// Vector loads run past the block by up to 16 + 8 pixels: cells nearer to the right edge are cut.
+// Margin at the right edge in px, because vector loads exceed the block by up to 16 + 8 pixels.
 constexpr int kRightMargin = 28;
-// (grey levels / px)². Rounding to whole grey levels alone makes 1/24, the largest of a cell's many
-// 1/4: below it there is nothing to match, and align() finds a window flat (kMinHessian).
+// Minimum score in (grey levels / px)². Rounding to whole grey levels causes 1/24, at most 1/4 in a
+// cell; below it align() finds a window flat (kMinHessian).
 constexpr float kFlat = 0.25F;
 
 struct Grid {
@@ -24,8 +24,8 @@ struct Grid {
   }
 };
 
-/// Best local maximum of the block's scores, leaving out its ring of one pixel and what the mask
-/// hides; score 0 when there is none. (x0, y0): the block's first pixel in the image.
+/// Best unmasked local maximum of the block's scores without its outer ring; score 0 if there is
+/// none. (x0, y0): the block's first pixel in the image.
 Corner best_of(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
   Corner best;
   for (int y = 1; y < h - 1; ++y) {
@@ -46,7 +46,8 @@ Corner best_of(const float* score, int x0, int y0, int w, int h, const Mask* mas
 
 bool stronger(const Corner& a, const Corner& b) noexcept {
   if (a.score != b.score) return a.score > b.score;
-  return a.y != b.y ? a.y < b.y : a.x < b.x;  // one order, whatever the sort does with equals
+  // Make the order unique, independent of the sort.
+  return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
 
 bool crowded(const Corner& c, std::span<const Corner> others, float distance) noexcept {
@@ -56,8 +57,8 @@ bool crowded(const Corner& c, std::span<const Corner> others, float distance) no
   });
 }
 
-/// The best corner of each free cell in rows [first, last) of the grid, at found[cell]; score 0
-/// where there is none.
+/// Finds the best corner of each free cell in rows [first, last) of the grid, at found[cell]; score
+/// 0 if there is none.
 void scan_rows(const ImageView& image, const CornerOptions& options, const Grid& grid,
                const bool* occupied, int first, int last, Corner* found) noexcept {
   alignas(64) std::array<float, detail::kMaxBlock * detail::kMaxBlock> score;

@@ -8,31 +8,38 @@
 
 namespace vergence::features {
 
-/// A pixel worth following.
+/// A corner that can be followed.
 struct Corner {
-  float x = 0, y = 0;  // px of the image searched
-  float score = 0;  // least eigenvalue of the structure tensor's mean over 7×7 px, (grey levels /
-                    // px)² (Shi & Tomasi 1994)
+  float x = 0, y = 0;
+  /// Smaller eigenvalue of the mean structure tensor over 7×7 px, in (grey levels / px)² (Shi &
+  /// Tomasi 1994).
+  float score = 0;
 };
 
 struct CornerOptions {
-  int cell = 32;               // px: at most one corner a cell
-  int border = 16;             // px kept free at the image's edge
-  float min_distance = 12;     // px to a corner already taken
-  const Mask* mask = nullptr;  // of the image searched; null: all of it is looked at
+  /// Cell size in px; there is at most one corner per cell.
+  int cell = 32;
+  /// Margin of the image without corners, in px.
+  int border = 16;
+  /// Minimum distance to an existing corner, in px.
+  float min_distance = 12;
+  /// Mask of the image; may be null.
+  const Mask* mask = nullptr;
 };
 
-inline constexpr int kMaxCell = 128;        // px: sizes the working memory of a cell
-inline constexpr int kMaxGridCells = 4096;  // of an image
+/// Maximum cell size in px, which determines the working memory.
+inline constexpr int kMaxCell = 128;
+/// Maximum number of cells of an image.
+inline constexpr int kMaxGridCells = 4096;
 
-/// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as
-/// `out` has room for. A corner counts by its rank: what there is no contrast for in absolute
-/// numbers may be all that a scene offers. Left out is only what no patch could be aligned on.
+/// Finds the strongest corner of every grid cell without any of `taken`, strongest first, as many
+/// as `out` can hold. The ranking needs no absolute contrast, which a scene may not offer; only
+/// corners that cannot be aligned are left out.
 ///
-/// Threads  The runner takes the lower half of the grid to its other side; the result does not
-///          depend on it.
-/// Memory   On the stacks, bounded by kMaxCell and kMaxGridCells. Corners that find no room are
-///          dropped, weakest first.
+/// Threads  The runner processes the lower half of the grid in parallel; the result does not depend
+///          on it.
+/// Memory   On the stack, bounded by kMaxCell and kMaxGridCells. If `out` is full, the weakest
+///          corners are dropped.
 void find_corners(const ImageView& image, const CornerOptions& options,
                   std::span<const Corner> taken, PairRunner& runner,
                   BoundedVector<Corner>* out) noexcept;

@@ -9,17 +9,20 @@
 namespace vergence::features {
 namespace {
 
-constexpr int kSmooth = 2;                            // radius of the box that takes the noise away
-constexpr int kReach = kPatchSide / 2 - kSmooth - 1;  // px from the middle
+// Radius of the smoothing box.
+constexpr int kSmooth = 2;
+// Maximum distance from the middle, in px.
+constexpr int kReach = kPatchSide / 2 - kSmooth - 1;
 constexpr std::uint64_t kPatternSeed = 20260131;
 
 struct Pair {
-  std::int16_t a, b;  // index in the patch
+  // Indices in the patch.
+  std::int16_t a, b;
 };
 
 std::array<Pair, 256> make_pattern() noexcept {
   Random random(kPatternSeed);
-  // Normal about the middle with a fifth of the side, as the paper found best.
+  // Gaussian around the middle with a fifth of the side, the paper's best choice.
   const auto place = [&random]() noexcept {
     const auto one = [&random]() noexcept {
       return std::clamp(static_cast<int>(std::lround(random.normal() * kPatchSide / 5.0)), -kReach,

@@ -6,21 +6,21 @@
 
 namespace vergence::features {
 
-/// 256 comparisons of smoothed grey values at fixed places of a patch (Calonder et al., "BRIEF",
-/// ECCV 2010): for finding a point again after tracking was lost. Stands a turn of some 20° and a
-/// change of size of some 20 %.
+/// BRIEF descriptor: 256 comparisons of smoothed grey values at fixed positions of a patch
+/// (Calonder et al., ECCV 2010), to find a point again after tracking was lost. Tolerates rotations
+/// of about 20° and scale changes of about 20 %.
 struct Descriptor {
   std::array<std::uint64_t, 4> bits{};
 };
 
-inline constexpr int kDescriptorLevel =
-    1;  // of the pyramid: less noise, and a neighbourhood of 56 px
+/// Pyramid level of the descriptor, which has less noise and covers 56 px.
+inline constexpr int kDescriptorLevel = 1;
 
 /// Computes the descriptor at the patch's level kDescriptorLevel, or at its coarsest level if it
 /// has fewer.
 [[nodiscard]] Descriptor describe(const Patch& patch) noexcept;
 
-/// Bits that differ, 0 … 256; unrelated patches differ in 128 ± 8.
+/// Hamming distance, 0 … 256; that of unrelated patches is 128 ± 8.
 [[nodiscard]] int distance(const Descriptor& a, const Descriptor& b) noexcept;
 
 }  // namespace vergence::features

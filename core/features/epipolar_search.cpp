@@ -13,7 +13,8 @@ namespace {
 using detail::Block;
 using detail::kBlock;
 
-constexpr int kPlaces = kMaxSearchSteps * 5;  // along the curve times across it
+// Positions along the curve times those across it.
+constexpr int kPlaces = kMaxSearchSteps * 5;
 constexpr int kMaxBand = 2;
 
 Block middle_of(const Patch& patch, int level) noexcept {
@@ -44,10 +45,12 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   Vec2 first;
   if (curve.at(options.rho_first, &first, nullptr) != ProjectStatus::ok) return result;
   Vec2 last = first;
-  // The near end may lie beyond the image, or the lens: the range ends where the curve leaves it.
+  // The near end may be outside the image or the lens model; the range then ends where the curve
+  // leaves it.
   double rho_last = options.rho_first;
   double step = options.rho_last - options.rho_first;
-  constexpr int kBisections = 10;  // to a thousandth of the range
+  // Resolution of a thousandth of the range.
+  constexpr int kBisections = 10;
   for (int i = 0; i <= kBisections; ++i, step *= 0.5) {
     Vec2 p;
     if (std::abs(rho_last + step - options.rho_first) >
@@ -68,19 +71,20 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   const bool horizontal = std::abs(along.x()) >= std::abs(along.y());
   const int band = std::clamp(options.band, 0, kMaxBand);
   const Block block = middle_of(patch, level);
-  // The block's first pixel stands kBlock/2 before the pixel searched for; the anchor's offset in
-  // its pixel moves with it.
+  // The block's first pixel is kBlock/2 before the searched pixel; the anchor's offset in its pixel
+  // moves with it.
   const Vec2 anchor = patch.offset[static_cast<std::size_t>(level)].cast<double>();
 
   struct Step {
-    std::int16_t index, x, y;  // along the curve; px of the level
+    // Index along the curve, and pixel of the level.
+    std::int16_t index, x, y;
   };
   std::array<Step, kMaxSearchSteps> kept;
   std::array<std::int32_t, kPlaces> offsets;
   int n = 0, places = 0;
-  // The curve is followed in chords. A lens that bends it with a radius of 800 px of the level,
-  // more than the recorded ones, leaves L² / 8R, a hundredth of a pixel, over eight.
-  constexpr int kChord = 8;  // steps
+  // Number of steps per chord of the curve. With a radius of curvature of 800 px of the level,
+  // smaller than those recorded, the deviation L² / 8R is a hundredth of a pixel over eight steps.
+  constexpr int kChord = 8;
   Vec2 p = first * scale - anchor, d = Vec2::Zero();
   for (int i = 0; i <= steps; ++i, p += d) {
     if (i % kChord == 0 && i < steps) {
@@ -91,7 +95,7 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
         break;
       d = (there * scale - anchor - p) / (end - i);
     }
-    // Rounded towards zero: what is negative lies outside either way.
+    // Rounding towards zero is harmless, because negative values are outside.
     const int x = static_cast<int>(p.x() + 0.5), y = static_cast<int>(p.y() + 0.5);
     const int dx = horizontal ? 0 : band, dy = horizontal ? band : 0;
     if (x - dx < kBlock / 2 || y - dy < kBlock / 2 || x + dx + kBlock / 2 > view.width ||
@@ -106,7 +110,8 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
       offsets[static_cast<std::size_t>(places++)] = static_cast<std::int32_t>(at + b * across);
   }
   if (n == 0) return result;
-  std::array<float, kPlaces> scores;  // squared correlations
+  // Squared correlations.
+  std::array<float, kPlaces> scores;
   static_assert(kPlaces % detail::kPlacesAtATime == 0);
   detail::correlate(block, view.data, view.stride, offsets.data(), places, scores.data());
 
@@ -130,7 +135,8 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   best_score = std::sqrt(best_score);
   const Step& at = kept[static_cast<std::size_t>(best)];
   float second = 0.F;
-  constexpr int kNeighbourhood = 3;  // px of the level: the same peak
+  // Distance in px of the level within which positions belong to the same peak.
+  constexpr int kNeighbourhood = 3;
   for (int i = 0; i < n; ++i)
     if (std::abs(kept[static_cast<std::size_t>(i)].index - at.index) > kNeighbourhood)
       second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
@@ -150,8 +156,9 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
 
 double fit_inverse_depth(const EpipolarCurve& curve, const Vec2& observed, double* rho,
                          double* sigma_rho_per_px) noexcept {
-  constexpr int kSteps =
-      4;  // nearly linear in inverse depth: two suffice, lens distortion asks for a third
+  // The problem is nearly linear in inverse depth: two steps suffice, and lens distortion needs a
+  // third.
+  constexpr int kSteps = 4;
   double value = *rho;
   for (int i = 0; i < kSteps; ++i) {
     Vec2 p;

@@ -5,53 +5,61 @@
 
 namespace vergence::features {
 
-/// Where a left patch may lie in another camera: its pixel for every inverse depth along the left
+/// Position of a left patch in another camera: its pixel for every inverse depth along the left
 /// ray.
 struct EpipolarCurve {
-  const Camera* camera = nullptr;  // the other camera
+  const Camera* camera = nullptr;
   Transform T_camera_left{};
-  Vec3 ray{};  // (x, y, 1) in left
+  /// Left ray (x, y, 1).
+  Vec3 ray{};
 
-  /// Pixel at inverse depth rho (1/m, of z in left; 0: infinity). Not ok: behind the camera or
-  /// beyond its lens.
+  /// Projects the point at inverse depth rho (1/m, of z in left; 0 is infinity). Not ok if it is
+  /// behind the camera or outside its lens model.
   [[nodiscard]] ProjectStatus at(double rho, Vec2* pixel, Mat23* J) const noexcept {
     return camera->project(T_camera_left.R * ray + rho * T_camera_left.t, pixel, J);
   }
 };
 
 struct EpipolarSearchOptions {
-  int level = 1;           // pyramid level searched; a coarser one where the curve is longer there
-                           // than kMaxSearchSteps: steps of more than a pixel pass matches by
-  double rho_first = 0.0;  // 1/m, start of the range; may be negative to ask for exchanged cameras
-  double rho_last = 1.0;   // 1/m, its end, or before it where the curve leaves the image
-  int band = 1;            // px of the level to each side of the curve, 2 at most
-  float min_zncc = 0.7F;   // of the 8×8 px compared
-  float unique = 0.85F;    // (1 − best) / (1 − second best): above it the match is ambiguous
-  const Mask* mask =
-      nullptr;  // of the image searched: the patch is not there; null: it may be anywhere
+  /// Pyramid level of the search. If the curve is longer there than kMaxSearchSteps, a coarser
+  /// level is searched, because steps above a pixel miss matches.
+  int level = 1;
+  /// Start of the range in 1/m; may be negative to test for swapped cameras.
+  double rho_first = 0.0;
+  /// End of the range in 1/m; earlier if the curve leaves the image.
+  double rho_last = 1.0;
+  /// Half width of the band around the curve in px of the level, at most 2.
+  int band = 1;
+  /// Minimum correlation of the 8×8 px compared.
+  float min_zncc = 0.7F;
+  /// Ratio (1 − best) / (1 − second best) above which the match is ambiguous.
+  float unique = 0.85F;
+  /// Mask of the searched image; may be null.
+  const Mask* mask = nullptr;
 };
 
 enum class SearchStatus : std::uint8_t { ok, off_image, uncorrelated, ambiguous };
 
 struct SearchResult {
   SearchStatus status = SearchStatus::off_image;
-  double rho = 0;  // 1/m of the best position's foot on the curve
-  Vec2 pixel{};    // level 0, whole pixels of the level searched
+  /// Inverse depth of the best position's foot on the curve, in 1/m.
+  double rho = 0;
+  /// Pixel of level 0, rounded to whole pixels of the searched level.
+  Vec2 pixel{};
   float zncc = 0;
 };
 
-inline constexpr int kMaxSearchSteps =
-    320;  // positions along a curve: half of a 640 px wide level 1
+/// Maximum number of positions along a curve: half of a 640 px wide level 1.
+inline constexpr int kMaxSearchSteps = 320;
 
-/// Compares the patch's middle 8×8 px of one level along the curve, by normalised correlation in
-/// integers.
+/// Compares the middle 8×8 px of one level of the patch along the curve, by normalised correlation
+/// in integers.
 [[nodiscard]] SearchResult search_along(const Patch& patch, const Pyramid& image,
                                         const EpipolarCurve& curve,
                                         const EpipolarSearchOptions& options) noexcept;
 
-/// The inverse depth whose pixel on the curve is nearest to an observed one: Gauss–Newton from
-/// `rho`. Returns the distance left, px (how far off the curve the observation lies; signed along
-/// the normal is not kept); < 0: failed.
+/// Finds the inverse depth whose pixel on the curve is nearest to an observed one, by Gauss–Newton
+/// from `rho`. Returns the remaining distance in px, or a negative value if it failed.
 [[nodiscard]] double fit_inverse_depth(const EpipolarCurve& curve, const Vec2& observed,
                                        double* rho, double* sigma_rho_per_px) noexcept;
 

@@ -8,29 +8,29 @@
 
 namespace vergence::features {
 
-/// Pixels where nothing may be looked for: the vehicle itself, dirt on the glass. One bit a pixel.
+/// Pixels without features: the vehicle itself, dirt on the glass. One bit per pixel.
 ///
-/// Ownership  The image it is made of is read in the constructor only.
-/// Threads    Read by any number.
+/// Ownership  The source image is read in the constructor only.
+/// Threads    Any number of readers.
 /// Memory     From the arena at construction: an eighth of the image.
-/// Errors     The constructor throws std::length_error when the arena is full.
+/// Errors     The constructor throws std::length_error if the arena is full.
 class Mask {
  public:
   /// Hides nothing.
   Mask() noexcept = default;
-  /// Hides the pixels of `image` that are 0 and those within `margin` px of one, along x and along
-  /// y. An empty image hides nothing.
+  /// Hides the pixels of `image` that are 0 and those within `margin` px of one along x and y. An
+  /// empty image hides nothing.
   Mask(const ImageView& image, int margin, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int width, int height) noexcept;
 
-  /// Pixels outside the image are not hidden: callers check the image's edge themselves.
+  /// Pixels outside the image are not hidden; callers check the edge.
   [[nodiscard]] bool hides(int x, int y) const noexcept {
     if (bits_.empty() || x < 0 || y < 0 || x >= width_ || y >= height_) return false;
     return (bits_[word(x, y)] >> (static_cast<unsigned>(x) % 64U) & 1U) != 0;
   }
   [[nodiscard]] bool hides(const Vec2& pixel) const noexcept;
   [[nodiscard]] bool empty() const noexcept { return bits_.empty(); }
-  /// Hidden pixels.
+  /// Number of hidden pixels.
   [[nodiscard]] std::int64_t count() const noexcept;
 
  private:

@@ -11,19 +11,23 @@
 namespace vergence::features {
 namespace {
 
-constexpr int kHalf = kPatchSide / 2;  // the middle pixel's index
-constexpr float kSettled = 0.01F;      // px of the level: a tenth of what noise leaves
-// Rounding to whole grey levels alone has a standard deviation of 1/√12 and a mean squared gradient
-// of 1/24: the limits are twice the one and six times the other.
-constexpr float kMinContrast = 0.6F;  // grey levels, standard deviation of the window
-constexpr float kMinHessian =
-    0.25F;  // grey levels² / px², least eigenvalue over the window's pixels
+// Index of the middle pixel.
+constexpr int kHalf = kPatchSide / 2;
+// Step in px of the level below which the alignment has settled, a tenth of its noise.
+constexpr float kSettled = 0.01F;
+// Minimum standard deviation of the window in grey levels, twice that of rounding (1/√12).
+constexpr float kMinContrast = 0.6F;
+// Minimum smaller eigenvalue over the window's pixels in grey levels² / px², six times the mean
+// squared gradient of rounding (1/24).
+constexpr float kMinHessian = 0.25F;
 
 struct LevelOutcome {
   AlignStatus status;
-  float x, y;  // px of the level
+  // Pixel of the level.
+  float x, y;
   float zncc;
-  float sigma;  // px of the level for one grey level of noise
+  // Standard deviation for one grey level of noise, in px of the level.
+  float sigma;
   int steps;
 };
 
@@ -43,8 +47,8 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
   out.sigma = 1.F / std::sqrt(least);
   const float ixx = w.hyy / det, ixy = -w.hxy / det, iyy = w.hxx / det;
   const float start_x = x, start_y = y;
-  // Vector loads read kWindowStride + 1 pixels of a row: the last rows of an image must not be read
-  // past their end.
+  // Vector loads read kWindowStride + 1 pixels of a row, which must not exceed the image's last
+  // rows.
   const float last_x = static_cast<float>(image.width - kWindowStride - 2),
               last_y = static_cast<float>(image.height - kWindow - 2);
   for (out.steps = 1; out.steps <= max_steps; ++out.steps) {
@@ -60,7 +64,7 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     const float image_variance = s.square - s.sum * s.sum / kPixels;
     const float norm = w.variance_sum * image_variance;
     out.zncc = norm > 1.F ? s.value / std::sqrt(norm) : 0.F;
-    // A gain near zero or negative means nothing here resembles the window: a step from it would be
+    // A gain near zero or negative means that nothing here resembles the window, so a step would be
     // noise.
     const float gain =
         std::max(s.value / w.variance_sum,
@@ -68,7 +72,8 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     float dx = (ixx * s.steep_x + ixy * s.steep_y) / gain;
     float dy = (ixy * s.steep_x + iyy * s.steep_y) / gain;
     const float length = std::sqrt(dx * dx + dy * dy);
-    constexpr float kMaxStep = 3.F;  // px of the level: beyond it the linear model does not hold
+    // Maximum step in px of the level, above which the linear model does not hold.
+    constexpr float kMaxStep = 3.F;
     if (length > kMaxStep) {
       dx *= kMaxStep / length;
       dy *= kMaxStep / length;
@@ -82,7 +87,7 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
       return out;
     }
   }
-  // Not settled to kSettled, but no longer moving much: the next finer level or the residual test
+  // It has not settled to kSettled but moves little; the next finer level or the residual test
   // decides.
   out.status = AlignStatus::ok;
   return out;
@@ -132,7 +137,7 @@ AlignResult align(const Patch& patch, const Pyramid& image, const Vec2& predicte
                     static_cast<float>(pixel.y() / scale),
                     options.max_shift / static_cast<float>(scale), options.max_steps);
     result.steps += out.steps;
-    // A coarse level may be flat or cut off at the border where a finer one is not.
+    // A coarse level may be flat or outside the image although a finer one is not.
     if (out.status != AlignStatus::ok && l > options.finest) continue;
     result.status = out.status;
     result.zncc = out.zncc;

@@ -7,7 +7,8 @@
 namespace vergence::features {
 namespace {
 
-constexpr int kSmallestSide = 32;  // px: below it a patch hardly fits
+// Minimum side of a level in px, below which a patch hardly fits.
+constexpr int kSmallestSide = 32;
 
 struct Size {
   int width, height;
@@ -48,7 +49,7 @@ Pyramid::Pyramid(int width, int height, int levels, Arena& arena)
   for (int l = 1; l < levels_; ++l) {
     s = {(s.width + 1) / 2, (s.height + 1) / 2};
     const std::size_t stride = padded_stride(s.width);
-    // One cache line more: vector loads of the last row may touch the bytes behind it.
+    // Add a cache line, because vector loads of the last row may exceed it.
     const auto bytes = arena.make<std::uint8_t>(
         stride * static_cast<std::size_t>(s.height) + kCacheLine, "pyramid");
     const auto i = static_cast<std::size_t>(l);

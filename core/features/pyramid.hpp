@@ -8,21 +8,20 @@ namespace vergence::features {
 
 inline constexpr int kMaxPyramidLevels = 6;
 
-/// An image and its halves. Pixel i of level l lies at pixel i·2^l of level 0: centres stay
-/// aligned, no half-pixel shift.
+/// Image pyramid. Pixel i of level l is pixel i·2^l of level 0, without a half-pixel shift.
 ///
-/// Each level is the one below, filtered by [1 4 6 4 1]/16 in both directions (border mirrored
-/// without repeating the edge pixel) and every second pixel taken; rounded to 8 bits. Integer
-/// arithmetic: the same bits on every machine.
+/// Each level is the previous one, filtered by [1 4 6 4 1]/16 in both directions (border mirrored
+/// without repeating the edge pixel), subsampled by two and rounded to 8 bits. Integer arithmetic:
+/// the same bits on every machine.
 ///
 /// Ownership  Level 0 is the caller's image, not copied: it must live until the next build(). The
-///            rest is the arena's.
+///            others are in the arena.
 /// Threads    build() by one thread; levels may be read by many afterwards.
 class Pyramid {
  public:
   Pyramid() noexcept = default;
-  /// Precondition: 1 ≤ levels ≤ kMaxPyramidLevels. Fewer are made when a level would be smaller
-  /// than 32 px on a side.
+  /// Precondition: 1 ≤ levels ≤ kMaxPyramidLevels. There are fewer if a level would be smaller than
+  /// 32 px on a side.
   Pyramid(int width, int height, int levels, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int width, int height, int levels) noexcept;
 
@@ -37,8 +36,9 @@ class Pyramid {
  private:
   int levels_ = 0;
   std::array<ImageView, kMaxPyramidLevels> views_{};
-  std::array<std::uint8_t*, kMaxPyramidLevels> storage_{};  // of levels ≥ 1
-  std::uint16_t* row_ = nullptr;  // one vertically filtered row, with margins
+  std::array<std::uint8_t*, kMaxPyramidLevels> storage_{};
+  // One vertically filtered row, with margins.
+  std::uint16_t* row_ = nullptr;
 };
 
 }  // namespace vergence::features

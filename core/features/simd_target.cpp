@@ -6,7 +6,8 @@ namespace vergence::features {
 
 const char* simd_target() noexcept {
   const std::int64_t usable = hwy::SupportedTargets() & HWY_TARGETS;
-  return hwy::TargetName(usable & -usable);  // the lowest bit is the best one
+  // The lowest bit is the best target.
+  return hwy::TargetName(usable & -usable);
 }
 
 }  // namespace vergence::features

@@ -2,9 +2,9 @@
 
 namespace vergence::features {
 
-/// The instruction set that the kernels run on here, by Highway's name for it (`AVX3`, `AVX2`,
-/// `SSE4`, `NEON`, `EMU128`: none, portable code): the best of those that the machine has and the
-/// program is built for, chosen at run time. Any thread; a literal.
+/// Instruction set of the kernels by Highway's name (`AVX3`, `AVX2`, `SSE4`, `NEON`, or `EMU128`
+/// for portable code): the best one of the machine and the build, selected at run time. Any thread;
+/// a literal.
 [[nodiscard]] const char* simd_target() noexcept;
 
 }  // namespace vergence::features

@@ -14,18 +14,19 @@
 namespace vergence::features {
 namespace {
 
-constexpr float kSigmaOfSize = 1.2F / 9.F;  // px a px: boxes of 9 px stand for a Gaussian of 1.2 px
-constexpr double kMaxOffset =
-    1.0;  // places or sizes: a parabola that tops further away is no maximum here
+// Sigma per box size: boxes of 9 px approximate a Gaussian of 1.2 px.
+constexpr float kSigmaOfSize = 1.2F / 9.F;
+// Maximum offset of a parabola's top in samples or sizes; a farther one is no maximum here.
+constexpr double kMaxOffset = 1.0;
 
-/// Stronger first; one order, whatever the heap does with equals.
+/// Orders stronger points first, uniquely and independent of the heap.
 bool stronger(const SurfPoint& a, const SurfPoint& b) noexcept {
   if (a.response != b.response) return a.response > b.response;
   if (a.y != b.y) return a.y < b.y;
   return a.x != b.x ? a.x < b.x : a.scale < b.scale;
 }
 
-/// Keeps the strongest in a heap whose first is the weakest.
+/// Keeps the strongest points in a heap whose first element is the weakest.
 void offer(const SurfPoint& p, BoundedVector<SurfPoint>* out) noexcept {
   if (out->push(p)) {
     std::push_heap(out->begin(), out->end(), stronger);
@@ -39,12 +40,12 @@ void offer(const SurfPoint& p, BoundedVector<SurfPoint>* out) noexcept {
 
 }  // namespace
 
-/// Where the places of an octave lie: column i, row j at (first + i · step, first + j · step).
+/// Sampling grid of an octave: column i, row j is at (first + i · step, first + j · step).
 struct Surf::Octave {
   Octave(int number, int width, int height) noexcept : step(1 << number) {
     const int half = size(kLayers - 1) / 2;
     first = (half + step - 1) / step * step;
-    // Also the last place leaves room for the largest boxes.
+    // The last position also has room for the largest boxes.
     columns = width > first + half ? (width - 1 - half - first) / step + 1 : 0;
     rows = height > first + half ? (height - 1 - half - first) / step + 1 : 0;
   }
@@ -81,7 +82,8 @@ bool Surf::greatest(int layer, int column, int row) const noexcept {
       const float* r = responses(k, j) + column;
       for (int i = -1; i <= 1; ++i) {
         if (k == layer && j == row && i == 0) continue;
-        // The first of equal neighbours is the maximum, so that a blob between two pixels has one.
+        // Among equal neighbours the first is the maximum, so that a blob between two pixels is
+        // found once.
         const bool before = k != layer ? k < layer : j != row ? j < row : i < 0;
         if (before ? !(value > r[i]) : !(value >= r[i])) return false;
       }
@@ -105,7 +107,7 @@ bool Surf::refine(const Octave& octave, int layer, int column, int row,
   const Vec2 top = -(curvature.inverse() * gradient);
   const double size_top =
       -0.5 * (at(1, 0, 0) - at(-1, 0, 0)) / (at(1, 0, 0) - 2 * centre + at(-1, 0, 0));
-  // Negated: refuses what is not a number, from a curvature that is none.
+  // The negated comparison also rejects NaN, from zero curvature.
   if (!(top.cwiseAbs().maxCoeff() <= kMaxOffset && std::abs(size_top) <= kMaxOffset)) return false;
   const int x = octave.first + column * octave.step, y = octave.first + row * octave.step,
             size = octave.size(layer);

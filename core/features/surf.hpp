@@ -11,16 +11,21 @@
 
 namespace vergence::features {
 
-/// A blob, its size and direction.
+/// A blob with its size and direction.
 struct SurfPoint {
-  float x = 0, y = 0;  // px, sub-pixel; pixel centres at whole numbers
-  float scale = 0;     // s, px: sigma of the Gaussian whose second derivatives fit best
-  float angle = 0;     // rad, x towards y; 0 when upright
-  float response = 0;  // determinant of the box Hessian, grey levels²
-  bool dark = false;   // sign of the Laplacian: dark on a bright ground
+  /// Sub-pixel position; pixel centres are at integer coordinates.
+  float x = 0, y = 0;
+  /// Scale s in px: sigma of the Gaussian whose second derivatives fit best.
+  float scale = 0;
+  /// Direction in rad, x towards y; 0 if upright.
+  float angle = 0;
+  /// Determinant of the box Hessian, in grey levels².
+  float response = 0;
+  /// Sign of the Laplacian: true if dark on a bright background.
+  bool dark = false;
 };
 
-/// SURF-64, of unit length; all zero where the picture is flat or the point lies at its edge.
+/// SURF-64 descriptor of unit length; all zero without structure or at the edge of the image.
 struct SurfDescriptor {
   alignas(16) std::array<float, 64> values{};
 };
@@ -28,58 +33,62 @@ struct SurfDescriptor {
 inline constexpr int kMaxSurfOctaves = 4;
 
 struct SurfOptions {
-  int octaves = 3;             // 1 … kMaxSurfOctaves: scales up to 3, 6, 12, 24 px
-  float min_response = 4;      // grey levels²
-  const Mask* mask = nullptr;  // of the image; null: all of it is looked at
+  /// Number of octaves, 1 … kMaxSurfOctaves: scales up to 3, 6, 12, 24 px.
+  int octaves = 3;
+  /// Minimum response, in grey levels².
+  float min_response = 4;
+  /// Mask of the image; may be null.
+  const Mask* mask = nullptr;
 };
 
 enum class SurfStatus : std::uint8_t {
   ok,
-  invalid_image,  // empty, or rows overlap
-  too_large,      // larger than given to the constructor
+  /// The image is empty, or its rows overlap.
+  invalid_image,
+  /// The image exceeds the size given to the constructor.
+  too_large,
 };
 
-/// Speeded-up robust features: blobs by the determinant of a Hessian of boxes, sums of Haar
-/// wavelets as their description.
+/// Speeded-up robust features: detects blobs by the determinant of a box Hessian and describes them
+/// by sums of Haar wavelets.
 ///
 /// Source     Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 110 (2008). Boxes
 ///            of 3 (k 2^o + 1) px in octave o = 1, 2, … with k = 1 … 4, sampled every 2^(o−1) px;
-///            maxima of the two inner sizes, refined by a parabola in x and y and one in size: the
-///            joint one of the paper leans where size and place of the top both lie between
-///            samples, by up to a tenth of a step.
-/// Ownership  Nothing of the image is kept but sums over it. The caller owns points and
-///            descriptors.
+///            maxima of the two inner sizes. They are refined by one parabola in x and y and one in
+///            size; the paper's joint one is biased by up to a tenth of a step.
+/// Ownership  Only sums over the image are kept. The caller owns points and descriptors.
 /// Threads    set_image() and detect() by one thread; describe() is const.
-/// Memory     From the arena at construction: 4 bytes a pixel and twelve rows. Points that find no
-///            room are dropped, weakest first.
-/// Time       O(pixels · octaves) to detect, O(1) a point to describe; no bound on pixels but the
-///            constructor's.
+/// Memory     From the arena at construction: 4 bytes per pixel and twelve rows. If the output is
+///            full, the weakest points are dropped.
+/// Time       O(pixels · octaves) to detect, O(1) per point to describe.
 /// Errors     Nothing throws after construction. Without a valid image there are no points and
 ///            descriptors are zero.
 class Surf {
  public:
   Surf() noexcept = default;
-  /// Images of at most this size. Throws std::length_error when the arena is full.
+  /// Throws std::length_error if the arena is full.
   Surf(int max_width, int max_height, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
-  /// Not `ok`: there is no image any more.
+  /// Sets the image. If the result is not `ok`, there is no image.
   [[nodiscard]] SurfStatus set_image(const ImageView& image) noexcept;
 
-  /// Points of the image, strongest first, upright. Returns how many there are: more than
-  /// out->size() when some found no room.
+  /// Detects the upright points of the image, strongest first. Returns their number, which exceeds
+  /// out->size() if some did not fit.
   int detect(const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept;
 
-  /// Gives each point the direction of its neighbourhood. Without it they stay upright: more
-  /// distinct and faster, for cameras that roll less than some 15°.
+  /// Sets each point's direction from its neighbourhood. Upright points are more distinct and
+  /// faster, for cameras that roll less than about 15°.
   void orient(std::span<SurfPoint> points) const noexcept;
 
   /// Precondition: as many descriptors as points.
   void describe(std::span<const SurfPoint> points, std::span<SurfDescriptor> out) const noexcept;
 
  private:
-  static constexpr int kLayers = 4;  // sizes an octave
-  static constexpr int kRows = 3;    // neighbouring rows of each
+  // Number of sizes per octave.
+  static constexpr int kLayers = 4;
+  // Number of neighbouring rows of each size.
+  static constexpr int kRows = 3;
 
   struct Octave;
   int scan_octave(const Octave& octave, const SurfOptions& options,
@@ -100,7 +109,8 @@ class Surf {
 
   int max_width_ = 0, max_height_ = 0;
   detail::IntegralImage sums_;
-  std::span<float> rows_;  // ring of three rows of places, each of kLayers sizes
+  // Ring of three rows of responses for each of kLayers sizes.
+  std::span<float> rows_;
 };
 
 }  // namespace vergence::features

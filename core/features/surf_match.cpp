@@ -11,11 +11,11 @@ namespace {
 
 constexpr float kNone = std::numeric_limits<float>::infinity();
 
-/// Points of flat neighbourhoods have a descriptor of zeros, which resembles every other such.
+/// True unless the descriptor is zero, as those of all flat neighbourhoods are.
 bool described(const SurfDescriptor& d) noexcept { return detail::squared_distance(d, {}) > 0.5F; }
 
-/// The epipolar line of a left point, a x + b y + c = 0 with a² + b² = 1; all zero where it has no
-/// direction: every point lies on it.
+/// Epipolar line of a left point, a x + b y + c = 0 with a² + b² = 1; all zero if it has no
+/// direction, so that every point is on it.
 Vec3 epipolar_line(const EpipolarBand* band, const SurfPoint& p) noexcept {
   if (band == nullptr) return Vec3::Zero();
   const Vec3 line = band->F * Vec3(static_cast<double>(p.x), static_cast<double>(p.y), 1.0);
@@ -81,7 +81,7 @@ SurfMatchStatus SurfMatcher::match(const SurfView& left, const SurfView& right,
               ratio = options.ratio * options.ratio;
   for (std::size_t i = 0; i < left.points.size() && !out->full(); ++i) {
     const Best& mine = left_[i];
-    // The negated comparisons refuse infinities and what is not a number.
+    // The negated comparisons also reject infinity and NaN.
     if (!(mine.square <= most) || !(mine.square < ratio * mine.second) ||
         right_[mine.partner].partner != i)
       continue;

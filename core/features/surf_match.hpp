@@ -7,52 +7,59 @@
 
 namespace vergence::features {
 
-/// Points and their descriptors, one image's. Views.
+/// Views of the points of one image and as many descriptors.
 struct SurfView {
   std::span<const SurfPoint> points;
-  std::span<const SurfDescriptor> descriptors;  // as many
+  std::span<const SurfDescriptor> descriptors;
 };
 
 struct SurfMatch {
-  std::uint32_t left = 0, right = 0;  // indices of the points
-  float distance = 0;                 // Euclidean, of unit vectors: 0 … 2
+  std::uint32_t left = 0, right = 0;
+  /// Euclidean distance of unit vectors, 0 … 2.
+  float distance = 0;
 };
 
-/// Where a left point's partner may lie: within `px` of its epipolar line, pixel_rightᵀ F
-/// pixel_left = 0. F is of pixels as the points are; a lens that distorts asks for a wider band.
+/// Band of width ±px around a left point's epipolar line, in which its partner must be:
+/// pixel_rightᵀ F pixel_left = 0. F is for the points' pixels; a lens with distortion needs a wider
+/// band.
 struct EpipolarBand {
   Mat3 F = Mat3::Zero();
-  double px = 0;  // half width
+  double px = 0;
 };
 
 struct SurfMatchOptions {
-  float ratio = 0.8F;         // of the second best's distance that the best may have
-  float max_distance = 0.6F;  // unrelated descriptors lie some 0.8 apart
+  /// Maximum ratio of the best to the second best distance.
+  float ratio = 0.8F;
+  /// Maximum distance; that of unrelated descriptors is about 0.8.
+  float max_distance = 0.6F;
 };
 
 enum class SurfMatchStatus : std::uint8_t {
   ok,
-  invalid_input,  // points without descriptors
-  capacity,       // more points than given to the constructor; nothing matched
+  /// The numbers of points and descriptors differ.
+  invalid_input,
+  /// There are more points than given to the constructor; nothing was matched.
+  capacity,
 };
 
-/// Mutually best partners among blobs of the same sign.
+/// Matches blobs of the same sign that are mutually best.
 ///
-/// Source     Nearest neighbour and its ratio to the second: Bay et al. 2008, Lowe 2004; mutual:
-///            best in both directions.
-/// Threads    One at a time.
-/// Memory     From the arena at construction. Matches that find no room are dropped: those of the
-///            last left points.
-/// Time       Some 64 multiplications a pair of points of equal sign (inside the band).
-/// Errors     Not `ok`: *out is empty.
+/// Source     Nearest neighbour and its ratio to the second best: Bay et al. 2008, Lowe 2004; best
+///            in both directions.
+/// Threads    One caller.
+/// Memory     From the arena at construction. If the output is full, matches of the last left
+///            points are dropped.
+/// Time       About 64 multiplications per pair of points of equal sign (in the band).
+/// Errors     If the result is not `ok`, *out is empty.
 class SurfMatcher {
  public:
   SurfMatcher() noexcept = default;
-  /// At most `capacity` points in either image. Throws std::length_error when the arena is full.
+  /// `capacity`: maximum number of points in either image. Throws std::length_error if the arena is
+  /// full.
   SurfMatcher(std::size_t capacity, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
 
-  /// In the order of the left points. `band` may be null.
+  /// Matches are in the order of the left points. `band` may be null.
   [[nodiscard]] SurfMatchStatus match(const SurfView& left, const SurfView& right,
                                       const SurfMatchOptions& options, const EpipolarBand* band,
                                       BoundedVector<SurfMatch>* out) noexcept;
@@ -60,12 +67,13 @@ class SurfMatcher {
  private:
   struct Best {
     std::uint32_t partner = 0;
-    float square = 0, second = 0;  // distances
+    // Squared distances of the best and the second best.
+    float square = 0, second = 0;
     bool described = false;
   };
   void compare(const SurfView& left, const SurfView& right, const EpipolarBand* band) noexcept;
 
-  std::span<Best> left_, right_;  // of each point
+  std::span<Best> left_, right_;
 };
 
 }  // namespace vergence::features

@@ -5,9 +5,10 @@
 namespace vergence {
 namespace {
 
-constexpr double kMinGradient2 =
-    1e-20;  // squared length of the line's normal: within 1e-10 of the epipole
-constexpr double kMinSine2 = 1e-20;  // between two rays: parallel to what double can tell
+// Minimum squared length of the line's normal: within 1e-10 of the epipole.
+constexpr double kMinGradient2 = 1e-20;
+// Minimum squared sine between two rays; below it they are parallel in double precision.
+constexpr double kMinSine2 = 1e-20;
 
 }  // namespace
 
@@ -49,13 +50,13 @@ bool EpipolarGeometry::distance(const Vec2& left, const Vec2& right, double* val
   const double i = 1.0 / std::sqrt(s);
   *value = n * i;
   if (J == nullptr) return true;
-  // l = t × (R x): ∂/∂φ = −[t]× [R x]×, ∂/∂(α, β) = −[R x]× B.   k = Rᵀ (x' × t): ∂/∂φ = Rᵀ [w]×,
-  // ∂/∂(α, β) = Rᵀ [x']× B.
+  // l = t × (R x): ∂/∂φ = −[t]× [R x]×, ∂/∂(α, β) = −[R x]× B. k = Rᵀ (x' × t): ∂/∂φ = Rᵀ [w]×,
+  // ∂/∂(α, β) = Rᵀ [x']× B. ds is ½ ∂s/∂δ.
   Eigen::Matrix<double, 3, 5> dl;
   const Mat3 Y = skew(turned);
   dl.leftCols<3>() = -skew(t_) * Y;
   dl.rightCols<2>() = -Y * B_;
-  Vec5 ds = dl.topRows<2>().transpose() * l.head<2>();  // ½ ∂s/∂δ
+  Vec5 ds = dl.topRows<2>().transpose() * l.head<2>();
   if constexpr (kBothImages) {
     Eigen::Matrix<double, 3, 5> dk;
     dk.leftCols<3>() = R_.transpose() * skew(w);
@@ -82,7 +83,7 @@ bool match_depths(const Transform& T, const Vec2& left, const Vec2& right, doubl
   const Vec3 c = a.cross(b);
   const double c2 = c.squaredNorm();
   if (!(c2 > kMinSine2 * a.squaredNorm() * b.squaredNorm())) return false;
-  // λ_r b = λ_l a + t; crossed with b and with a.
+  // Cross products of λ_r b = λ_l a + t with b and a eliminate one depth each.
   *depth_left = b.cross(T.t).dot(c) / c2;
   *depth_right = a.cross(T.t).dot(c) / c2;
   return true;

@@ -5,15 +5,15 @@ namespace vergence {
 
 using Mat5 = Eigen::Matrix<double, 5, 5>;
 
-/// The stereo transform moved by δ = (φ, α, β), rad: R ← Exp(φ) R, t ← |t| · normalised(t/|t| + B
-/// (α, β)), B the tangent basis of t/|t|. The length stays: two cameras do not see it.
+/// Perturbs the stereo transform by δ = (φ, α, β), rad: R ← Exp(φ) R, t ← |t| · normalised(t/|t| +
+/// B (α, β)), with B the tangent basis of t/|t|. The length is unobservable and stays.
 /// Precondition: |t| > 0.
 [[nodiscard]] Transform moved_on_sphere(const Transform& T_right_left, const Vec5& delta) noexcept;
 
-/// E = [t/|t|]× R: ray_rightᵀ E ray_left = 0. Zero where |t| is.
+/// Essential matrix E = [t/|t|]× R with ray_rightᵀ E ray_left = 0; zero if |t| is.
 [[nodiscard]] Mat3 essential_matrix(const Transform& T_right_left) noexcept;
 
-/// E with its derivatives prepared, so that many matches share the work.
+/// Essential matrix with prepared derivatives, to share work among many matches.
 ///
 /// With rays x = (x, y, 1) of the left and x' of the right camera, l = E x, k = Eᵀ x', n = x'ᵀ E x:
 ///
@@ -21,16 +21,15 @@ using Mat5 = Eigen::Matrix<double, 5, 5>;
 ///     to the line        n / √(l_x² + l_y²)
 ///
 /// The first (P. Sampson 1982) is the reprojection error to first order, the second the right
-/// point's distance from the left one's epipolar line.
-/// Both are signed, in normalised units (times the focal length: px). J: derivative by δ of
-/// moved_on_sphere().
-/// Threads  Const after construction.
+/// point's distance from the left one's epipolar line. Both are signed and in normalised units
+/// (times the focal length: px). J is the derivative with respect to δ of moved_on_sphere().
+/// Const after construction.
 class EpipolarGeometry {
  public:
   explicit EpipolarGeometry(const Transform& T_right_left) noexcept;
 
-  /// False: nothing is measured, as at the epipole, where the line has no direction, or without a
-  /// baseline; *value and *J untouched. J may be null.
+  /// Returns false and leaves *value and *J unchanged at the epipole, where the line has no
+  /// direction, or without a baseline. J may be null.
   [[nodiscard]] bool sampson(const Vec2& left, const Vec2& right, double* value,
                              Vec5* J) const noexcept;
   [[nodiscard]] bool to_line(const Vec2& left, const Vec2& right, double* value,
@@ -43,14 +42,16 @@ class EpipolarGeometry {
                               Vec5* J) const noexcept;
 
   Mat3 R_, E_;
-  Vec3 t_;   // unit
-  Mat32 B_;  // tangent basis of t_
+  // Unit vector.
+  Vec3 t_;
+  // Tangent basis of t_.
+  Mat32 B_;
   bool valid_;
 };
 
-/// Depths along (x, y, 1) of a match by the two rays' nearest points: depth_right · right = R
-/// (depth_left · left) + t.
-/// False: the rays are parallel; nothing written.
+/// Computes the depths of a match along (x, y, 1) at the nearest points of the two rays:
+/// depth_right · right = R (depth_left · left) + t. Returns false and writes nothing if the rays
+/// are parallel.
 [[nodiscard]] bool match_depths(const Transform& T_right_left, const Vec2& left, const Vec2& right,
                                 double* depth_left, double* depth_right) noexcept;
 

@@ -13,7 +13,7 @@ EpipolarEvidence weigh_epipolar_distances(std::span<float> distances, double ban
   constexpr double kTrueShare = 0.5;
   EpipolarEvidence e;
   if (distances.empty()) return e;
-  // Half of the band is no core: chance alone makes the median that.
+  // The limit is half of the band, the median of chance matches alone.
   e.width_px = std::clamp(static_cast<double>(median(distances)) / kMedianOfNormal, noise_px,
                           std::max(noise_px, 0.5 * band_px));
   const double peak = band_px * std::sqrt(2 / std::numbers::pi) / e.width_px;

@@ -14,9 +14,12 @@
 namespace vergence {
 namespace {
 
-constexpr double kMinRank = 1e-10;     // least over largest pivot of the five equations
-constexpr double kMaxResidual = 1e-8;  // of the ten cubics for ‖E‖² of order one, after polishing
-constexpr int kPolishSteps = 4;        // the elimination leaves 1e-6 at worst; two steps are usual
+// Minimum ratio of the smallest to the largest pivot of the five equations.
+constexpr double kMinRank = 1e-10;
+// Maximum residual of the ten cubics after refinement, for ‖E‖² of order one.
+constexpr double kMaxResidual = 1e-8;
+// The elimination leaves errors of at most 1e-6; two steps are usual.
+constexpr int kPolishSteps = 4;
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 using Mat10x20 = Eigen::Matrix<double, 10, 20>;
@@ -49,7 +52,7 @@ constexpr std::array<Exponents, 20> kCubic = {
      {0, 2, 0}, {1, 1, 1}, {1, 1, 0}, {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2},
      {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
 
-/// Where the product of monomial i of A and j of B stands in C.
+/// Index in C of the product of monomial i of A and j of B.
 template <std::size_t A, std::size_t B, std::size_t C>
 consteval std::array<std::array<std::size_t, B>, A> product_table(
     const std::array<Exponents, A>& a, const std::array<Exponents, B>& b,
@@ -77,9 +80,10 @@ void add_product(const Quadratic& a, const Linear& b, Mat10x20* M, int row) noex
       (*M)(row, static_cast<int>(kQuadraticLinear[i][j])) += a[i] * b[j];
 }
 
-using Basis = std::array<Mat3, 4>;  // X Y Z W
+// X Y Z W.
+using Basis = std::array<Mat3, 4>;
 
-/// The ten cubics, a row each: det E, and the nine of E Eᵀ E − ½ tr(E Eᵀ) E.
+/// The ten cubics, one per row: det E, and the nine of E Eᵀ E − ½ tr(E Eᵀ) E.
 [[nodiscard]] Mat10x20 constraints(const Basis& basis) noexcept {
   std::array<std::array<Linear, 3>, 3> E;
   for (std::size_t r = 0; r < 3; ++r)
@@ -87,7 +91,8 @@ using Basis = std::array<Mat3, 4>;  // X Y Z W
       for (std::size_t k = 0; k < 4; ++k)
         E[r][c][k] = basis[k](static_cast<int>(r), static_cast<int>(c));
   Mat10x20 M = Mat10x20::Zero();
-  for (std::size_t c = 0; c < 3; ++c) {  // expansion along the first row
+  // Expand along the first row.
+  for (std::size_t c = 0; c < 3; ++c) {
     const std::size_t a = (c + 1) % 3, b = (c + 2) % 3;
     Quadratic minor{};
     add_product(E[1][a], E[2][b], 1.0, &minor);
@@ -115,7 +120,8 @@ using Basis = std::array<Mat3, 4>;  // X Y Z W
 /// Null space of the five equations as four matrices, orthonormal.
 [[nodiscard]] bool null_space(const std::array<Vec2, 5>& left, const std::array<Vec2, 5>& right,
                               Basis* basis) noexcept {
-  Eigen::Matrix<double, 9, 5> A;  // columns: the equations
+  // The columns are the equations.
+  Eigen::Matrix<double, 9, 5> A;
   for (int i = 0; i < 5; ++i) {
     const Vec3 x = left[static_cast<std::size_t>(i)].homogeneous(),
                y = right[static_cast<std::size_t>(i)].homogeneous();
@@ -125,7 +131,7 @@ using Basis = std::array<Mat3, 4>;  // X Y Z W
   }
   const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 5>> qr(A);
   if (!(std::abs(qr.matrixQR()(4, 4)) > kMinRank * std::abs(qr.matrixQR()(0, 0)))) return false;
-  // qr.householderQ() one reflector after another: all of it takes the compiler seconds.
+  // Apply qr.householderQ() one reflector at a time; forming all of it takes the compiler seconds.
   Mat9 Q = Mat9::Identity();
   Eigen::Matrix<double, 9, 1> workspace;
   for (Eigen::Index k = 4; k >= 0; --k)
@@ -144,8 +150,7 @@ struct EliminatedRow {
   std::array<double, 5> one;
 };
 
-/// upper − z · lower for two rows of the reduced system, of which only the right ten columns are
-/// left.
+/// Computes upper − z · lower for two rows of the reduced system, given its right ten columns.
 [[nodiscard]] EliminatedRow eliminate(const Vec10& upper, const Vec10& lower) noexcept {
   return {{upper[2], upper[1] - lower[2], upper[0] - lower[1], -lower[0]},
           {upper[5], upper[4] - lower[5], upper[3] - lower[4], -lower[3]},
@@ -175,7 +180,7 @@ template <std::size_t N>
   return v;
 }
 
-/// det B(z), degree ten.
+/// Computes det B(z), of degree ten.
 [[nodiscard]] std::array<double, 11> determinant(const std::array<EliminatedRow, 3>& B) noexcept {
   const auto p1 = difference(product(B[1].y, B[2].one), product(B[1].one, B[2].y));
   const auto p2 = difference(product(B[1].one, B[2].x), product(B[1].x, B[2].one));
@@ -186,7 +191,7 @@ template <std::size_t N>
   return out;
 }
 
-/// (x, y) with B(z) (x, y, 1)ᵀ = 0 by the longest cross product of two rows.
+/// Computes (x, y) with B(z) (x, y, 1)ᵀ = 0 by the longest cross product of two rows.
 [[nodiscard]] bool x_and_y(const std::array<EliminatedRow, 3>& B, double z, Vec3* xyz) noexcept {
   std::array<Vec3, 3> rows;
   for (std::size_t r = 0; r < 3; ++r)
@@ -200,7 +205,7 @@ template <std::size_t N>
   return xyz->allFinite();
 }
 
-/// The ten cubics at unit E and their derivative along three directions.
+/// Evaluates the ten cubics at E.
 void cubics_at(const Mat3& E, Vec10* f) noexcept {
   const Mat3 EEt = E * E.transpose();
   const Mat3 T = EEt * E - 0.5 * EEt.trace() * E;
@@ -233,8 +238,8 @@ void cubics_at(const Mat3& E, Vec10* f) noexcept {
       for (int i = 0; i < 9; ++i) J(1 + i, k) = dT(i / 3, i % 3);
     }
     Eigen::Matrix4d H = J.transpose() * J;
-    H.noalias() +=
-        q * q.transpose();  // the length of q is free in the cubics: held, so that H has full rank
+    // The cubics do not determine the length of q; fix it, so that H has full rank.
+    H.noalias() += q * q.transpose();
     const Eigen::LDLT<Eigen::Matrix4d> ldlt(H);
     const Vec4 next = (q - ldlt.solve(Vec4(J.transpose() * f))).normalized();
     const Mat3 E_next = matrix(next);
@@ -265,7 +270,7 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
   const Eigen::Matrix<double, 10, 10> reduced = lu.solve(tail);
   if (!reduced.allFinite()) return out;
   const auto row = [&reduced](int i) noexcept { return Vec10(reduced.row(i).transpose()); };
-  // Rows 4 … 9 of the reduced system lead with x²z x² y²z y² xyz xy: pairs that differ by a factor
+  // Rows 4 … 9 of the reduced system start with x²z x² y²z y² xyz xy: pairs that differ by a factor
   // z.
   const std::array<EliminatedRow, 3> B = {eliminate(row(4), row(5)), eliminate(row(6), row(7)),
                                           eliminate(row(8), row(9))};
@@ -275,7 +280,7 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
   if (!(largest > 0) || !std::isfinite(largest)) return out;
   for (double& c : det) c /= largest;
 
-  // |z| ≤ 1, and beyond it the reversed polynomial in 1/z.
+  // Roots with |z| ≤ 1, then larger ones by the reversed polynomial in 1/z.
   std::array<double, 11> reversed = det;
   std::reverse(reversed.begin(), reversed.end());
   for (const bool outside : {false, true}) {
@@ -287,7 +292,8 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
       Mat3 E;
       if (!x_and_y(B, outside ? 1.0 / roots[i] : roots[i], &xyz) || !polish(basis, xyz, &E))
         continue;
-      bool seen = false;  // two starts may be polished into one
+      // Two starts may converge to the same solution.
+      bool seen = false;
       for (int j = 0; j < out.count; ++j) {
         const Mat3& other = out.E[static_cast<std::size_t>(j)];
         seen = seen || std::min((other - E).squaredNorm(), (other + E).squaredNorm()) < 1e-18;
@@ -310,7 +316,8 @@ int decompose_essential(const Mat3& E, std::span<const Vec2> left, std::span<con
   const Vec3 t = U.col(2);
   int most = 0;
   for (const Mat3& R : rotations) {
-    int ahead = 0, reversed = 0;  // −t turns both depths' signs
+    // The opposite t reverses the signs of both depths.
+    int ahead = 0, reversed = 0;
     for (std::size_t i = 0; i < left.size(); ++i) {
       double l = 0, r = 0;
       if (!match_depths({R, t}, left[i], right[i], &l, &r)) continue;

@@ -13,13 +13,15 @@ namespace vergence {
 namespace {
 
 constexpr const char* kWho = "rig MLESAC";
-// Scoring looks up after so many observations whether the hypothesis has lost already; a multiple
-// of the block.
+// Number of observations, a multiple of the block, after which scoring checks whether the
+// hypothesis has already lost.
 constexpr std::size_t kAbortChunk = 64;
-constexpr int kPolishSteps = 3;  // Gauss–Newton on inliers from a pose a few sigmas off
-constexpr int kMaxPolished =
-    12;  // new bests polished a solve: they come log(hypotheses) often, later ones matter least
-constexpr double kNoHuber = 1e6;  // sigmas: inliers are cut at T², nothing is left to down-weight
+// Number of Gauss–Newton steps on inliers, from a pose with an error of a few sigmas.
+constexpr int kPolishSteps = 3;
+// Maximum number of refined hypotheses per solve; there are about log(hypotheses).
+constexpr int kMaxPolished = 12;
+// Huber's threshold in sigmas: inliers are cut at T², so none is down-weighted.
+constexpr double kNoHuber = 1e6;
 
 [[nodiscard]] bool valid(const MlesacOptions& o) noexcept {
   return o.max_hypotheses >= 1 && o.min_hypotheses >= 0 && o.confidence > 0 && o.confidence < 1 &&
@@ -183,7 +185,8 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
   problem_.gather(o);
   out.observations = observations_;
   const bool has_prior = prior != nullptr && prior->finite();
-  int drawable = 0;  // observations in cameras that have three
+  // Number of observations in cameras that have at least three.
+  int drawable = 0;
   for (const CameraSet& s : sets_) drawable += s.count >= 3 ? static_cast<int>(s.count) : 0;
   if (observations_ == 0 || (drawable == 0 && !has_prior)) {
     std::fill_n(flags_.begin(), points_, std::uint8_t{0});
@@ -219,7 +222,7 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
 
   while (out.samples < needed) {
     ++out.samples;
-    // A camera in proportion to what it sees.
+    // Choose a camera in proportion to its observations.
     int ticket = static_cast<int>(random.below(static_cast<std::uint32_t>(drawable)));
     std::size_t k = 0;
     for (; k + 1 < sets_.size(); ++k) {

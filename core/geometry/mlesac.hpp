@@ -12,31 +12,36 @@
 namespace vergence {
 
 struct MlesacOptions {
-  int max_hypotheses = 100;  // three-point samples, 1 … 10 000; each gives up to four poses
-  int min_hypotheses =
-      8;  // even when the prior explains everything: the prior's noise is not the frame's
-  double confidence = 0.999;  // that one sample at least was free of outliers; sets the adaptive
-                              // stop, 0.5 … 0.999999
+  /// Maximum number of three-point samples, 1 … 10 000; each gives up to four poses.
+  int max_hypotheses = 100;
+  /// Minimum number of samples, even if the prior fits, because its noise is not that of the frame.
+  int min_hypotheses = 8;
+  /// Probability that at least one sample has no outlier, for the adaptive stop, 0.5 … 0.999999.
+  double confidence = 0.999;
   double outlier_cost = kChi2OfPixel;
 };
 
 struct MlesacPose {
-  /// There is a pose; the caller decides whether its inliers suffice. Not found where the input
-  /// or the options cannot be, there are more points than the workspace holds, or without a prior
-  /// no camera has three usable observations or no sample gave a pose.
+  /// True if there is a pose; the caller checks its inliers. False if the input or options are
+  /// invalid, the workspace is too small, or, without a prior, no camera has three usable
+  /// observations or no sample gave a pose.
   bool found = false;
   Transform T_left_world{};
-  int inliers = 0;              // points all of whose `seen` observations are usable, within T²
-  int inlier_observations = 0;  // of `observations`
-  int observations = 0;         // usable, of all cameras
-  double score = 0;             // C below, lower is better
-  int samples = 0;              // three-point samples drawn
+
+  /// Number of points all of whose observations are usable and within T².
+  int inliers = 0;
+  int inlier_observations = 0;
+  /// Number of usable observations of all cameras.
+  int observations = 0;
+  /// Cost C; lower is better.
+  double score = 0;
+  int samples = 0;
 };
 
-/// Pose of a rig in the world from points seen by any of its cameras, outliers among them.
+/// Estimates the pose of a rig in the world from points seen by any of its cameras, with outliers.
 ///
-/// A sample is three points that one camera sees, in three different buckets of its image (8 × 6
-/// over what it sees), so that they lie apart; camera k's three-point pose becomes T_left_world =
+/// A sample is three points seen by one camera, spread over different buckets of its image (8 × 6
+/// over the points' bounding rectangle); camera k's three-point pose becomes T_left_world =
 /// T_camera_left[k]⁻¹ T_k_world. Each hypothesis is scored over every observation of every camera
 /// by the truncated form of MLESAC's likelihood (P. H. S. Torr, A. Zisserman, "MLESAC", CVIU 78,
 /// 2000: the mixture of a Gaussian for inliers and a uniform density for outliers; its cost ρ₂):
@@ -44,41 +49,45 @@ struct MlesacPose {
 ///     C = Σ_o min(e_o², T²),   e_o² = |measured − projected|² / σ_o²;   behind the camera: T²
 ///
 /// T² is where the two densities of the mixture cross. Scoring stops once C exceeds the best so
-/// far, which changes nothing. A sample's pose carries the noise of three points only; so each new
-/// best is polished by a few least-squares steps over its inliers and kept if that lowers C (local
-/// optimisation: O. Chum, J. Matas, J. Kittler, DAGM 2003). Stop after N = ln(1 − confidence) /
-/// ln(1 − w³) samples, w the share of inlier observations of the best so far.
+/// far. Each new best, with the noise of three points only, is refined by a few least-squares steps
+/// over its inliers if that lowers C (local optimisation: O. Chum, J. Matas, J. Kittler, DAGM
+/// 2003). It stops after N = ln(1 − confidence) / ln(1 − w³) samples, with w the share of inlier
+/// observations of the best so far.
 ///
-/// Ownership  Workspace in the arena it was made in. flags() stay valid until the next solve().
-/// Threads    One caller per object; several objects may run side by side.
+/// Ownership  Workspace in the arena. flags() stay valid until the next solve().
+/// Threads    One caller per object; several objects may run in parallel.
 /// Memory     All at construction.
 /// Precision  Scores in float about the points' mean (0.01 px for points within 100 times their
 ///            distance), flags in double.
-/// Errors     Not found: the pose is the identity and means nothing.
-/// Same input, options and random state: same result, on every instruction set.
+/// Errors     If no pose is found, it is the identity. Same input, options and random state: same
+///            result, on every instruction set.
 class RigMlesac {
  public:
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
-  /// At most `capacity` points. Throws std::length_error when the arena is full.
+  /// `capacity`: maximum number of points. Throws std::length_error if the arena is full.
   RigMlesac(std::size_t capacity, Arena& arena);
 
-  /// `prior` (may be null): a pose worth trying first, constant velocity's prediction for instance.
+  /// `prior` (may be null): a pose to try first, for example the constant-velocity prediction.
   [[nodiscard]] MlesacPose solve(const RigObservations& observations, const MlesacOptions& options,
                                  const Transform* prior, Random& random) noexcept;
 
-  /// For each point of the last solve(): bit k set if camera k's observation is within T². An
-  /// inlier is a point whose flags equal its `seen` bits.
+  /// Per point of the last solve(), bit k is set if camera k's observation is within T². An inlier
+  /// is a point whose flags equal its `seen` bits.
   [[nodiscard]] std::span<const std::uint8_t> flags() const noexcept {
     return flags_.first(points_);
   }
 
  private:
   struct CameraSet {
-    std::span<float> x, y, z, u, v, weight, cap;  // columns for scoring
-    std::span<std::uint32_t> point;               // index into the input
-    std::span<std::uint8_t> bucket;               // of the image
+    // Columns for scoring.
+    std::span<float> x, y, z, u, v, weight, cap;
+    // Index in the input.
+    std::span<std::uint32_t> point;
+    // Bucket in the image.
+    std::span<std::uint8_t> bucket;
     std::size_t count = 0;
-    std::size_t scored = 0;  // count rounded up to whole blocks
+    // `count` rounded up to whole blocks.
+    std::size_t scored = 0;
   };
 
   void gather(const RigObservations& observations, double cap) noexcept;
@@ -88,19 +97,21 @@ class RigMlesac {
                              double best) const noexcept;
   void flag(const RigObservations& observations, double cap, MlesacPose* pose) noexcept;
 
-  /// Least squares over the inliers of *T, at most kPolishSteps; false: *T untouched.
+  /// Least squares over the inliers of *T, at most kPolishSteps steps. If it fails, it returns
+  /// false and leaves *T unchanged.
   [[nodiscard]] bool polish(double cap, Transform* T) noexcept;
 
   std::array<CameraSet, kMaxCameras> sets_{};
   detail::PoseProblem problem_;
   std::span<std::uint8_t> flags_;
-  Vec3 centre_ = Vec3::Zero();  // of the points, world
+  // Centre of the points in the world.
+  Vec3 centre_ = Vec3::Zero();
   std::size_t points_ = 0;
   int observations_ = 0;
 };
 
-/// Samples after which, with share `inliers` of good data, one of `size` points is clean with that
-/// confidence; ≥ 1, capped.
+/// Number of samples (1 … `cap`) after which one of `size` points is free of outliers with that
+/// confidence, for a share `inliers` of good data.
 [[nodiscard]] int samples_needed(double inliers, int size, double confidence, int cap) noexcept;
 
 }  // namespace vergence

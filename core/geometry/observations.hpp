@@ -8,25 +8,26 @@
 
 namespace vergence {
 
-/// Ideal pinhole of an undistorted pixel: (fx X/Z + cx, fy Y/Z + cy).
+/// Ideal pinhole camera of undistorted pixels: (fx X/Z + cx, fy Y/Z + cy), in px.
 struct Pinhole {
-  double fx = 0, fy = 0, cx = 0, cy = 0;  // px
+  double fx = 0, fy = 0, cx = 0, cy = 0;
 };
 
-/// World points and where the cameras of a rig see them at one instant, structure of arrays.
+/// World points and their observations by the cameras of a rig at one instant, as structure of
+/// arrays.
 ///
 /// Ownership  Views; the memory outlives the call that reads them.
-/// Units      Points in world, m. Pixels undistorted (lens model taken out), so that a pinhole is
-///            exact.
+/// Units      Points in world, m. Pixels are undistorted, so that a pinhole is exact.
 /// Shape      x, y, z, sigma, seen have one length n; u[k], v[k] have length n for every camera k <
-///            cameras, and what stands at i counts where bit k of seen[i] is set only.
+///            cameras, whose element i is valid only if bit k of seen[i] is set.
 struct RigObservations {
   int cameras = 0;
   std::array<Pinhole, kMaxCameras> pinhole{};
-  std::array<Transform, kMaxCameras>
-      T_camera_left{};  // X_k = T_camera_left[k] X_left; [0] identity
+  /// X_k = T_camera_left[k] X_left; element 0 is the identity.
+  std::array<Transform, kMaxCameras> T_camera_left{};
   std::span<const double> x, y, z;
-  std::span<const double> sigma;  // px, of one coordinate, the same in all cameras; > 0
+  /// Standard deviation of one coordinate in px, the same in all cameras; > 0.
+  std::span<const double> sigma;
   std::span<const std::uint8_t> seen;
   std::array<std::span<const double>, kMaxCameras> u{}, v{};
 
@@ -34,31 +35,29 @@ struct RigObservations {
   [[nodiscard]] bool sees(std::size_t i, int camera) const noexcept {
     return ((seen[i] >> camera) & 1U) != 0;
   }
-  /// Lengths agree, camera count in range, intrinsics and transforms finite. Entries themselves may
-  /// still be anything.
+  /// True if lengths agree, the number of cameras is in range, and intrinsics and transforms are
+  /// finite. Entries may still have any value.
   [[nodiscard]] bool consistent() const noexcept;
-  /// The observation of point i in that camera can be reckoned with: finite numbers, positive
-  /// finite sigma.
+  /// True if the observation of point i in that camera has finite numbers and a positive finite
+  /// sigma.
   [[nodiscard]] bool usable(std::size_t i, int camera) const noexcept;
 };
 
-/// Owns the arrays of RigObservations in an arena; refilled every frame. When full, push()
-/// refuses.
+/// Owns the arrays of RigObservations in an arena; refilled every frame.
 class RigObservationTable {
  public:
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   RigObservationTable(std::size_t capacity, Arena& arena);
 
-  /// Forgets the points; keeps the rig.
+  /// Clears the points; keeps the rig.
   void clear() noexcept { size_ = 0; }
-  /// Intrinsics and transforms of the cameras; distortion is not read. Precondition: rig.cameras in
-  /// 1 … kMaxCameras.
+  /// Sets intrinsics and transforms of the cameras; distortion is not read. Precondition:
+  /// rig.cameras in 1 … kMaxCameras.
   void set_rig(const RigCalibration& rig) noexcept;
-  /// A point that no camera sees yet; its index is size() − 1 after this. False: full, nothing
-  /// changed.
+  /// Adds a point without observations, at index size() − 1. Returns false if the table is full.
   [[nodiscard]] bool push(const Vec3& p_world, double sigma_px) noexcept;
-  /// The last point pushed is seen by `camera` at that undistorted pixel. Precondition: size() > 0,
-  /// camera of the rig.
+  /// Adds the observation of the last point by `camera` at an undistorted pixel. Precondition:
+  /// size() > 0, camera of the rig.
   void see(int camera, const Vec2& pixel) noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
@@ -67,7 +66,8 @@ class RigObservationTable {
   [[nodiscard]] RigObservations view() const noexcept;
 
  private:
-  RigObservations rig_{};  // cameras, pinholes, transforms; no arrays
+  // Cameras, pinholes and transforms; the arrays are empty.
+  RigObservations rig_{};
   std::span<double> x_, y_, z_, sigma_;
   std::span<std::uint8_t> seen_;
   std::array<std::span<double>, kMaxCameras> u_{}, v_{};

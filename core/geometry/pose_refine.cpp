@@ -11,13 +11,18 @@ namespace vergence {
 namespace {
 
 constexpr const char* kWho = "pose refinement";
-constexpr double kRayleighMedian = 1.1774100225154747;  // √(2 ln 2)
+// √(2 ln 2).
+constexpr double kRayleighMedian = 1.1774100225154747;
 constexpr int kMinObservations = 3;
-constexpr int kRescaleAfter = 2;        // steps: by then the pose is within a sigma or two
-constexpr double kFirstDamping = 1e-4;  // relative to the diagonal, once a plain step has failed
-constexpr int kMaxFailures = 6;         // damping grows tenfold a time: beyond, rounding decides
-constexpr double kMaxCondition =
-    1e12;  // of the scaled information: beyond, double holds no digit of the worst direction
+// Number of steps after which the pose is within about two sigmas.
+constexpr int kRescaleAfter = 2;
+// Damping relative to the diagonal after a plain step has failed.
+constexpr double kFirstDamping = 1e-4;
+// Damping grows tenfold per failure; after this many, rounding dominates.
+constexpr int kMaxFailures = 6;
+// Maximum condition of the scaled information; above it double precision does not resolve the worst
+// direction.
+constexpr double kMaxCondition = 1e12;
 
 [[nodiscard]] bool valid(const PoseRefineOptions& o) noexcept {
   return o.max_steps >= 1 && o.max_steps <= 10 && o.huber > 0 && o.min_scale > 0 &&
@@ -100,7 +105,7 @@ bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) n
     }
     const Transform next = detail::moved(pose->T_left_world, delta);
     const detail::PoseProblem::Sums then = problem_.sums(next, pose->scale, options.huber);
-    // Rounding of the sum is forgiven: at the optimum steps neither help nor hurt.
+    // Tolerate rounding of the sum, because steps at the optimum change nothing.
     if (!(then.cost <= now.cost * (1.0 + 1e-12)) || !next.finite()) {
       if (small(delta, options.small_update)) {
         pose->converged = true;
@@ -121,7 +126,7 @@ bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) n
       break;
     }
   }
-  // The scale at the end is the one that information and flags are in.
+  // Information and flags use the final scale.
   if (!rescaled) {
     pose->scale = residual_scale(pose->T_left_world, options.min_scale);
     now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
@@ -175,7 +180,7 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
 
   if (!descend(options, &out)) return out;
   if (drop_gross(out, options)) {
-    // Where what is left does not hold the pose, it is that of all.
+    // If the remaining observations do not determine the pose, keep that of all.
     const RefinedPose of_all = out;
     if (!descend(options, &out)) out = of_all;
   }

@@ -16,15 +16,15 @@ namespace vergence {
 namespace {
 
 constexpr const char* kWho = "stereo MLESAC";
-constexpr std::size_t kAbortChunk =
-    128;  // matches scored between looks at the best so far; a multiple of the block
-          // Gauss–Newton from a pose a few sigmas off
-// Gauss–Newton steps of a polish and, for each, by how much T² is widened: a sample's noise hides
-// good matches at first.
+// Number of matches, a multiple of the block, between checks against the best score.
+constexpr std::size_t kAbortChunk = 128;
+// Widening of T² for each Gauss–Newton step, because a sample's noise hides good matches at first.
 constexpr std::array kPolishWidths = {9.0, 4.0, 1.0, 1.0, 1.0};
-constexpr int kMaxPolished = 12;  // new bests polished a call: they come log(hypotheses) often
-constexpr double kMaxCondition =
-    1e12;  // of the information: beyond, double holds no digit of the worst direction
+// Maximum number of refined hypotheses per call; there are about log(hypotheses).
+constexpr int kMaxPolished = 12;
+// Maximum condition of the information; above it double precision does not resolve the worst
+// direction.
+constexpr double kMaxCondition = 1e12;
 
 [[nodiscard]] bool valid(const StereoMatches& m, double baseline,
                          const StereoMlesacOptions& o) noexcept {
@@ -35,8 +35,8 @@ constexpr double kMaxCondition =
          std::isfinite(o.outlier_cost);
 }
 
-/// In front of both cameras, or so far away that noise decides the sign of its depth, which then
-/// means nothing.
+/// True if a match is in front of both cameras, or so far away that noise decides the sign of its
+/// depth.
 [[nodiscard]] bool in_front(const Transform& T, const Vec2& left, const Vec2& right,
                             double inverse_sigma, double cap) noexcept {
   double depth_left = 0, depth_right = 0;
@@ -45,7 +45,8 @@ constexpr double kMaxCondition =
   const Vec3 turned = T.R * left.homogeneous();
   if (!(turned.z() > 0)) return false;
   const double gap = (turned.head<2>() / turned.z() - right).norm() * inverse_sigma;
-  return gap * gap < 2.0 * cap;  // of both rays' noise
+  // The noise of both rays adds up.
+  return gap * gap < 2.0 * cap;
 }
 
 }  // namespace
@@ -132,8 +133,8 @@ Mat5 StereoMlesac::information(double cap, const Transform& T, Vec5* gradient) c
     Vec5 J;
     if (!geometry.sampson(left_[i], right_[i], &r, &J)) continue;
     r *= inverse_sigma_[i];
-    // A wrong match that the line lets pass has a large disparity and with it a long lever on t:
-    // half of them stand behind.
+    // A wrong match near its line has a large disparity and therefore a strong influence on t, but
+    // half of those are behind a camera.
     if (!(r * r < cap) || !in_front(T, left_[i], right_[i], inverse_sigma_[i], cap)) continue;
     J *= inverse_sigma_[i];
     H.noalias() += J * J.transpose();
@@ -203,7 +204,8 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
       Transform better = T;
       if (polished < kMaxPolished && polish(cap, &better)) {
         ++polished;
-        // The distances do not see the sign of t: with the better E the depths are asked again.
+        // The distances do not depend on the sign of t, so the depths are checked again with the
+        // better E.
         const Mat3 E_better = essential_matrix(better);
         const double polished_cost = score(E_better, best);
         if (polished_cost < best && transform_of(E_better, cap, baseline, &better))

@@ -9,16 +9,18 @@
 namespace vergence {
 namespace {
 
-constexpr double kUnitTolerance = 1e-6;  // of |ray|² − 1: a caller who forgot to normalise
-constexpr double kMinRaySine2 =
-    1e-14;  // sin² between two rays: 0.02″, far below what pixels resolve
-constexpr double kMinTriangleSine2 =
-    1e-12;  // sin² of a corner of the world triangle: below it the frame is noise
-constexpr int kPolishSteps = 3;  // Newton from a start good to 1e-8: two reach rounding
-constexpr double kMaxRelativeMisfit =
-    1e-9;  // of a squared side after polishing, relative to the sum of the squared sides
+// Tolerance of |ray|² − 1, to detect rays that are not normalised.
+constexpr double kUnitTolerance = 1e-6;
+// Minimum sin² between two rays: 0.02″, far below the resolution of pixels.
+constexpr double kMinRaySine2 = 1e-14;
+// Minimum sin² of a corner of the world triangle; below it the frame is noise.
+constexpr double kMinTriangleSine2 = 1e-12;
+// Number of Newton steps; two reach rounding from an error of 1e-8.
+constexpr int kPolishSteps = 3;
+// Maximum error of a squared side after refinement, relative to the sum of the squared sides.
+constexpr double kMaxRelativeMisfit = 1e-9;
 
-/// A symmetric 3×3 form q(λ) = λᵀ M λ by its six numbers.
+/// A symmetric 3×3 form q(λ) = λᵀ M λ.
 struct Quadric {
   double xx, xy, xz, yy, yz, zz;
   [[nodiscard]] Vec3 times(const Vec3& v) const noexcept {
@@ -32,7 +34,7 @@ struct Quadric {
     return {yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy,
             xx * zz - xz * xz, xz * xy - xx * yz, xx * yy - xy * xy};
   }
-  /// tr(M N): the coefficient that couples two forms in a pencil's determinant.
+  /// tr(M N), the coupling coefficient of two forms in a pencil's determinant.
   [[nodiscard]] double dot(const Quadric& o) const noexcept {
     return xx * o.xx + yy * o.yy + zz * o.zz + 2.0 * (xy * o.xy + xz * o.xz + yz * o.yz);
   }
@@ -43,16 +45,17 @@ struct Quadric {
           a.yy + s * b.yy, a.yz + s * b.yz, a.zz + s * b.zz};
 }
 
-/// The sides of both triangles: cosines between rays, squared lengths between points.
+/// Sides of both triangles: cosines between rays, squared lengths between points.
 struct Sides {
   double cos01, cos02, cos12;
-  double gap01, gap02,
-      gap12;  // |ray_i − ray_j|² = 2 − 2 cos, without its cancellation for narrow bundles
-  double a01, a02, a12;  // divided by their sum: the problem has no scale of its own
+  // |ray_i − ray_j|² = 2 − 2 cos, without cancellation for narrow angles.
+  double gap01, gap02, gap12;
+  // Squared lengths over their sum, because the problem has no scale of its own.
+  double a01, a02, a12;
 };
 
-/// Depths that meet the three squared sides (λ_i − λ_j)² + λ_i λ_j gap_ij = a_ij: Newton with the
-/// inverse of the 3×3 Jacobian by cofactors.
+/// Refines depths to satisfy the three squared sides (λ_i − λ_j)² + λ_i λ_j gap_ij = a_ij, by
+/// Newton's method with the inverse of the 3×3 Jacobian by cofactors.
 [[nodiscard]] bool polish(const Sides& s, Vec3* depths) noexcept {
   Vec3 l = *depths;
   const auto residuals = [&s](const Vec3& d) noexcept {
@@ -68,13 +71,15 @@ struct Sides {
     const double j10 = d02 + s.gap02 * l[2], j12 = s.gap02 * l[0] - d02;
     const double j21 = d12 + s.gap12 * l[2], j22 = s.gap12 * l[1] - d12;
     const double det = -j00 * j12 * j21 - j01 * j10 * j22;
-    if (det == 0.0) break;  // a double root: the start stays as it is
+    // At a double root, keep the start.
+    if (det == 0.0) break;
     const double i = 1.0 / det;
     const Vec3 next(l[0] - i * (-j12 * j21 * r[0] - j01 * j22 * r[1] + j01 * j12 * r[2]),
                     l[1] - i * (-j10 * j22 * r[0] + j00 * j22 * r[1] - j00 * j12 * r[2]),
                     l[2] - i * (j10 * j21 * r[0] - j00 * j21 * r[1] - j01 * j10 * r[2]));
     const Vec3 after = residuals(next);
-    if (!(after.squaredNorm() < r.squaredNorm())) break;  // at rounding, or NaN
+    // Rounding is reached, or the value is NaN.
+    if (!(after.squaredNorm() < r.squaredNorm())) break;
     l = next;
     r = after;
   }
@@ -83,7 +88,8 @@ struct Sides {
   return l.minCoeff() > 0.0;
 }
 
-/// Columns: along e1, normal to (e1, e2), and their cross product. Precondition: e1 × e2 ≠ 0.
+/// Frame with columns along e1, in the plane of e1 and e2, and normal to both. Precondition: e1 ×
+/// e2 ≠ 0.
 [[nodiscard]] Mat3 triangle_frame(const Vec3& e1, const Vec3& e2) noexcept {
   const Vec3 x = e1 * (1.0 / std::sqrt(e1.squaredNorm()));
   const Vec3 c = x.cross(e2);
@@ -113,43 +119,42 @@ struct Sides {
   return p * (1.0 / std::sqrt(p.squaredNorm()));
 }
 
-/// Directions λ (up to sign) where two conics meet; at most four. `split` = first + γ second is
-/// singular.
+/// Directions λ (up to sign) in which two conics intersect; at most four. The pencil's member first
+/// + γ second is singular.
 int meet(const Quadric& first, const Quadric& second, double gamma,
          std::array<Vec3, 4>* directions) noexcept {
   const Quadric split = combination(first, gamma, second);
   Vec3 apex;
   if (!null_vector(split, &apex)) return 0;
-  // Eigenvectors in the plane perpendicular to the apex, by one Jacobi turn.
+  // Eigenvectors in the plane perpendicular to the apex, by one Jacobi rotation.
   const Vec3 f = perpendicular(apex), g = apex.cross(f);
   const Vec3 Mf = split.times(f), Mg = split.times(g);
   const double ff = f.dot(Mf), fg = f.dot(Mg), gg = g.dot(Mg);
   const double mean = 0.5 * (ff + gg), half = 0.5 * (ff - gg);
   const double radius = std::sqrt(half * half + fg * fg);
   const double high = mean + radius, low = mean - radius;
-  if (!(high > 0.0) || !(low < 0.0))
-    return 0;  // both of one sign: two complex planes, no common direction
+  // Eigenvalues of one sign give two complex planes without a common direction.
+  if (!(high > 0.0) || !(low < 0.0)) return 0;
   Vec3 e_high = half >= 0 ? Vec3((half + radius) * f + fg * g) : Vec3(fg * f + (radius - half) * g);
   e_high *= 1.0 / std::sqrt(e_high.squaredNorm());
   const Vec3 e_low = apex.cross(e_high);
-  // high (e_high·λ)² + low (e_low·λ)² = 0: the planes √high e_high·λ = ±√−low e_low·λ.
+  // high (e_high·λ)² + low (e_low·λ)² = 0 gives the planes √high e_high·λ = ±√−low e_low·λ.
   const double root_high = std::sqrt(high), root_low = std::sqrt(-low);
-  const Quadric& other =
-      std::abs(gamma) > 1.0
-          ? first
-          : second;  // on the planes first = −γ second: the larger has more digits
+  // On the planes first = −γ second, so the larger one is more accurate.
+  const Quadric& other = std::abs(gamma) > 1.0 ? first : second;
   const Vec3 M_apex = other.times(apex);
   const double uu = apex.dot(M_apex);
   int n = 0;
   for (const double sign : {1.0, -1.0}) {
-    const Vec3 v =
-        sign * root_low * e_high + root_high * e_low;  // spans the plane together with the apex
+    // This vector and the apex span the plane.
+    const Vec3 v = sign * root_low * e_high + root_high * e_low;
     const double uv = v.dot(M_apex), vv = v.dot(other.times(v));
     // uu α² + 2 uv αβ + vv β² = 0 in homogeneous (α, β), the stable pair of roots.
     double discriminant = uv * uv - uu * vv;
     if (discriminant < 0.0) {
       if (discriminant < -1e-12 * (uv * uv + std::abs(uu * vv))) continue;
-      discriminant = 0.0;  // a double root that rounding has pushed aside
+      // This is a double root, apart from rounding.
+      discriminant = 0.0;
     }
     const double q = uv >= 0 ? -uv - std::sqrt(discriminant) : -uv + std::sqrt(discriminant);
     (*directions)[static_cast<std::size_t>(n++)] = q * apex + uu * v;
@@ -184,7 +189,7 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
   if (!std::isfinite(sum)) return out;
   const double longest = std::max({s.a01, s.a02, s.a12}),
                shortest = std::min({s.a01, s.a02, s.a12});
-  // |p01 × p02|² = (twice the area)²; with the two longer sides about equal it is longest ×
+  // |p01 × p02|² = (twice the area)². With two longer sides of about equal length it is longest ×
   // shortest × sin² of a corner.
   if (!(p01.cross(p02).squaredNorm() > kMinTriangleSine2 * longest * shortest) ||
       !(shortest > 1e-24 * longest))
@@ -197,13 +202,11 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
   const Quadric D1{s.a12, -s.a12 * s.cos01, 0.0, s.a12 - s.a01, s.a01 * s.cos12, -s.a01};
   const Quadric D2{s.a12, 0.0, -s.a12 * s.cos02, -s.a02, s.a02 * s.cos12, s.a12 - s.a02};
   const Quadric adj1 = D1.adjugate(), adj2 = D2.adjugate();
-  // det(D1 + γ D2); Vec3 rows suffice for the determinants: det M = row0 · first column of the
-  // adjugate.
+  // det(D1 + γ D2) as a cubic in γ: det M = row0 · first column of the adjugate.
   const double c0 = D1.xx * adj1.xx + D1.xy * adj1.xy, c3 = D2.xx * adj2.xx + D2.xz * adj2.xz;
   const double c1 = adj1.dot(D2), c2 = adj2.dot(D1);
 
-  // Where the cubic is nearly flat the pencil may be taken the other way round: 1/γ is a root of
-  // the reversed cubic.
+  // If the leading coefficient is small, reverse the pencil: 1/γ is a root of the reversed cubic.
   std::array<Vec3, 4> directions;
   int n = 0;
   if (std::abs(c3) >= std::abs(c0))
@@ -211,7 +214,7 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
   else
     n = meet(D2, D1, detail::sharpest_cubic_root(c0, c1, c2, c3), &directions);
 
-  // F_camera = R F_world for the frames of the two triangles.
+  // The frames of the two triangles satisfy F_camera = R F_world.
   const Mat3 F_world = triangle_frame(p01, p02);
   const double length = std::sqrt(sum);
   std::array<Vec3, 4> found;
@@ -220,7 +223,7 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
     if (l.sum() < 0.0) l = -l;
     const double largest = l.maxCoeff();
     if (!(l.minCoeff() > -1e-6 * largest) || !(largest > 0.0)) continue;
-    // Length of λ from the sum of the three sides, which is 1.
+    // The sum of the three sides, which is 1, determines the length of λ.
     const double q = 2.0 * (l.squaredNorm() - s.cos01 * l[0] * l[1] - s.cos02 * l[0] * l[2] -
                             s.cos12 * l[1] * l[2]);
     if (!(q > 0.0)) continue;
@@ -234,7 +237,7 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
     const Vec3 x0 = l[0] * rays[0], x1 = l[1] * rays[1], x2 = l[2] * rays[2];
     Transform T;
     T.R.noalias() = triangle_frame(x1 - x0, x2 - x0) * F_world.transpose();
-    // Through the centroid: a translation that rests on all three.
+    // The translation through the centroid uses all three points.
     T.t = (length / 3.0) * (x0 + x1 + x2) - T.R * ((points[0] + points[1] + points[2]) / 3.0);
     if (!T.finite()) continue;
     found[static_cast<std::size_t>(out.count)] = l;

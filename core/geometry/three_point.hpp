@@ -7,25 +7,26 @@
 
 namespace vergence {
 
-/// Poses that map the three points onto the three rays; none where the input is not finite, the
-/// points lie on a line, rays coincide or are no unit vectors, or no triangle of that size fits.
+/// Poses that map three points onto three rays; none if the input is not finite, the points are
+/// collinear, rays coincide or are not unit vectors, or no triangle of that size fits.
 struct ThreePointSolutions {
-  int count = 0;                              // 0 … 4
-  std::array<Transform, 4> T_camera_world{};  // the first `count` are meant, in no order
+  /// Number of solutions, 0 … 4.
+  int count = 0;
+  std::array<Transform, 4> T_camera_world{};
 };
 
-/// Absolute pose of a camera from three points: λ_i ray_i = R point_i + t, λ_i > 0.
+/// Computes the absolute pose of a camera from three points: λ_i ray_i = R point_i + t, λ_i > 0.
 ///
 /// The unknown depths λ satisfy |λ_i ray_i − λ_j ray_j|² = |point_i − point_j|² for the three
 /// pairs. Two homogeneous differences of these are conics; a root of their pencil's determinant (a
 /// cubic) splits one member into two planes, each of which meets the other conic in two directions
 /// λ (M. Persson, K. Nordberg, "Lambda Twist: An Accurate Fast Robust Perspective Three Point (P3P)
-/// Solver", ECCV 2018). The depths are then polished by Newton on the three distances, and R is the
-/// turn between the two triangles' own frames, orthonormal by construction.
+/// Solver", ECCV 2018). The depths are then refined by Newton's method on the three distances, and
+/// R is the rotation between the two triangles' own frames, orthonormal by construction.
 ///
-/// Input   rays: unit vectors in the camera's frame; points: world, m. Any scale of the scene;
-///         checked, never assumed.
-/// Threads Pure. Memory none. Time about 1 µs. Errors none; nothing that comes out is NaN.
+/// Input   rays: unit vectors in the camera's frame; points: world, m, of any scale. Both are
+///         checked.
+/// Threads Pure. Time about 1 µs. Results are never NaN.
 [[nodiscard]] ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
                                                     const std::array<Vec3, 3>& points) noexcept;
 

@@ -8,11 +8,13 @@
 namespace vergence {
 namespace {
 
-constexpr double kMinForward =
-    1e-6;  // of h_z, where the first view has 1: a ray nearly at right angles to the camera's axis
-constexpr double kConverged = 1e-12;  // of the ray, radians
-constexpr double kMinParallaxGain =
-    1e-18;  // of Σ (∂ray/∂ρ)², m²: cameras within nanometres of each other
+// Minimum h_z, which is 1 in the first view; smaller values are rays nearly orthogonal to the
+// camera's axis.
+constexpr double kMinForward = 1e-6;
+// Convergence limit of the ray, in rad.
+constexpr double kConverged = 1e-12;
+// Minimum of Σ (∂ray/∂ρ)² in m²; below it the cameras are within nanometres.
+constexpr double kMinParallaxGain = 1e-18;
 
 struct Reduced {
   Mat3 H;
@@ -27,13 +29,13 @@ struct Reduced {
   });
 }
 
-/// T_view_first as seen by every view in turn.
+/// Computes T_view_first.
 [[nodiscard]] Transform relative(const RayView& view, const RayView& first) noexcept {
   const Mat3 R = view.T_camera_world.R * first.T_camera_world.R.transpose();
   return {R, view.T_camera_world.t - R * first.T_camera_world.t};
 }
 
-/// False: a view has the point beside or behind it.
+/// Computes the normal equations. Returns false if the point is beside or behind a view.
 [[nodiscard]] bool reduce(std::span<const RayView> views, const Vec3& abr, Reduced* out) noexcept {
   *out = {Mat3::Zero(), Vec3::Zero(), 0.0};
   for (const RayView& v : views) {
@@ -41,7 +43,8 @@ struct Reduced {
     const Vec3 h = T.R * Vec3(abr[0], abr[1], 1.0) + abr[2] * T.t;
     if (!(h.z() > kMinForward)) return false;
     const double iz = 1.0 / h.z(), x = h.x() * iz, y = h.y() * iz;
-    Mat3 dh;  // ∂h/∂(a, b, ρ)
+    // ∂h/∂(a, b, ρ).
+    Mat3 dh;
     dh << T.R.col(0), T.R.col(1), T.t;
     Mat23 J;
     J.row(0) = iz * (dh.row(0) - x * dh.row(2));
@@ -55,7 +58,8 @@ struct Reduced {
   return true;
 }
 
-/// Weighted least squares of ρ with (a, b) as the first view measured them. False: no view tells.
+/// Weighted least squares of ρ with (a, b) from the first view. Returns false if no view determines
+/// it.
 [[nodiscard]] bool linear_inverse_depth(std::span<const RayView> views, double* rho) noexcept {
   const RayView& first = views.front();
   double num = 0, den = 0, gain = 0;
@@ -63,7 +67,7 @@ struct Reduced {
     const Transform T = relative(v, first);
     const Vec3 m = T.R * Vec3(first.ray.x(), first.ray.y(), 1.0);
     const double scale = 1.0 / (v.sigma * std::max(std::abs(m.z()), kMinForward));
-    // x (m_z + ρ t_z) = m_x + ρ t_x, likewise y.
+    // The equation is x (m_z + ρ t_z) = m_x + ρ t_x, likewise for y.
     const Vec2 a = (v.ray * T.t.z() - T.t.head<2>()) * scale,
                b = (m.head<2>() - v.ray * m.z()) * scale;
     num += a.dot(b);
@@ -99,7 +103,7 @@ TriangulatedPoint triangulate(std::span<const RayView> views,
     const Vec3 delta = llt.solve(now.g);
     const Vec3 next = abr + delta;
     Reduced then;
-    // A step that does not lower the error ends it: rounding, or a point that no depth explains.
+    // Stop if a step does not lower the error: rounding, or a point that no depth explains.
     if (!next.allFinite() || !reduce(views, next, &then) || !(then.chi2 <= now.chi2)) break;
     abr = next;
     now = then;
@@ -129,7 +133,8 @@ TriangulatedPoint triangulate(std::span<const RayView> views,
   out.status = TriangulateStatus::ok;
   const double d = 1.0 / rho;
   out.p_world = T_world_first * Vec3(abr[0] * d, abr[1] * d, d);
-  Mat3 J;  // ∂p_first/∂(a, b, ρ)
+  // ∂p_first/∂(a, b, ρ).
+  Mat3 J;
   J << d, 0, -abr[0] * d * d, 0, d, -abr[1] * d * d, 0, 0, -d * d;
   J = T_world_first.R * J;
   out.covariance = J * S * J.transpose();

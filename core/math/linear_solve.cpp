@@ -60,7 +60,8 @@ Eigen::Matrix<double, N, M> lu_solve(const Square<N>& A,
 
 template <int N>
 Column<N> semidefinite_eigenvalues(const Square<N>& m) noexcept {
-  // As exact as Eigen's eigensolver, which takes the compiler ten times as long for each size.
+  // This is as accurate as Eigen's eigensolver, which takes ten times as long to compile for each
+  // size.
   return Eigen::JacobiSVD<Square<N>>(m).singularValues();
 }
 

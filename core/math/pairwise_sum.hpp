@@ -3,8 +3,8 @@
 
 namespace vergence {
 
-/// Σ of N = 2^k numbers, the second half added to the first until one is left: an order that does
-/// not depend on how wide a machine's vectors are.
+/// Sums N = 2^k numbers by repeatedly adding the second half to the first, an order independent of
+/// the vector width.
 template <std::size_t N, class T>
 [[nodiscard]] constexpr T pairwise_sum(const T* numbers) noexcept {
   static_assert(N >= 2 && (N & (N - 1)) == 0);

@@ -4,8 +4,8 @@
 
 namespace vergence {
 
-/// Small, seeded, the same on every platform (the standard's distributions are not): PCG32 (O'Neill
-/// 2014, XSH RR).
+/// Seeded generator with equal results on every platform, unlike the standard's distributions:
+/// PCG32 (O'Neill 2014, XSH RR).
 class Random {
  public:
   explicit Random(std::uint64_t seed, std::uint64_t stream = 1) noexcept
@@ -22,7 +22,7 @@ class Random {
     const auto r = static_cast<std::uint32_t>(old >> 59U);
     return (x >> r) | (x << ((32U - r) & 31U));
   }
-  /// Uniform in [0, n), n > 0; the bias of the multiply-shift is below n / 2³².
+  /// Uniform in [0, n), n > 0, with a bias below n / 2³².
   [[nodiscard]] std::uint32_t below(std::uint32_t n) noexcept {
     return static_cast<std::uint32_t>((static_cast<std::uint64_t>(next()) * n) >> 32U);
   }
@@ -32,8 +32,8 @@ class Random {
     return static_cast<double>((hi << 26U) | lo) * 0x1.0p-53;
   }
   [[nodiscard]] double uniform(double lo, double hi) noexcept { return lo + (hi - lo) * uniform(); }
-  /// Standard normal, Marsaglia's polar method; the loop ends after 1.27 turns on average and is
-  /// bounded at 64.
+  /// Standard normal by Marsaglia's polar method, which takes 1.27 iterations on average, at most
+  /// 64.
   [[nodiscard]] double normal() noexcept {
     for (int i = 0; i < 64; ++i) {
       const double u = uniform(-1, 1), v = uniform(-1, 1), s = u * u + v * v;

@@ -3,15 +3,17 @@
 #include <cstddef>
 #include <span>
 
-/// Robust statistics that several rooms of core use.
+/// Robust statistics for several folders of core.
 namespace vergence {
 
-inline constexpr double kMedianOfNormal = 0.6745;  // of |x|, x standard normal
-// Scales beyond which Tukey's biweight leaves an error out: 95 % efficient for normal ones.
+/// Median of |x| for x standard normal.
+inline constexpr double kMedianOfNormal = 0.6745;
+// Threshold of Tukey's biweight in scales; 95 % efficient for normal errors.
 inline constexpr double kTukey = 4.685;
-inline constexpr double kChi2OfPixel = 9.21;  // χ² of two coordinates at 99 %
+/// χ² of two coordinates at 99 %.
+inline constexpr double kChi2OfPixel = 9.21;
 
-/// The upper median; reorders. Precondition: not empty.
+/// Upper median; reorders the values. Precondition: not empty.
 template <class T>
 [[nodiscard]] T median(std::span<T> values) noexcept {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -5,8 +5,8 @@ namespace vergence {
 
 /// A rigid transform written `T_to_from`: p_to = T_to_from * p_from = R p_from + t, metres.
 ///
-/// Perturbed on the left of the rotation and plainly in translation: R ← Exp(φ) R, t ←
-/// t + τ.
+/// Perturbations are on the left of the rotation and added to the translation: R ← Exp(φ) R, t ← t
+/// + τ.
 struct Transform {
   Mat3 R = Mat3::Identity();
   Vec3 t = Vec3::Zero();
@@ -21,17 +21,17 @@ struct Transform {
   [[nodiscard]] bool finite() const noexcept;
 };
 
-/// R ← Exp(φ) R, t ← t + τ.
+/// Returns the transform perturbed by R ← Exp(φ) R, t ← t + τ.
 [[nodiscard]] Transform perturbed(const Transform& T, const Vec3& phi, const Vec3& tau) noexcept;
 
-/// Unit quaternion of a rotation, w ≥ 0: one sign, so that files are reproducible.
+/// Unit quaternion of a rotation with w ≥ 0, so that files are reproducible.
 [[nodiscard]] Eigen::Quaterniond quaternion(const Mat3& R) noexcept;
 
 /// Returns the camera after scaling the world by `factor` about a point.
 [[nodiscard]] Transform scaled_about(const Transform& T_camera_world, const Vec3& centre,
                                      double factor) noexcept;
 
-/// Position linear, rotation along the shorter arc; s in [0, 1] from a to b.
+/// Interpolates from a (s = 0) to b (s = 1): position linearly, rotation along the shorter arc.
 [[nodiscard]] Transform interpolate(const Transform& a, const Transform& b, double s) noexcept;
 
 }  // namespace vergence

@@ -6,7 +6,8 @@ namespace vergence {
 
 Mat3 exp_so3(const Vec3& phi) noexcept {
   const double theta2 = phi.squaredNorm();
-  double a, b;  // sin θ/θ, (1 − cos θ)/θ²
+  // sin θ/θ and (1 − cos θ)/θ².
+  double a, b;
   if (theta2 < 1e-8) {
     a = 1.0 - theta2 / 6.0;
     b = 0.5 - theta2 / 24.0;
@@ -35,8 +36,8 @@ Mat3 left_jacobian_so3(const Vec3& phi) noexcept {
   const Mat3 K = skew(phi);
   if (theta2 < 1e-8) return Mat3::Identity() + (0.5 - theta2 / 24.0) * K + K * K / 6.0;
   const double theta = std::sqrt(theta2);
-  const double s =
-      std::sin(0.5 * theta);  // 1 − cos θ = 2 sin²(θ/2), which loses no digits at small angles
+  // 1 − cos θ = 2 sin²(θ/2) keeps its precision at small angles.
+  const double s = std::sin(0.5 * theta);
   return Mat3::Identity() + 2.0 * s * s / theta2 * K +
          (theta - std::sin(theta)) / (theta2 * theta) * K * K;
 }

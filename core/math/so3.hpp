@@ -12,12 +12,12 @@ namespace vergence {
   return m;
 }
 
-/// Rotation vector (axis × angle, rad) → rotation matrix, Rodrigues; a series below 1e-4 rad where
-/// sin(θ)/θ loses digits.
+/// Rotation matrix of a rotation vector (axis × angle, rad) by Rodrigues; below 1e-4 rad by a
+/// series, because sin(θ)/θ loses precision.
 [[nodiscard]] Mat3 exp_so3(const Vec3& phi) noexcept;
 
-/// Rotation matrix → rotation vector with angle in [0, π]. Through the quaternion, so that angles
-/// near π keep their digits.
+/// Rotation vector of a rotation matrix with its angle in [0, π], through the quaternion, which is
+/// accurate near π.
 [[nodiscard]] Vec3 log_so3(const Mat3& R) noexcept;
 
 /// Angle of a rotation, rad, in [0, π].
@@ -26,11 +26,10 @@ namespace vergence {
 /// Left Jacobian: Exp(φ + δ) ≈ Exp(Jl(φ) δ) Exp(φ).
 [[nodiscard]] Mat3 left_jacobian_so3(const Vec3& phi) noexcept;
 
-/// Two unit vectors that span the plane perpendicular to a unit vector; the same for the same
-/// input.
+/// Two unit vectors that span the plane perpendicular to a unit vector, deterministically.
 [[nodiscard]] Mat32 tangent_basis(const Vec3& unit) noexcept;
 
-/// The rotation nearest to a matrix that has drifted from orthonormality by products.
+/// Rotation nearest to a matrix that products have made non-orthonormal.
 [[nodiscard]] Mat3 normalised(const Mat3& R) noexcept;
 
 }  // namespace vergence

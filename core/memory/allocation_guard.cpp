@@ -6,7 +6,7 @@
 namespace vergence {
 namespace {
 
-// Plain thread-local storage of a constant: reading it inside malloc must not allocate.
+// Constant-initialised thread-local storage, because reading it inside malloc must not allocate.
 thread_local constinit bool sealed = false;
 std::atomic<std::uint64_t> count{0};
 std::atomic<bool> abort_on{false};
@@ -29,7 +29,8 @@ void AllocationGuard::record_allocation() noexcept {
   if (!sealed) return;
   count.fetch_add(1, std::memory_order_relaxed);
   if (abort_on.load(std::memory_order_relaxed)) {
-    sealed = false;  // abort() may allocate on its way out
+    // abort() itself may allocate.
+    sealed = false;
     std::abort();
   }
 }

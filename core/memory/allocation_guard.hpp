@@ -3,11 +3,10 @@
 
 namespace vergence {
 
-/// Counts heap allocations made by threads that have promised to make none.
+/// Counts heap allocations of threads that must not allocate.
 ///
-/// Works where the program links `vergence_core_memory_hooks`, which puts itself before the C
-/// library's malloc family; elsewhere (sanitizer builds bring their own) available() is false and
-/// the count stays 0.
+/// Requires linking `vergence_core_memory_hooks`, which overrides the C library's malloc family;
+/// otherwise (for example in sanitizer builds) available() is false and the count stays 0.
 /// Threads  seal_thread() and unseal_thread() act on the calling thread; the counter is common to
 ///          all.
 class AllocationGuard {
@@ -16,13 +15,13 @@ class AllocationGuard {
   static void seal_thread() noexcept;
   static void unseal_thread() noexcept;
   [[nodiscard]] static bool thread_sealed() noexcept;
-  /// Allocations on sealed threads since the program's start.
+  /// Number of allocations on sealed threads since the program's start.
   [[nodiscard]] static std::uint64_t runtime_allocations() noexcept;
-  /// From now on an allocation on a sealed thread aborts (tests: the debugger then stands at the
-  /// culprit).
+  /// Sets whether an allocation on a sealed thread aborts, for tests: the debugger then stops at
+  /// its cause.
   static void abort_on_allocation(bool on) noexcept;
 
-  /// For the hooks only: an allocation has happened on this thread.
+  /// Called by the hooks at an allocation on this thread.
   static void record_allocation() noexcept;
   static void set_available() noexcept;
 };

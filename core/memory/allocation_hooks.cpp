@@ -1,5 +1,5 @@
-// Stands before glibc's allocator in programs that link it: every allocation of every library
-// passes here. glibc exports its own functions under these names for exactly this purpose.
+// Overrides glibc's allocator in programs that link it, so that every allocation of every library
+// passes here. glibc exports its own functions under these names for this purpose.
 #include <cerrno>
 #include <cstddef>
 

@@ -15,28 +15,28 @@
 
 namespace vergence {
 
-inline constexpr std::size_t kCacheLine =
-    64;  // bytes; also the widest SIMD vector's natural alignment (AVX-512)
+/// Size in bytes, also the alignment of the widest SIMD vector (AVX-512).
+inline constexpr std::size_t kCacheLine = 64;
 
-/// Bytes of an arena by name.
+/// Bytes of an arena under one name.
 struct ArenaRow {
-  const char* name = "";  // a constant
+  const char* name = "";
   std::size_t bytes = 0;
 };
 
-/// All memory of the real-time path, taken once at start. Hands out, never takes back.
+/// All memory of the real-time path, allocated once at start and never returned in parts.
 ///
 ///     Arena arena(odometry::Map::memory_needed());
 ///     odometry::Map map(10, arena);  // 10 keyframes
 ///     for (const ArenaRow& row : arena.rows()) use(row.name, row.bytes);
 ///
-/// Ownership  The arena owns the bytes; what is made in it lives as long as the arena.
-/// Threads    One thread, before the seal.
-/// Memory     Reserved as zero pages: one becomes resident when it is first written to, so what a
-///            capacity holds beyond its use costs addresses alone. What must not fault later is
-///            locked by the program (realtime.lock_memory), which makes all of it resident.
-/// Errors     Throws std::length_error when full, naming who asked, and std::bad_alloc:
-///            construction time only, outside the real-time path.
+/// Ownership  The arena owns the bytes; objects in it live as long as the arena.
+/// Threads    One thread, during initialisation.
+/// Memory     Reserved as zero pages, which become resident when first written, so that unused
+///            capacity costs address space only. The program can lock all of it
+///            (realtime.lock_memory), which makes it resident.
+/// Errors     Throws std::length_error with the requester's name if full, and std::bad_alloc; at
+///            construction only.
 class Arena {
  public:
   explicit Arena(std::size_t bytes)
@@ -50,19 +50,19 @@ class Arena {
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
 
-  /// n value-initialised objects on a cache line of their own. `who`: a constant that outlives the
+  /// Makes n value-initialised objects on separate cache lines. `who`: a constant that outlives the
   /// arena.
   template <class T>
   [[nodiscard]] std::span<T> make(std::size_t n, const char* who) {
     const std::span<T> all = take<T>(n, who);
-    // Zero pages are values already where a default is all zero bytes: they stay untouched.
+    // If a default value is all zero bytes, the zero pages stay untouched.
     if (n > 0 && !zero_by_default<T>(all.data()))
       std::uninitialized_value_construct_n(all.data(), n);
     return all;
   }
 
-  /// n objects of zero bytes, whatever a T is by default, for callers that write before they read,
-  /// as a BoundedVector does: pages stay untouched until then.
+  /// Makes n objects of zero bytes, for callers that write before they read, such as BoundedVector:
+  /// pages stay untouched until then.
   template <class T>
   [[nodiscard]] std::span<T> make_unset(std::size_t n, const char* who) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -73,7 +73,7 @@ class Arena {
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
   /// Bytes by name, in the order of their first request.
   [[nodiscard]] std::span<const ArenaRow> rows() const noexcept { return rows_; }
-  /// All of it, to ask the system which pages are resident.
+  /// All bytes, to query the system for resident pages.
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept { return {begin_, capacity_}; }
 
  private:
@@ -96,7 +96,8 @@ class Arena {
     return {first, n};
   }
 
-  /// Returns true if a value-initialised T is all zero bytes; one is made at `at`, which is zero.
+  /// Returns true if a value-initialised T is all zero bytes; constructs one at `at`, which is
+  /// zero.
   template <class T>
   [[nodiscard]] static bool zero_by_default(T* at) {
     if constexpr (!std::is_arithmetic_v<T> && !std::is_enum_v<T> && !std::is_pointer_v<T>) {

@@ -7,18 +7,18 @@
 
 namespace vergence {
 
-/// Shared parts of the two vectors below: at most capacity() values of type T, never a heap. When
-/// full, push() refuses and returns false. Storage has data() and size().
+/// Base of the two vectors below: at most capacity() values of type T without a heap. If full,
+/// push() returns false. Storage has data() and size().
 template <class T, class Storage>
 class VectorOn {
  public:
-  /// False: full, nothing changed; the caller counts it.
+  /// Returns false and changes nothing if full; the caller counts it.
   [[nodiscard]] bool push(const T& value) noexcept {
     if (full()) return false;
     storage_[size_++] = value;
     return true;
   }
-  /// Drops everything from n on. Precondition: n ≤ size().
+  /// Drops the elements from n on. Precondition: n ≤ size().
   void truncate(std::size_t n) noexcept {
     assert(n <= size_);
     size_ = n;
@@ -54,7 +54,7 @@ class VectorOn {
   std::size_t size_ = 0;
 };
 
-/// In place, capacity in the type.
+/// Vector with in-place storage and its capacity in the type.
 template <class T, std::size_t N>
 class FixedVector : public VectorOn<T, std::array<T, N>> {
   static_assert(std::is_trivially_copyable_v<T> || std::is_default_constructible_v<T>);
@@ -63,7 +63,7 @@ class FixedVector : public VectorOn<T, std::array<T, N>> {
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
 };
 
-/// Over memory of an arena, capacity chosen at construction. Copies share the storage.
+/// Vector in an arena's memory, with its capacity set at construction. Copies share the storage.
 template <class T>
 class BoundedVector : public VectorOn<T, std::span<T>> {
  public:

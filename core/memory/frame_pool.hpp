@@ -13,10 +13,10 @@
 
 namespace vergence {
 
-/// One slot of a FramePool: a handle that goes through rings.
+/// Handle of a slot of a FramePool, which is passed through rings.
 using FrameSlot = std::uint16_t;
 
-/// Image memory of one size, taken once: slots start on a cache line, rows are padded to whole
+/// Image memory of one size, allocated once: slots start on a cache line, rows are padded to whole
 /// cache lines.
 ///
 ///     Arena arena(FramePool::memory_needed(752, 480, 4));
@@ -27,25 +27,24 @@ using FrameSlot = std::uint16_t;
 ///       pool.release(*slot);
 ///     }
 ///
-/// Ownership  acquire() makes a slot the caller's, until release(). Views of it are valid that
-///            long.
+/// Ownership  The caller owns a slot from acquire() to release(); views of it are valid for that
+///            time.
 /// Threads    acquire(), writable(): one thread. release(): one thread, the same or another.
 ///            view(): the holder of the slot.
-/// Memory     All of it from the arena in the constructor; neither lock nor system call afterwards.
-/// Full       With no slot free acquire() refuses; the caller's stated policy acts (replay waits,
-///            live drops and counts).
-/// Errors     The constructor throws std::length_error when the arena is too small. A slot that
-///            is not out is not released.
+/// Memory     From the arena in the constructor; no lock or system call afterwards.
+/// Full       Without a free slot acquire() returns nothing, and the caller's policy applies
+///            (replay waits, live drops and counts).
+/// Errors     The constructor throws std::length_error if the arena is too small. Releasing a slot
+///            that is not acquired has no effect.
 class FramePool {
  public:
-  static constexpr std::size_t kMaxSlots =
-      64;  // 16 pairs of four cameras ahead; more only adds latency
+  /// 16 rig frames of four cameras; more only adds latency.
+  static constexpr std::size_t kMaxSlots = 64;
 
-  /// Bytes between the starts of two rows.
+  /// Number of bytes between the starts of two rows.
   [[nodiscard]] static constexpr std::size_t stride(int width) noexcept {
     return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine;
   }
-  /// Size that the arena must provide.
   [[nodiscard]] static constexpr std::size_t memory_needed(int width, int height,
                                                            std::size_t slots) noexcept {
     return slots * stride(width) * static_cast<std::size_t>(height);
@@ -63,15 +62,15 @@ class FramePool {
   FramePool(const FramePool&) = delete;
   FramePool& operator=(const FramePool&) = delete;
 
-  /// A slot of undefined content; nothing when all are out.
+  /// Returns a slot with undefined content, or nothing if all are acquired.
   [[nodiscard]] std::optional<FrameSlot> acquire() noexcept {
     FrameSlot slot = 0;
     if (!free_.pop(&slot)) return std::nullopt;
     out_[slot].store(true, std::memory_order_relaxed);
     return slot;
   }
-  /// False, and nothing changes: the slot is not out. Free twice it would be acquired twice, and
-  /// one image would overwrite another.
+  /// Returns false and changes nothing if the slot is not acquired. A slot released twice would be
+  /// acquired twice, and one image would overwrite another.
   bool release(FrameSlot slot) noexcept {
     if (slot >= slots_ || !out_[slot].exchange(false, std::memory_order_relaxed)) return false;
     [[maybe_unused]] const bool room = free_.push(slot);
@@ -93,7 +92,6 @@ class FramePool {
   [[nodiscard]] int width() const noexcept { return width_; }
   [[nodiscard]] int height() const noexcept { return height_; }
   [[nodiscard]] std::size_t slots() const noexcept { return slots_; }
-  /// Free slots: a figure for statistics.
   [[nodiscard]] std::size_t available() const noexcept { return free_.size(); }
 
  private:
@@ -104,7 +102,8 @@ class FramePool {
   int width_, height_;
   std::size_t slots_;
   std::span<std::uint8_t> bytes_;
-  Ring<FrameSlot, kMaxSlots> free_;  // orders what is relaxed in out_
+  // The ring also orders the relaxed accesses to out_.
+  Ring<FrameSlot, kMaxSlots> free_;
   std::array<std::atomic<bool>, kMaxSlots> out_{};
 };
 

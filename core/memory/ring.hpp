@@ -11,17 +11,17 @@ namespace vergence {
 
 /// Bounded queue between exactly one producer thread and one consumer thread; N is a power of two.
 ///
-/// Threads  push(), full(): producer. pop(), empty(): consumer. size() is exact for neither: a
-///          figure for statistics.
-/// Memory   In place; no heap, no lock, no system call. When full, push() refuses: the caller's
-///          stated policy acts.
+/// Threads  push(), full(): producer. pop(), empty(): consumer. size() is exact for neither; use it
+///          for statistics.
+/// Memory   In place; no heap, lock or system call. If full, push() returns false and the caller's
+///          policy applies.
 template <class T, std::size_t N>
 class Ring {
   static_assert(N > 0 && (N & (N - 1)) == 0, "a power of two, so that counters wrap");
   static_assert(std::is_trivially_destructible_v<T>, "slot handles and small values only");
 
  public:
-  /// False: full, nothing changed.
+  /// Returns false and changes nothing if full.
   [[nodiscard]] bool push(const T& value) noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail - head_.load(std::memory_order_acquire) == N) return false;
@@ -29,7 +29,7 @@ class Ring {
     tail_.store(tail + 1, std::memory_order_release);
     return true;
   }
-  /// False: empty, *value as it was.
+  /// Returns false and leaves *value unchanged if empty.
   [[nodiscard]] bool pop(T* value) noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (tail_.load(std::memory_order_acquire) == head) return false;
@@ -37,22 +37,23 @@ class Ring {
     head_.store(head + 1, std::memory_order_release);
     return true;
   }
-  /// Exact for the consumer (it can only become less empty).
+  /// Exact for the consumer, for which it can only become less empty.
   [[nodiscard]] bool empty() const noexcept {
     return tail_.load(std::memory_order_acquire) == head_.load(std::memory_order_acquire);
   }
-  /// Exact for the producer (it can only become less full).
+  /// Exact for the producer, for which it can only become less full.
   [[nodiscard]] bool full() const noexcept { return size() == N; }
   [[nodiscard]] std::size_t size() const noexcept {
-    // Head first: it never passes a tail that is read after it. Both may go on in between.
+    // Read the head first, which never passes a tail that is read later. Both may advance in
+    // between.
     const std::size_t head = head_.load(std::memory_order_acquire);
     return std::min(tail_.load(std::memory_order_acquire) - head, N);
   }
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
 
  private:
-  alignas(kCacheLine) std::atomic<std::size_t> head_{
-      0};  // each on its own cache line: no false sharing
+  // Separate cache lines avoid false sharing.
+  alignas(kCacheLine) std::atomic<std::size_t> head_{0};
   alignas(kCacheLine) std::atomic<std::size_t> tail_{0};
   alignas(kCacheLine) std::array<T, N> items_{};
 };

@@ -12,7 +12,8 @@ namespace {
 using Name = std::array<char, ThreadAllocations::kNameBytes>;
 
 struct Counter {
-  Name name{};  // published by `used`
+  // Published by `used`.
+  Name name{};
   std::atomic<std::uint64_t> count{0};
 };
 
@@ -22,10 +23,11 @@ std::array<Counter, ThreadAllocations::kMaxNames> table;
 std::atomic<std::size_t> used{0};
 std::atomic<std::uint64_t> others{0};
 std::atomic<bool> counting{false};
-std::atomic<std::uint32_t> session{0};  // begin() so many times: rows of before are void
+// Number of begin() calls; rows of earlier ones are invalid.
+std::atomic<std::uint32_t> session{0};
 std::atomic_flag claiming = ATOMIC_FLAG_INIT;
 
-/// Plain thread-local storage of a constant: reading it inside malloc must not allocate.
+/// Constant-initialised thread-local storage, because reading it inside malloc must not allocate.
 struct Place {
   std::uint32_t session = 0;
   int row = kNoRow;
@@ -38,13 +40,14 @@ int find(const Name& name, std::size_t rows) noexcept {
   return kNoRow;
 }
 
-/// The row of that name, a new one if need be; kNoRow: the table is full.
+/// Returns the row of that name, creating it if necessary; kNoRow if the table is full.
 int row_of(const Name& name) noexcept {
   if (const int row = find(name, used.load(std::memory_order_acquire)); row != kNoRow) return row;
   while (claiming.test_and_set(std::memory_order_acquire)) {
   }
   const std::size_t rows = used.load(std::memory_order_relaxed);
-  int row = find(name, rows);  // another thread of that name may have been first
+  // Another thread of that name may have been first.
+  int row = find(name, rows);
   if (row == kNoRow && rows < table.size()) {
     table[rows].name = name;
     used.store(rows + 1, std::memory_order_release);
@@ -62,8 +65,7 @@ Name name_of_this_thread() noexcept {
   return name;
 }
 
-/// Our threads have their name for good once it begins so; another one may still be about to get
-/// it.
+/// True for the program's own thread names, which are final; other threads may still be renamed.
 bool is_final(const Name& name) noexcept {
   constexpr std::size_t kPrefix = 9;
   return std::memcmp(name.data(), "vergence-", kPrefix) == 0;

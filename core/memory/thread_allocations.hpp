@@ -5,37 +5,39 @@
 
 namespace vergence {
 
-/// Counts heap allocations of every thread of the program by the name the kernel has for it
-/// (pthread_setname_np; prctl(2), PR_GET_NAME), between begin() and end(). Threads of a library are
-/// counted alike, under the names that the library gives them; threads of one name share a row.
+/// Counts heap allocations of every thread of the program between begin() and end(), by its kernel
+/// name (pthread_setname_np; prctl(2), PR_GET_NAME). This includes threads of libraries; threads of
+/// the same name share a row.
 ///
-/// Works where AllocationGuard does: in a program that links `vergence_core_memory_hooks`.
-/// Memory   A fixed table; what a thread allocates once the table is full goes to `others`.
-/// Threads  All functions from any thread. begin() while threads allocate may give a few of the
-///          calls of that moment to either side.
-/// Debugger A breakpoint on `vergence::ThreadAllocations::count` stops at every counted allocation.
+/// Requires linking `vergence_core_memory_hooks`, as AllocationGuard does.
+/// Memory   A fixed table; allocations of threads that do not fit count as `others`.
+/// Threads  All functions from any thread. Allocations during begin() may count on either side.
 class ThreadAllocations {
  public:
   static constexpr std::size_t kMaxNames = 32;
-  static constexpr std::size_t kNameBytes = 16;  // of the kernel, the final zero included
+  /// Size of a kernel thread name with its final zero.
+  static constexpr std::size_t kNameBytes = 16;
 
   struct Row {
-    std::array<char, kNameBytes> name{};  // ends with a zero
+    /// Ends with a zero.
+    std::array<char, kNameBytes> name{};
     std::uint64_t count = 0;
   };
   struct Counts {
-    std::array<Row, kMaxNames> rows{};  // `size` of them, in order of their first allocation
+    /// The first `size` rows are valid, in order of their first allocation.
+    std::array<Row, kMaxNames> rows{};
     std::size_t size = 0;
-    std::uint64_t others = 0;  // of threads that had no place in the table
+    /// Allocations of threads that did not fit into the table.
+    std::uint64_t others = 0;
   };
 
   /// Clears the table and counts from now on.
   static void begin() noexcept;
-  /// Counts no longer; the table stays.
+  /// Stops counting; the table stays.
   static void end() noexcept;
   [[nodiscard]] static Counts counts() noexcept;
 
-  /// For the hooks only: an allocation has happened on this thread.
+  /// Called by the hooks at an allocation on this thread.
   static void record_allocation() noexcept;
 
  private:

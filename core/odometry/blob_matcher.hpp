@@ -8,29 +8,28 @@
 
 namespace vergence::odometry {
 
-/// Raw pixels of what seems to be one thing in two images.
+/// Raw pixels of a tentative match between two images.
 struct RoughMatch {
   Vec2 left = Vec2::Zero(), other = Vec2::Zero();
 };
 
-inline constexpr std::size_t kMaxBlobs =
-    1500;  // of an image: about what a street shows above the default response
+/// Maximum number of blobs in an image, about what a street shows above the default response.
+inline constexpr std::size_t kMaxBlobs = 1500;
 
-/// SURF-64 across two images of which nothing is known: upright, mutually best. docs/benchmarks.md
-/// compares it with corners.
+/// Matches upright SURF-64 features between two images of unknown relative pose; matches are
+/// mutually best. docs/benchmarks.md compares it with corners.
 ///
 /// Threads  One caller.
-/// Memory   From the arena at construction. Of more than kMaxBlobs blobs the weakest are dropped.
-/// Errors   Images that are empty or too large: no matches.
+/// Memory   From the arena at construction. If there are more than kMaxBlobs blobs, the weakest are
+///          dropped.
+/// Errors   Images that are empty or too large give no matches.
 class BlobMatcher {
  public:
   BlobMatcher() noexcept = default;
-  /// Images of at most this size.
   BlobMatcher(int max_width, int max_height, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
-  /// By the strength of the left blob, strongest first. Valid until the next call.
-  /// A mask may be null.
+  /// Returns the matches, strongest left blob first; valid until the next call. A mask may be null.
   [[nodiscard]] std::span<const RoughMatch> match(const ImageView& left,
                                                   const features::Mask* left_mask,
                                                   const ImageView& other,

@@ -10,12 +10,17 @@
 namespace vergence::odometry {
 namespace {
 
-// Measured on recorded drives and on rendered ones, of which the truth is exact (covariance_bench).
+// The constants are measured on recorded sequences and on rendered ones with exact ground truth
+// (covariance_bench).
 constexpr double kFitInflation = 3;
-constexpr double kSharedTurn = 2.6e-4;      // rad a metre: 0.015°
-constexpr double kExtrapolatedShare = 0.5;  // of the assumed translation
-constexpr double kExtrapolatedTurn = 0.1;   // rad/s: what a vehicle's turn may change by unseen …
-constexpr double kUnknownAcceleration = 1;  // m/s²: … and how it may gather way or brake
+// Sigma of the shared rotation in rad per metre (0.015°).
+constexpr double kSharedTurn = 2.6e-4;
+// Sigma of an extrapolated translation, as a share of it.
+constexpr double kExtrapolatedShare = 0.5;
+// Sigma of a vehicle's unseen change of rotation rate, in rad/s.
+constexpr double kExtrapolatedTurn = 0.1;
+// Sigma of a vehicle's unseen acceleration, in m/s².
+constexpr double kUnknownAcceleration = 1;
 
 Mat3 skew(const Vec3& v) noexcept {
   Mat3 S;
@@ -31,7 +36,7 @@ Mat6 adjoint(const Transform& T) noexcept {
   return A;
 }
 
-/// (φ, τ) → (τ, φ).
+/// Reorders a covariance from (φ, τ) to (τ, φ).
 Mat6 translation_first(const Mat6& C) noexcept {
   Mat6 out;
   out << C.bottomRightCorner<3, 3>(), C.bottomLeftCorner<3, 3>(), C.topRightCorner<3, 3>(),
@@ -45,8 +50,8 @@ Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                        double extrapolated_s) noexcept {
   Mat6 Q = kFitInflation * kFitInflation * translation_first(fit);
   if (extrapolated_s > 0) {
-    // The motion is carried on for a while only; a vehicle that goes on as it went is so many times
-    // that further.
+    // Only the first kLongestExtrapolation seconds are extrapolated; at constant velocity the rest
+    // adds the share `missing`.
     const double carried_s = std::min(extrapolated_s, kLongestExtrapolation);
     const double missing = (extrapolated_s - carried_s) / carried_s;
     const double way = T_now_before.t.norm(), turn = log_so3(T_now_before.R).norm();
@@ -84,7 +89,8 @@ void DriftCovariance::step(const Transform& T_left_world, const Mat6& motion, do
   const Transform T_now_anchor = T_left_world * anchor_.T_left_world.inverse();
   const Mat6 A = adjoint(T_now_anchor);
   const Mat6 noise = A * anchor_.noise * A.transpose() + motion;
-  now_.noise = 0.5 * (noise + noise.transpose());  // stays symmetric over millions of steps
+  // Keep it symmetric over millions of steps.
+  now_.noise = 0.5 * (noise + noise.transpose());
   now_.shared = A * anchor_.shared;
   now_.shared.col(0).head<3>() += length_sigma * T_now_anchor.t;
   for (int axis = 0; axis < 3; ++axis)
@@ -94,7 +100,7 @@ void DriftCovariance::step(const Transform& T_left_world, const Mat6& motion, do
 }
 
 Mat6 DriftCovariance::pose() const noexcept {
-  // p_left = Exp(φ) (R p + t) + τ puts the camera at C − Rᵀ τ, turned about the world's axes by
+  // With p_left = Exp(φ) (R p + t) + τ the camera is at C − Rᵀ τ, rotated about the world's axes by
   // −Rᵀ φ.
   const Mat6 both = now_.noise + now_.shared * now_.shared.transpose();
   Mat6 P;

@@ -9,18 +9,19 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr double kImageMargin = 9.0;   // px: a window's half and one
-constexpr float kMinStructure = 3.0F;  // grey levels, standard deviation of the coarsest level: a
-                                       // lens cap's noise stays below 2
-// Grey levels, 1 σ, of a pixel: rounding has 0.3, a sensor in daylight about one.
+// Margin of the image in pixels: half a window and one more.
+constexpr double kImageMargin = 9.0;
+// Minimum standard deviation of the coarsest level in grey levels; a lens cap's noise stays below
+// 2.
+constexpr float kMinStructure = 3.0F;
+// Noise of a pixel in grey levels, 1 sigma: rounding has 0.3, a sensor in daylight about one.
 constexpr double kGreyNoise = 1;
-constexpr int kMaskMargin =
-    features::kWindow / 2 + 1;  // px: no pixel that holds a feature is a masked one
+// Margin of masks in pixels, so that no feature contains a masked pixel.
+constexpr int kMaskMargin = features::kWindow / 2 + 1;
 
-/// Fingerprint of a small image, which shows whether it has structure and whether it is a
-/// repetition.
+/// Fingerprint of a small image, to detect structure and repetition.
 FrontEnd::Fingerprint fingerprint(const ImageView& image) noexcept {
-  // Knuth's, of MMIX: odd, so that no pixel's part is lost in what follows it.
+  // Knuth's multiplier of MMIX; it is odd, so that every pixel affects the result.
   constexpr std::uint64_t kMultiplier = 6364136223846793005U;
   std::int64_t sum = 0, square = 0;
   std::uint64_t hash = 0;
@@ -135,14 +136,15 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     const auto i = static_cast<std::size_t>(k);
     if (!frame.images[i].empty())
       check.given = static_cast<std::uint8_t>(check.given | (1U << static_cast<unsigned>(k)));
-    // The left image once more on another line is as impossible as the last one once more.
+    // A copy of the left image from another camera is as impossible as a repeated image.
     if (k > 0 && structured[i] && fingerprints_[i] == fingerprints_[0]) {
       repeated[i] = true;
       structured[i] = false;
     }
     if (repeated[i]) check.repeated = true;
     if (structured[i] && !repeated[i]) renewed = true;
-    // A repeated image of a further camera is not of this instant; the left camera's pose is valid.
+    // A repeated image of an additional camera is from another instant; the left camera's pose is
+    // valid.
     if (k > 0 && repeated[i] && !repeated[0]) structured[i] = false;
     if (structured[i])
       check.structured =
@@ -184,7 +186,8 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
   const double z = (p.T_origin_world * p.p_world).z();
   const Mat2 A = warp(J, T_k_origin.R, z, p.d_ray_d_pixel);
   features::AlignResult a = features::align(p.patch, pyramids_[i], predicted, A, how);
-  // From a good prediction the finest level alone gets there; if not, a coarser one sees farther.
+  // From a good prediction the finest level suffices; otherwise try a coarser one, which has a
+  // larger range.
   if (a.status != features::AlignStatus::ok && how.coarsest == how.finest) {
     features::AlignOptions farther = how;
     ++farther.coarsest;
@@ -237,7 +240,7 @@ void FrontEnd::follow_sample(Map& map, const Transform& T_left_world, int sample
   how.finest = 0;
   how.min_zncc = kMayMatch;
   how.max_shift = static_cast<float>(8 << coarsest);
-  // At least every second: stride 1 would mean the candidates too.
+  // Use a stride of at least 2, because stride 1 would include the candidates.
   follow_into_all(map, T_left_world, how, std::max(2, active / std::max(sample, 1)));
 }
 

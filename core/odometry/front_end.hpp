@@ -20,51 +20,59 @@ namespace vergence::odometry {
 
 /// Checks of the images of one frame.
 struct ImageCheck {
-  std::uint8_t given = 0;       // bit k: camera k delivered an image
-  std::uint8_t structured = 0;  // bit k: and it shows something of this frame
-  bool repeated = false;  // a camera gave its last image or the left one's once more: noise makes
-                          // that impossible
-  bool left_repeated = false;  // the left one is among them
-  bool uneven = false;         // one repeated an image while another gave a new one
+  /// Bit k is set if camera k delivered an image.
+  std::uint8_t given = 0;
+  /// Bit k is set if that image has structure. A repeated one counts only if the left one is, too.
+  std::uint8_t structured = 0;
+  /// True if a camera delivered its previous image or the left one's again, which noise makes
+  /// impossible for a new image.
+  bool repeated = false;
+  /// True if the left image is repeated.
+  bool left_repeated = false;
+  /// True if one camera repeated an image while another delivered a new one.
+  bool uneven = false;
 };
 
 /// Result of stereo matching for the corners of one frame.
 struct StereoCount {
   int corners = 0;
-  int matched = 0;              // in front of the rig
-  int near = 0;                 // of these, with a disparity that measures depth
-  EpipolarEvidence evidence{};  // by their distances from the epipolar lines
+  /// Number of corners matched, in front of the rig.
+  int matched = 0;
+  /// Number of these whose disparity measures depth.
+  int near = 0;
+  /// Evidence from their distances to the epipolar lines.
+  EpipolarEvidence evidence{};
 };
 
-/// A match between the left and another image found without knowing the rig: ideal pixels.
+/// A match between the left and another image, in ideal pixels, found without a known rig.
 struct FreeMatch {
   Vec2 left = Vec2::Zero(), other = Vec2::Zero();
-  double sigma = 0;  // px
+  /// Standard deviation of one coordinate, in pixels.
+  double sigma = 0;
 };
 
-/// Pixels of one rig frame: pyramids, following points, new corners and their stereo matches.
+/// Image processing of one rig frame: builds pyramids, follows points, detects corners and matches
+/// them in stereo.
 ///
 /// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the
 ///            owner's.
-/// Threads    One caller; the runner takes the cameras but `left` to its other side. Results do not
+/// Threads    One caller; the runner processes the additional cameras in parallel. Results do not
 ///            depend on it.
-/// Masks      Where one hides a pixel, or comes nearer than a window's half, nothing is found,
-///            followed or matched.
-/// Memory     From the arena at construction. When the map has no room for a new point, the weakest
+/// Masks      Nothing is found, followed or matched within half a window of a masked pixel.
+/// Memory     From the arena at construction. If the map has no room for new points, the weakest
 ///            corners are dropped.
 class FrontEnd {
  public:
-  /// Fingerprint of the coarsest level, equal for equal images. Equal sums alone occur by chance
-  /// twice an hour on a rig that stands at 30 Hz; the hash over positions and grey values excludes
-  /// that.
+  /// Fingerprint of the coarsest level, equal for equal images. Sums alone coincide by chance twice
+  /// an hour for a standing rig at 30 Hz, so it includes a hash over positions and grey values.
   struct Fingerprint {
     std::int64_t sum = 0, square = 0;
     std::uint64_t hash = 0;
     bool operator==(const Fingerprint&) const = default;
   };
 
-  /// `masks` by camera, read here only: 0 is hidden; fewer than cameras, or empty ones: nothing is.
-  /// Precondition: as large as the images.
+  /// `masks`: one per camera, as large as the images, read here only; pixels are hidden where it is
+  /// 0. Missing or empty masks hide nothing.
   FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
            PairRunner& runner, std::span<const ImageView> masks = {});
   [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
@@ -74,59 +82,59 @@ class FrontEnd {
   /// Builds the pyramids of a frame's images.
   [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;
 
-  /// Follows a spread sample of about `sample` active points from a rough prediction, from pyramid
-  /// level `coarsest` down: it may be off by some 8·2^coarsest px.
+  /// Follows about `sample` evenly chosen active points from a rough prediction, which may be off
+  /// by some 8·2^coarsest px, from pyramid level `coarsest` down.
   void follow_sample(Map& map, const Transform& T_left_world, int sample, int coarsest) noexcept;
   /// Follows every followed point into every structured camera from a good prediction.
   void follow_all(Map& map, const Transform& T_left_world) noexcept;
 
-  /// The owner's rig has other intrinsics than before.
+  /// Call when the intrinsics of the rig have changed.
   void rebuild_lenses() noexcept;
-  /// Half width of the band about the epipolar line, px, from now on.
+  /// Sets the half width of the search band around the epipolar line, in px.
   void set_band(double px) noexcept { band_px_ = px; }
 
-  /// Looks for the map's points in camera k wherever they may be, by what they look like. Answers
-  /// how many seem found; their observations there, wrong ones among them, are rough; those in
-  /// other cameras stay. Some milliseconds: for frames that tracking has lost.
+  /// Searches for the map's points in the whole image of camera k by their descriptors. Returns the
+  /// number of tentative matches, whose observations are rough and include wrong ones; those of
+  /// other cameras stay. Takes some milliseconds.
   [[nodiscard]] int relocalise(Map& map, int k) noexcept;
 
-  /// Corners of `left`, or blobs (OdometryOptions::init_features), found in camera k with nothing
-  /// known of the rig but that it does not turn the image by more than some 20°: mutually best
-  /// descriptors, then aligned. Wrong ones are among them. Some ten milliseconds, with blobs three
-  /// times that. Valid until the next call.
+  /// Matches corners of `left`, or blobs (OdometryOptions::init_features), in camera k without a
+  /// known rig, except that it rotates the image by less than about 20°. Descriptors are mutually
+  /// best and matches aligned; wrong ones remain. Takes about 10 ms, with blobs 30 ms. Valid until
+  /// the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
-  /// New corners of `left` where the map has no points, matched across; null: as if there were no
-  /// map. As many as there is room for, by the effort, and `min_corners` so many whatever that is.
+  /// Detects new corners of `left` where `map` has no points (null: everywhere) and matches them in
+  /// stereo. `effort` limits their number, but not below `min_corners`.
   [[nodiscard]] StereoCount match_new(const Map* map, const FrameWorkload& effort = {},
                                       int min_corners = 0) noexcept;
-  /// Weighs the distances of this frame's points from the epipolar lines between the first two
+  /// Evaluates the distances of this frame's points to the epipolar lines between the first two
   /// cameras.
   [[nodiscard]] EpipolarEvidence weigh_points(const Map& map) noexcept;
   /// Adds the matches of the last match_new() to the map as points of the given stage, each with
   /// its observation in `now`.
   void add_points(const Transform& T_left_world, PointStage stage, Map* map) noexcept;
 
-  /// The corners of the last match_new() fit the rig with its cameras exchanged better than as it
-  /// is. Its matches are lost.
+  /// Returns true if the corners of the last match_new() fit the rig better with its cameras
+  /// swapped. Discards the matches.
   [[nodiscard]] bool exchanged() noexcept;
 
   [[nodiscard]] const UndistortedCamera& lens(int k) const noexcept {
     return lenses_[static_cast<std::size_t>(k)];
   }
-  /// Nothing is looked for at this pixel of camera k.
+  /// True if the mask hides this pixel of camera k.
   [[nodiscard]] bool hides(int k, const Vec2& pixel) const noexcept {
     return masks_[static_cast<std::size_t>(k)].hides(pixel);
   }
   [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }
 
  private:
-  /// Minimum correlation of two windows to be compared further. The epipolar distance, the ratio to
-  /// the second best and the following frames decide whether they match. The value is
-  /// the best of a trial over thirteen sequences.
+  /// Minimum correlation of two windows to be compared further; the epipolar distance, the ratio to
+  /// the second best and later frames decide on the match. The value was the best over thirteen
+  /// sequences.
   static constexpr float kMayMatch = 0.7F;
-  static constexpr int kSmallestCell =
-      12;  // px: a window's side; nearer corners share their pixels
+  // Minimum cell size in pixels, the size of a window; corners nearer to each other share pixels.
+  static constexpr int kSmallestCell = 12;
 
   struct Followed {
     bool found = false;
@@ -136,9 +144,12 @@ class FrontEnd {
   struct NewPoint {
     bool usable = false;
     int matched_camera = 0;
-    double rho = 0;        // 1/m
-    double disparity = 0;  // px between here and a point at infinity
-    float distance = 0;    // px from the epipolar line
+    // Inverse depth, in 1/m.
+    double rho = 0;
+    // Distance in px from the projection of a point at infinity.
+    double disparity = 0;
+    // Distance from the epipolar line, in px.
+    float distance = 0;
     Vec3 ray{};
     Mat2 d_ray_d_pixel{};
     features::Patch patch{};
@@ -149,15 +160,15 @@ class FrontEnd {
                                 const features::AlignOptions& how) const noexcept;
   void follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how,
                        int stride) noexcept;
-  /// `by_noise`: AlignResult::sigma, px for one grey level.
-  /// `parallax`: how far this camera stands from where the patch was cut, over the depth there:
-  /// what its unknown slope can do.
+  /// Undistorts a raw pixel and sets its sigma. `by_noise`: AlignResult::sigma, in px per grey
+  /// level. `parallax`: distance of this camera from where the patch was cut, over the depth there,
+  /// which weights the effect of the patch's unknown slope.
   [[nodiscard]] bool finish(int k, const Vec2& raw, double by_noise, double parallax,
                             Followed* f) const noexcept;
   void match_stereo(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
   [[nodiscard]] features::CornerOptions corner_options(int k) const noexcept;
-  /// Corners of camera k four times as dense as points are: so that most of the other image's have
-  /// their partner.
+  /// Finds corners of camera k four times as dense as points, so that most corners of the other
+  /// image have a partner.
   void find_dense_corners(int k) noexcept;
   void match_corners_freely(int k) noexcept;
   /// Aligns a rough match and keeps it if that succeeds and there is room.
@@ -165,11 +176,11 @@ class FrontEnd {
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
   /// Weighs the epipolar distances of the matches whose disparity exceeds `min_disparity`.
   [[nodiscard]] EpipolarEvidence weigh(double min_disparity) noexcept;
-  /// Where camera k sits is known, if only roughly: before, its transform is the identity.
+  /// True if camera k's transform is known at least roughly; before, it is the identity.
   [[nodiscard]] bool placed(int k) const noexcept {
     return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0;
   }
-  /// Null: camera k has none.
+  /// Mask of camera k, or null.
   [[nodiscard]] const features::Mask* mask(int k) const noexcept {
     const features::Mask& m = masks_[static_cast<std::size_t>(k)];
     return m.empty() ? nullptr : &m;
@@ -181,18 +192,20 @@ class FrontEnd {
   PairRunner& runner_;
   int cameras_;
   std::uint8_t structured_ = 0;
-  std::array<Fingerprint, kMaxCameras> fingerprints_{};  // of the last images
+  std::array<Fingerprint, kMaxCameras> fingerprints_{};
   std::array<UndistortedCamera, kMaxCameras> lenses_{};
   std::array<features::Mask, kMaxCameras> masks_{};
   std::array<features::Pyramid, kMaxCameras> pyramids_{};
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;
   std::span<NewPoint> fresh_;
-  BoundedVector<float> distances_;  // from epipolar lines, of what is weighed
-  std::span<features::Descriptor>
-      described_;  // of the map's points in relocalise(), of dense corners in match_free()
+  // Distances to epipolar lines, for weigh().
+  BoundedVector<float> distances_;
+  // Descriptors of the map's points in relocalise(), and of dense corners in match_free().
+  std::span<features::Descriptor> described_;
   BoundedVector<FreeMatch> free_matches_;
-  BlobMatcher blobs_;  // has no memory unless asked for
+  // Has no memory with init_features 0.
+  BlobMatcher blobs_;
   double band_px_;
   float detect_ms_ = 0;
 };

@@ -6,22 +6,25 @@
 #include "core/features/patch.hpp"
 #include "core/odometry/front_end.hpp"
 
-/// Matches by what patches look like, with no pose or rig to predict them.
+/// Matches by descriptors, without a predicted pose or rig.
 namespace vergence::odometry {
 namespace {
 
-constexpr double kDenseCells =
-    3500;                          // of an image: below features::kMaxGridCells with their rounding
-constexpr int kMaxDistance = 64;   // bits of 256: unrelated patches lie at 128 ± 8
-constexpr double kDistinct = 0.8;  // of the second best's distance
-constexpr float kRoughSigma = 3.F;  // px: two corners found independently
+// Target number of cells of an image, which stays below features::kMaxGridCells after rounding.
+constexpr double kDenseCells = 3500;
+// Maximum Hamming distance of 256 bits; unrelated patches have 128 ± 8.
+constexpr int kMaxDistance = 64;
+// Maximum ratio to the second best distance.
+constexpr double kDistinct = 0.8;
+// Standard deviation in px between two independently detected corners.
+constexpr float kRoughSigma = 3.F;
 
 }  // namespace
 
 void FrontEnd::find_dense_corners(int k) noexcept {
   features::CornerOptions how = corner_options(k);
-  // A corner finds its partner if that is among the strongest of its cell; there is room for
-  // kMaxPoints of them.
+  // A corner finds its partner if that is the strongest of its cell. At most kMaxPoints corners
+  // fit.
   const Intrinsics& c = rig_.intrinsics[static_cast<std::size_t>(k)];
   const auto least =
       static_cast<int>(std::ceil(std::sqrt(static_cast<double>(c.width) * c.height / kDenseCells)));
@@ -108,7 +111,7 @@ void FrontEnd::match_corners_freely(int k) noexcept {
     const bool cut = features::cut_patch(pyramids_[c], {taken_[j].x, taken_[j].y}, &patch);
     described_[j] = cut ? features::describe(patch) : features::Descriptor{};
   }
-  // By dense corner: the left corner it resembles most.
+  // Per dense corner, the most similar left corner.
   std::array<std::uint16_t, kMaxPoints> owner;
   std::array<std::uint16_t, kMaxPoints> owner_bits;
   owner_bits.fill(256);

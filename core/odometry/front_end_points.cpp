@@ -19,8 +19,7 @@ float milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
 }  // namespace
 
 features::CornerOptions FrontEnd::corner_options(int k) const noexcept {
-  // Half of the cells hold a corner that can be followed and matched: sky, road and the like fill
-  // the rest.
+  // Number of cells per point: about half of the cells have no usable corner (sky, road).
   constexpr double kCellsAPoint = 1.6;
   const Intrinsics& c = rig_.intrinsics[0];
   features::CornerOptions how;
@@ -41,7 +40,7 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
   for (int k = 1; k < cameras_; ++k) {
     if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0 || !placed(k)) continue;
     const auto i = static_cast<std::size_t>(k);
-    // With the cameras exchanged, the first image is that of camera k.
+    // With the cameras swapped, the first image is that of camera k.
     const UndistortedCamera& here = lenses_[exchanged ? i : 0];
     if (!here.ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) continue;
     const Transform& T_k_left = rig_.T_camera_left[i];
@@ -52,7 +51,7 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
     search.level = 1;
     search.band = std::max(1, static_cast<int>(std::lround(0.5 * band_px_)));
     search.mask = mask(k);
-    // As far as the image is wide: what is nearer no two cameras see.
+    // Search over the width of the image; two cameras do not both see nearer points.
     const Intrinsics& lens = rig_.intrinsics[i];
     search.rho_last = std::max(lens.width, lens.height) / (lens.fx * baseline);
     const features::SearchResult s =
@@ -76,8 +75,8 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
     if (off < 0 || off > band_px_) continue;
     out->distance = static_cast<float>(off);
     out->disparity = rho / sigma_per_px;
-    const double noise = 3.0 * std::sqrt(2.0) *
-                         options_.pixel_sigma;  // px, three sigmas of a difference of two positions
+    // Three sigmas of the difference of two positions, in px.
+    const double noise = 3.0 * std::sqrt(2.0) * options_.pixel_sigma;
     if (out->disparity < -noise) continue;
     out->rho = std::max(rho, 1.0 / (kFarBaselines * baseline));
     if (!finish(k, a.pixel, static_cast<double>(a.sigma), out->rho * baseline, &out->stereo))
@@ -102,8 +101,7 @@ StereoCount FrontEnd::match_new(const Map* map, const FrameWorkload& effort,
                                 int min_corners) noexcept {
   StereoCount count;
   corners_.clear();
-  // Without a left image the pyramid still looks at the last one, whose memory its camera may have
-  // taken back.
+  // Without a left image the pyramid refers to the last one, whose memory may have been released.
   if ((structured_ & 1U) == 0) return count;
   const auto start = std::chrono::steady_clock::now();
   taken_.clear();
@@ -147,7 +145,8 @@ EpipolarEvidence FrontEnd::weigh_points(const Map& map) noexcept {
     if (!lenses_[0].ideal().unproject(p.now.pixel[0].cast<double>(), &curve.ray)) continue;
     const double off =
         features::fit_inverse_depth(curve, p.now.pixel[1].cast<double>(), &rho, &unused);
-    // Beyond the band as far as in it: none was found there by chance.
+    // Points are followed, not searched for in the band, so distances beyond it count, limited to
+    // it.
     if (off >= 0) (void)distances_.push(static_cast<float>(std::min(off, band_px_)));
   }
   return weigh_epipolar_distances(distances_.span(), band_px_,

@@ -7,18 +7,17 @@
 
 namespace vergence::odometry {
 
-/// Detects gaps between frames that are too long for motion prediction, and requests a new scene
+/// Detects gaps between frames that are too long for motion prediction, and requests a map reset
 /// after one.
 ///
-/// The limit follows the drive: it is a multiple of the usual interval between frames, so that a
-/// steady 1 Hz has no gaps. After a gap the few surviving points constrain only one frame, and
-/// keeping them would spread the gap's pose error over many frames; so a new scene is requested. If
-/// every interval is a gap, no request is made.
+/// The limit is a multiple of the usual interval, so a steady 1 Hz has no gaps. After a gap the few
+/// surviving points would spread the gap's pose error over many frames; so a new map is requested,
+/// unless every interval is a gap.
 ///
 /// Not thread-safe. Does not allocate.
 class GapDetector {
  public:
-  /// Call for every frame. Returns the seconds since the one before; 0 if there was none.
+  /// Call for every frame. Returns the seconds since the previous one; 0 for the first.
   [[nodiscard]] double since_frame(Stamp frame) noexcept {
     const double since = any_ ? (frame - last_).to_seconds() : 0;
     if (any_) intervals_[count_++ % kIntervals] = since;
@@ -26,8 +25,8 @@ class GapDetector {
     last_ = frame;
     return since;
   }
-  /// A frame `dt` seconds after the last pose, or after the last frame where that showed something
-  /// and had no pose. `renew`: the scene could be made anew. Returns dt where it is a gap, else 0.
+  /// Checks a frame `dt` seconds after the last pose, or after the last frame if that had structure
+  /// but no pose. `renew`: the map can be rebuilt. Returns dt if it is a gap, else 0.
   [[nodiscard]] double check(double dt, bool renew) noexcept {
     const double usual = usual_interval();
     const bool gap = usual > 0 && dt > kLongest * usual;
@@ -36,16 +35,17 @@ class GapDetector {
     return gap ? dt : 0;
   }
   [[nodiscard]] bool renewal_due() const noexcept { return due_; }
-  /// Clears the request: the scene was made anew or replaced, or cannot be made anew.
+  /// Clears the request, because the map was replaced or cannot be rebuilt.
   void clear_renewal() noexcept { due_ = false; }
 
  private:
-  static constexpr std::size_t kIntervals = 9;  // so many of the newest make the usual one
-  // Intervals. A vehicle that brakes or accelerates at 5 m/s² and has frames at 10 Hz is 0.9 m from
-  // where its last motion would have it after six of them: nothing near is found there any more.
+  // Number of newest intervals whose median is the usual one.
+  static constexpr std::size_t kIntervals = 9;
+  // Maximum number of usual intervals without a gap. Braking at 5 m/s² for six intervals at 10 Hz
+  // deviates by 0.9 m from the prediction, so near points are no longer found.
   static constexpr double kLongest = 6;
 
-  /// The median, so that a gap has no effect unless most intervals are gaps.
+  /// Median interval in seconds; gaps have no effect unless they are the majority.
   [[nodiscard]] double usual_interval() const noexcept {
     const std::size_t n = std::min(count_, kIntervals);
     if (n == 0) return 0;
@@ -55,11 +55,14 @@ class GapDetector {
     return *middle;
   }
 
-  bool any_ = false;  // there was a frame, at `last_`
+  // True once there was a frame, at `last_`.
+  bool any_ = false;
   Stamp last_{};
-  std::array<double, kIntervals> intervals_{};  // s
-  std::size_t count_ = 0;                       // intervals seen
-  bool before_ = false;                         // the newest frame came after a gap
+  // In seconds.
+  std::array<double, kIntervals> intervals_{};
+  std::size_t count_ = 0;
+  // True if the newest frame came after a gap.
+  bool before_ = false;
   bool due_ = false;
 };
 

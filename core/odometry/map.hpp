@@ -9,23 +9,26 @@
 
 namespace vergence::odometry {
 
-inline constexpr std::size_t kMaxWindow =
-    20;  // keyframes; OdometryOptions::window_keyframes stays below
-inline constexpr std::size_t kMaxPoints =
-    2048;  // of the map: tracked ones and those the window still sees
+/// Maximum number of keyframes in the window.
+inline constexpr std::size_t kMaxWindow = 20;
+/// Maximum number of points in the map: tracked ones and those that the window still observes.
+inline constexpr std::size_t kMaxPoints = 2048;
 
-inline constexpr double kNearDisparity =
-    3.0;  // px between a point and infinity: ten times the noise of a match; what makes scale
+/// Minimum disparity of a near point relative to infinity, in px: ten times the noise of a match.
+/// Near points determine the scale.
+inline constexpr double kNearDisparity = 3.0;
 
-// Depth given to a point whose disparity is within the noise of zero.
+// Depth in baselines of a point whose disparity is within the noise of zero.
 inline constexpr double kFarBaselines = 2000.0;
 
 /// Observations of a point in one rig frame: pixels of an ideal pinhole camera with each camera's
 /// own K, distortion removed.
 struct PointObservation {
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
-  std::array<float, kMaxCameras> sigma{};  // px, one coordinate
-  std::uint8_t cameras = 0;                // bit k: camera k saw it
+  /// Standard deviation of one coordinate, in pixels.
+  std::array<float, kMaxCameras> sigma{};
+  /// Bit k is set if camera k saw the point.
+  std::uint8_t cameras = 0;
 
   [[nodiscard]] bool by(int k) const noexcept {
     return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0;
@@ -41,34 +44,50 @@ struct PointObservation {
 };
 
 enum class PointStage : std::uint8_t {
-  free,       // slot not in use
-  candidate,  // followed, but not yet seen often enough to hold a pose
-  active,     // followed, holds poses
-  dormant,    // no longer followed; the window still adjusts with its observations
+  free,
+  /// The point is followed, but was not yet found often enough to constrain poses.
+  candidate,
+  /// The point is followed and constrains poses.
+  active,
+  /// The point is no longer followed; the window still uses its observations.
+  dormant,
 };
 
-/// A point of the scene. p_world in metres; the patch is what it looked like in `left` where it was
-/// made.
+/// A point of the map, with its position in metres and the patch that it showed in `left` when it
+/// was created.
 struct MapPoint {
   PointStage stage = PointStage::free;
-  std::uint32_t id = 0;     // of the track; given again after 2^32 others
-  std::uint8_t missed = 0;  // frames in a row that did not find it
-  std::uint16_t found = 0;  // frames that did
+  /// Number of the track; reused after 2^32 others.
+  std::uint32_t id = 0;
+  /// Number of consecutive frames in which the point was not found.
+  std::uint8_t missed = 0;
+  /// Number of frames in which the point was found.
+  std::uint16_t found = 0;
   Vec3 p_world = Vec3::Zero();
-  Transform T_origin_world{};             // left camera where the patch was cut
-  Vec3 ray = Vec3::UnitZ();               // (x, y, 1) of its pixel there
-  Mat2 d_ray_d_pixel = Mat2::Identity();  // of that ray's x, y by the raw pixel
-  features::Patch patch{};
-  PointObservation now{};  // this frame's
-  std::uint8_t in_images =
-      0;  // bit k: found in camera k's image now, whether that agrees with the pose or not
-  bool across = false;          // another camera than `left` has seen it where it should be
-  bool logged = false;          // at `logged_at`
-  Eigen::Vector2f logged_at{};  // raw pixel in `left` when the track log last took a frame
-  std::array<Eigen::Vector2f, kMaxCameras> raw{};   // this frame's pixels as the image has them
-  std::array<PointObservation, kMaxWindow> seen{};  // by keyframe slot
 
-  /// Its position is good enough to reckon poses with.
+  /// Pose of the left camera in which the patch was cut.
+  Transform T_origin_world{};
+  /// Ray (x, y, 1) of its pixel there.
+  Vec3 ray = Vec3::UnitZ();
+  /// Derivative of that ray's x and y with respect to the raw pixel.
+  Mat2 d_ray_d_pixel = Mat2::Identity();
+  features::Patch patch{};
+
+  /// Observations in the current frame that agree with the pose.
+  PointObservation now{};
+  /// Bit k is set if the point was found in camera k's current image, whether or not it agrees.
+  std::uint8_t in_images = 0;
+  /// True if an additional camera has seen the point where expected.
+  bool across = false;
+
+  /// True if the track log has taken the point, at `logged_at`.
+  bool logged = false;
+  /// Raw pixel in `left` when it was last logged.
+  Eigen::Vector2f logged_at{};
+  std::array<Eigen::Vector2f, kMaxCameras> raw{};
+  std::array<PointObservation, kMaxWindow> seen{};
+
+  /// True if the position is accurate enough to constrain poses.
   [[nodiscard]] bool holds_poses() const noexcept {
     return stage == PointStage::active || stage == PointStage::dormant;
   }
@@ -79,15 +98,13 @@ struct MapPoint {
 
 struct Keyframe {
   Transform T_left_world{};
-  std::array<Transform, kMaxCameras>
-      T_camera_left{};  // as they were then; read while the cameras are not linked
+  /// Transforms at that time; used while the cameras are not linked.
+  std::array<Transform, kMaxCameras> T_camera_left{};
   Stamp stamp{};
 };
 
-/// Points and the window of keyframes, fixed memory.
-///
-/// Policies when full  Points: make_point() refuses, the caller counts. Keyframes: make_keyframe()
-/// drops the oldest first.
+/// Points and the window of keyframes in fixed memory. If full, make_point() returns null and
+/// make_keyframe() drops the oldest keyframe.
 class Map {
  public:
   Map(std::size_t window, Arena& arena)
@@ -97,19 +114,18 @@ class Map {
   }
 
   void clear() noexcept;
-  /// A free slot, cleared; null when there is none.
+  /// Returns a cleared free slot, or null if there is none.
   [[nodiscard]] MapPoint* make_point() noexcept;
-  /// Where the next free slot is sought from. Given back by rewind() when all points made since
-  /// are free again, these leave no trace in the order of slots, in which residuals are summed.
+  /// Start of the search for the next free slot. If all points created since are free again,
+  /// rewind() restores the order of slots, in which residuals are summed.
   [[nodiscard]] std::size_t cursor() const noexcept { return next_point_; }
   void rewind(std::size_t cursor) noexcept { next_point_ = cursor; }
-  /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's observation
-  /// there is empty.
+  /// Returns the slot of a new keyframe without observations; drops the oldest one if the window is
+  /// full.
   [[nodiscard]] std::size_t make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept;
-  /// Everything grows by `factor` about a place of the world: points, keyframes and the distances
-  /// of their cameras.
+  /// Scales points, keyframes and baselines by `factor` about a point of the world.
   void scale_about(const Vec3& centre, double factor) noexcept;
-  /// Poses become T_left_world · T_old_new, and all points with them.
+  /// Changes the world frame: poses become T_left_world · T_old_new, and points follow.
   void move_world(const Transform& T_old_new) noexcept;
 
   [[nodiscard]] std::span<MapPoint> points() noexcept { return points_; }
@@ -126,7 +142,8 @@ class Map {
 
   std::span<MapPoint> points_;
   std::size_t window_;
-  std::size_t next_point_ = 0;  // where the search for a free slot goes on
+  // Start of the search for a free slot.
+  std::size_t next_point_ = 0;
   std::uint32_t next_id_ = 1;
   std::array<Keyframe, kMaxWindow> keyframes_{};
   FixedVector<std::uint8_t, kMaxWindow> order_;

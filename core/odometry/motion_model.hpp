@@ -20,11 +20,12 @@ class MotionModel {
   void assume(const Transform& T_left_world, Stamp stamp) noexcept;
   /// Corrects the last pose; the velocity stays.
   void correct(const Transform& T_left_world) noexcept { T_left_world_ = T_left_world; }
-  /// Scales the velocity as the world was scaled.
+  /// Scales the velocity with the world.
   void scale(double factor) noexcept { shift_per_s_ *= factor; }
 
  private:
-  Transform T_left_world_{};  // of the last posed frame
+  // Pose of the last posed frame.
+  Transform T_left_world_{};
   // Velocity: rotation vector (rad/s) and translation (m/s) of T_now_before over the last step.
   Vec3 turn_per_s_ = Vec3::Zero(), shift_per_s_ = Vec3::Zero();
   Stamp stamp_{};

@@ -2,14 +2,12 @@
 
 namespace vergence::odometry {
 
-/// Detects that most of the points made lately do not fit the pose: if the pose follows an object
-/// that moves in front of the scene, new points are lost as soon as they are made. Not thread-safe.
-/// Does not allocate.
+/// Detects that most new points do not fit the pose: if the pose follows an object that moves in
+/// front of the scene, new points are lost immediately. Not thread-safe. Does not allocate.
 class NewPointMonitor {
  public:
-  /// Adds the number of new points searched for in a frame and the number found at rest in the
-  /// scene. Small numbers are summed over frames before they are evaluated, so that one blurred
-  /// frame does not decide.
+  /// Adds the numbers of new points searched for in a frame and found at rest. Numbers are summed
+  /// over frames, so that one blurred frame does not decide.
   void add(int tried, int kept) noexcept {
     tried_ += tried;
     kept_ += kept;
@@ -17,18 +15,20 @@ class NewPointMonitor {
     lost_ = kept_ < kKept * tried_;
     tried_ = kept_ = 0;
   }
-  /// True if the points evaluated last were mostly lost.
+  /// True if the last evaluated points were mostly lost.
   [[nodiscard]] bool lost() const noexcept { return lost_; }
-  /// Call when the map is made anew.
+  /// Call when the map is rebuilt.
   void reset() noexcept { *this = {}; }
 
  private:
-  static constexpr int kEnough = 30;  // to judge from
-  // Half to nine in ten are found where the scene stands, a twentieth where the pose follows what
-  // moves in front of it.
+  // Minimum number of points for an evaluation.
+  static constexpr int kEnough = 30;
+  // Minimum share of points found: in a static scene it is 0.5 to 0.9, and 0.05 if the pose follows
+  // a moving object.
   static constexpr double kKept = 0.3;
 
-  int tried_ = 0, kept_ = 0;  // since they were judged
+  // Numbers of points since the last evaluation.
+  int tried_ = 0, kept_ = 0;
   bool lost_ = false;
 };
 

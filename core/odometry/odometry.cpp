@@ -17,13 +17,14 @@ using detail::weakness;
 
 namespace {
 
-constexpr int kFramesUntilTrial =
-    3;  // without new points, before some are made to be tried alone: no keyframe is made while
-        // the rig stands, and it stands relative to a truck alongside
-constexpr int kTrialPoints = 40;  // of them, however little time there is: enough to judge from
+// Number of frames without new points after which some are tried. A standing rig makes no keyframe,
+// and it also seems to stand next to a truck at its own speed.
+constexpr int kFramesUntilTrial = 3;
+// Number of trial points regardless of the time budget; enough for an evaluation.
+constexpr int kTrialPoints = 40;
 constexpr int kFramesLostBeforeRestart = 3;
-constexpr double kUnlinkedBand =
-    4.0;  // px: this frame's transform between the cameras is itself measured
+// Band in px for unlinked cameras, whose transform is only measured in this frame.
+constexpr double kUnlinkedBand = 4.0;
 
 }  // namespace
 
@@ -131,7 +132,7 @@ double Odometry::new_points(int min_corners, FrameOutcome* out) noexcept {
 void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
                             FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
-  // New points are made by the calibration, and without one they cannot be made.
+  // New points need a calibration.
   out->moving = others_move_ || (link_ == Link::linked && new_points_.lost());
   const Reason of_images = weakness(images, rig_.cameras);
   if (of_images != Reason::none)
@@ -205,7 +206,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const FrameWorkload effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
-  // Far things alone carry a scene on and begin none.
+  // A map with far points only continues but must not be rebuilt.
   const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kNearEnough;
   if (next_rig_ && out.images_good) {
     out.relink_due = true;

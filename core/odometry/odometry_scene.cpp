@@ -7,7 +7,7 @@
 #include "core/math/robust.hpp"
 #include "core/odometry/detail/frame_steps.hpp"
 
-/// Scenes: initialisation, change of calibration, loss.
+/// Maps: initialisation, change of calibration, loss.
 namespace vergence::odometry {
 
 using detail::kNearEnough;
@@ -17,10 +17,13 @@ using detail::weakness;
 
 namespace {
 
-constexpr int kStartMatches = 30;  // points across to find the rig's transform from
+// Minimum number of stereo matches to initialise the rig's transform.
+constexpr int kStartMatches = 30;
 
-constexpr double kWorstDirection = 0.1;  // rad, of t, to start from
-constexpr double kWorstRotation = 0.01;  // rad
+// Maximum sigma of the direction of t for a start, in rad.
+constexpr double kWorstDirection = 0.1;
+// Maximum sigma of the rotation for a start, in rad.
+constexpr double kWorstRotation = 0.01;
 
 }  // namespace
 
@@ -34,8 +37,7 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
       n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
   if (!e.found || e.inliers < kStartMatches || e.inliers < kRigidShare * static_cast<double>(n))
     return false;
-  // A direction of t that the scene does not hold (all of it far away) is no start: depth would be
-  // arbitrary.
+  // If all points are far away, the direction of t is not determined and depths would be arbitrary.
   if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
     out->reason = Reason::needs_near_structure;
     return false;
@@ -47,7 +49,7 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
 bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
   StereoCount stereo = front_end_.match_new(nullptr);
-  // Where half of the corners are matched and near, no more of them are so by chance.
+  // If half of the corners are matched and near, swapped cameras cannot match more by chance.
   const bool asked = 2 * stereo.near < stereo.corners;
   const bool exchanged = asked && front_end_.exchanged();
   if (asked) stereo = front_end_.match_new(nullptr);
@@ -58,7 +60,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
     out->reason = Reason::cameras_swapped;
   else if (!stereo.evidence.fits() || stereo.matched < options_.min_inliers)
     out->reason = Reason::no_stereo_matches;
-  else if (stereo.near < kNearEnough)  // the rig fits, and nothing seen holds the scale
+  else if (stereo.near < kNearEnough)
     out->reason = Reason::weak_geometry;
   else {
     map_.clear();
@@ -86,7 +88,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
 
 void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
                            const Transform& predicted, double dt, FrameOutcome* out) noexcept {
-  // Nothing to follow: this frame begins a scene, where the last one is thought to have ended.
+  // Without points to follow, this frame starts a map at the predicted end of the last one.
   const Reason of_images = weakness(images, rig_.cameras);
   const bool unknown = link_ == Link::unlinked && !rig_known_;
   bool started = unknown && resume(predicted, frame.stamp, out);
@@ -101,7 +103,7 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
   }
   if (link_ == Link::unlinked) {
     out->initialised = initialise;
-    // Further cameras see the scene that the first two have made.
+    // Additional cameras see the map that the first two have built.
     PoseFit of_two;
     of_two.T_left_world = predicted;
     of_two.cameras = 0b11;
@@ -110,7 +112,8 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->status = PoseStatus::degraded;
     out->reason = Reason::uncalibrated;
   }
-  if (of_images != Reason::none) {  // begun by the other cameras
+  // The other cameras have started the map.
+  if (of_images != Reason::none) {
     out->status = PoseStatus::degraded;
     out->reason = of_images;
   }
@@ -153,7 +156,8 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
     }
   } else if (gaps_.renewal_due() && out->renewal_due) {
     out->renewed = renew_scene(out);
-    gaps_.clear_renewal();  // what there was goes on where no new scene can be made
+    // The old map continues if a new one cannot be built.
+    gaps_.clear_renewal();
   }
 }
 
@@ -177,8 +181,8 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
                     [](const MapPoint& p) { return p.holds_poses() && p.now.cameras != 0; });
   adopt(rig);
 
-  // A direction seen by the old lens of camera k → pixels of the image → ideal ones of the new
-  // lens.
+  // Converts a direction in the old model of camera k to a raw pixel, and to an ideal pixel of the
+  // new model.
   const auto seen_again = [&](int k, const Vec3& direction, Vec2* raw, Vec2* ideal) noexcept {
     double unused = 0;
     return old_lenses[static_cast<std::size_t>(k)].raw().project(direction, raw, nullptr) ==
@@ -214,7 +218,8 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
     *again = curve.ray / std::max(rho, 1 / (kFarBaselines * rig_.baseline));
     return true;
   };
-  // The newest keyframe that saw it in `left`; where none did, the one where it was made.
+  // Returns the newest keyframe that saw the point in `left`; if none did, the one where it was
+  // created.
   const auto where = [&](const MapPoint& p, Transform* T_left_world,
                          Transform* T_right_left) noexcept {
     *T_left_world = p.T_origin_world;
@@ -226,7 +231,7 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
     }
   };
 
-  // Depths change by one factor for the most part: by it the way between the keyframes, too.
+  // Depths change mainly by one factor; scale the distances between keyframes by it as well.
   std::array<double, kMaxPoints> factors;
   std::size_t n = 0;
   Transform T_left_world, T_right_left;
@@ -248,7 +253,7 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
     if (!triangulate(X, T_right_left, &X)) X *= factor;
     p.p_world = scaled_about(T_left_world, here, factor).inverse() * X;
     Vec2 raw, ideal;
-    // The patch was cut from pixels: its ray is what the new lens makes of them.
+    // The patch was cut from pixels, so the new model determines its ray.
     if (!seen_again(0, p.ray, &raw, &ideal) ||
         !front_end_.lens(0).ray_jacobian(raw, &p.ray, &p.d_ray_d_pixel))
       p.stage = PointStage::free;
@@ -264,7 +269,7 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
   motion_.scale(factor);
 
   const EpipolarEvidence evidence = front_end_.weigh_points(map_);
-  // With the newest frame among the keyframes the points are adjusted to what it sees, too.
+  // Add the newest frame as a keyframe, so that the points are also adjusted to its observations.
   const std::size_t newest_slot = map_.make_keyframe(motion_.T_left_world(), motion_.stamp());
   map_.keyframe(newest_slot).T_camera_left = rig_.T_camera_left;
   for (MapPoint& p : map_.points())

@@ -15,29 +15,31 @@ using detail::StageClock;
 
 namespace {
 
-constexpr int kSample =
-    100;  // points followed from far away: enough for MLESAC, a third of the work
-// Inliers of the sample, below which the prediction was wrong. Three points determine a pose; five
-// more of thirty, found within 32 px, agree with it to half a pixel by chance once in 10¹⁰
-// hypotheses.
+// Number of points followed from a rough prediction: enough for MLESAC, a third of the work.
+constexpr int kSample = 100;
+// Minimum number of inliers of a good prediction. Three points determine a pose; five more of
+// thirty, found within 32 px, agree with it to half a pixel by chance once in 10¹⁰ hypotheses.
 constexpr int kSampleInliers = 8;
-constexpr double kSampleShare = 0.3;     // and of those found, which must agree
-constexpr double kMinSampleShare = 0.2;  // where no start does better: a calibration that does
-                                         // not fit leaves a quarter of the far points
-constexpr double kSampleResidual =
-    3.0;  // px: worse than that is no agreement, however many take part in it
-constexpr int kRelocaliseInliers = 15;    // that agree on one pose: by chance of rough matches 8 do
-constexpr double kRecognisedShare = 0.5;  // of the points in view that must be found again where
-                                          // the way to a place was not followed
-constexpr double kBorder = 12.0;          // px: nearer to the edge a patch does not fit
-// Share of the points in view of further cameras that they must still see; below it they see
-// something else.
+// Minimum share of found points that agree.
+constexpr double kSampleShare = 0.3;
+// Minimum share if no attempt does better; a wrong calibration leaves a quarter of the far points.
+constexpr double kMinSampleShare = 0.2;
+// Maximum rms residual in px, however many points agree.
+constexpr double kSampleResidual = 3.0;
+// Minimum number of points that agree on a pose; of rough matches 8 do by chance.
+constexpr int kRelocaliseInliers = 15;
+// Minimum share of points in view that must be found again if the motion was not tracked.
+constexpr double kRecognisedShare = 0.5;
+// Margin of the image in px, in which a patch does not fit.
+constexpr double kBorder = 12.0;
+// Minimum share of the points in view of additional cameras that they must see.
 constexpr double kSeenAcross = 0.3;
-constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
-constexpr std::uint16_t kFoundEnough =
-    2;  // rig frames, so four images, before a point holds a pose
+// Maximum number of consecutive frames for which a point may be hidden.
+constexpr std::uint8_t kMissesAllowed = 2;
+// Number of rig frames, so four images, before a point constrains poses.
+constexpr std::uint16_t kFoundEnough = 2;
 
-/// A pose of the sample that all points may be followed from.
+/// True if the pose of the sample is accurate enough to follow all points from it.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
   return fit.inliers >= kSampleInliers && fit.inliers > share * fit.given &&
          fit.rms_px < kSampleResidual;
@@ -57,8 +59,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
-  // From the prediction; if that was wrong, from further away; if that was, from where the last
-  // frame stood.
+  // Try the prediction, then with a larger range, then the pose of the last frame.
   struct Attempt {
     const Transform* start;
     int coarsest;
@@ -87,11 +88,10 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   clock.mark(Stage::track);
   fit = this->fit(coarse, false);
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
-  // One facade looks like the next: a place is recognised only if most of what should be seen
-  // from there is.
+  // Facades look alike: a place is recognised only if most points in view are found.
   if (unreliable && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
     fit.found = false;
-  // Left active, they would count as missing at the next place that is tried.
+  // If they stayed active, they would count as missing in the next attempt.
   for (std::size_t i = 0; !fit.found && i < map_.points().size(); ++i)
     if (revived[i]) map_.points()[i].stage = PointStage::dormant;
   clock.mark(Stage::pose);
@@ -136,7 +136,7 @@ PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived
   fit.found = fit.inliers >= kRelocaliseInliers;
   if (!fit.found) return fit;
   out->relocalised = true;
-  // Those that do not show are dropped as any other.
+  // Points that are not found are dropped as usual.
   for (std::size_t i = 0; i < map_.points().size(); ++i) {
     MapPoint& p = map_.points()[i];
     if (p.stage != PointStage::dormant) continue;

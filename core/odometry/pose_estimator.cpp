@@ -12,13 +12,16 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr double kStereoShare =
-    0.5;  // of the points found in two cameras, in which both must agree with the pose
-constexpr int kCameraHolds = 8;   // inliers for a camera to count as one that supports the pose
-constexpr int kCameraAlone = 12;  // inliers for a camera's own pose to be used
-constexpr int kByChance = 4;      // matches to one that agrees: wrong ones agree by chance
+// Minimum share of points found in two cameras in which both must agree with the pose.
+constexpr double kStereoShare = 0.5;
+// Minimum number of inliers of a camera that supports the pose.
+constexpr int kCameraHolds = 8;
+// Minimum number of inliers of a camera's own pose.
+constexpr int kCameraAlone = 12;
+// Maximum ratio of matches to inliers; wrong matches agree by chance.
+constexpr int kByChance = 4;
 
-/// Zero where the observations hold no pose.
+/// Zero if the observations do not determine the pose.
 Mat6 covariance_of(const RefinedPose& pose) noexcept {
   const Cholesky<6> factor(pose.information);
   if (!factor.ok()) return Mat6::Zero();
@@ -152,8 +155,7 @@ void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
   for (int k = 0; k < rig_.cameras; ++k)
     if (held[static_cast<std::size_t>(k)] >= kCameraHolds)
       fit->cameras = static_cast<std::uint8_t>(fit->cameras | (1U << static_cast<unsigned>(k)));
-  // One camera alone measures no depth and makes no new points: what is left of the map has to hold
-  // the pose well.
+  // A single camera measures no depth and creates no points, so more inliers are required.
   fit->found = fit->inliers >=
                (std::popcount(fit->cameras) < 2 ? options_.ok_inliers : options_.min_inliers);
 }
@@ -229,7 +231,7 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
     collect_camera(map, k);
     const Solved s = solve(T_camera_left[c] * (k == 0 ? start : fit.T_left_world), sample);
     if (!holds_camera(s)) {
-      // Without the left camera's pose there is none of the rig.
+      // The rig's pose needs the left camera's.
       if (k == 0) break;
       continue;
     }

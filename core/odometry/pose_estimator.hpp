@@ -6,63 +6,68 @@
 
 namespace vergence::odometry {
 
-/// A pose of the rig found from this frame's observations of the map, and what it rests on.
+/// Pose of the rig from this frame's observations of the map, with its support.
 struct PoseFit {
   bool found = false;
   Transform T_left_world{};
   int inliers = 0;
   int stereo = 0;
-  int stereo_found = 0;  // points found in two cameras, whether they agree or not
-  int near = 0;          // inliers whose depth this frame measures
-  int given = 0;         // points that were found in the images at all
+  /// Number of points found in two cameras, whether or not they agree.
+  int stereo_found = 0;
+  /// Number of inliers whose depth this frame measures.
+  int near = 0;
+  /// Number of points found in the images.
+  int given = 0;
   double rms_px = 0;
-  std::uint8_t cameras = 0;        // bit k: camera k holds at least a few of the inliers
-  Mat6 covariance = Mat6::Zero();  // of T_left_world with the points held: left perturbation (φ
-                                   // rad, τ m), about the left camera
-  /// The cameras agree about the scene: only then does a frame shape the map.
+  /// Bit k is set if camera k has at least a few of the inliers.
+  std::uint8_t cameras = 0;
+  /// Covariance of T_left_world with fixed points: left perturbation (φ rad, τ m), about the left
+  /// camera.
+  Mat6 covariance = Mat6::Zero();
+  /// True if the cameras agree about the points; only then a frame changes the map.
   [[nodiscard]] bool confirmed_stereo() const noexcept;
 };
 
-/// Poses from points: three points in MLESAC, then all of them.
+/// Estimates poses from points: MLESAC with three points, then a refinement with all.
 ///
-/// Linked, the cameras are one rigid rig; unlinked, each camera's pose is found for itself and the
-/// rig's transform is what comes out.
-/// Ownership  Options and rig are the owner's. agrees() stays valid until the next fit. Threads:
-///            one caller. Memory: the arena's.
+/// Linked cameras are one rigid rig. With unlinked ones each camera's pose is estimated separately,
+/// which gives the rig's transform.
+/// Ownership  Options and rig are the owner's. agrees() stays valid until the next fit. One caller.
+///            Memory from the arena.
 class PoseEstimator {
  public:
   PoseEstimator(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed() noexcept;
 
-  /// From `start`; with `sample` by MLESAC first, else by refinement alone.
+  /// Fits the pose of linked cameras from `start`; with `sample` by MLESAC first, else by
+  /// refinement alone.
   [[nodiscard]] PoseFit fit_linked(const Map& map, const Transform& start, bool sample) noexcept;
-  /// By the left camera's observations alone; the others' are judged by the pose that comes out.
-  /// Not found: stated in the fit.
+  /// Fits the pose by the left camera's observations alone; the others' are compared with the
+  /// result.
   [[nodiscard]] PoseFit fit_left(const Map& map, const Transform& start) noexcept;
-  /// For a fit, the last one, of cameras that contradict each other: which is right the images do
-  /// not say, but the left one is what the pose is of. Its own fit if that is good enough; else
-  /// `all` stands, and agrees() with it.
+  /// Call after a fit `all` of cameras that contradict each other. Returns the fit by the left
+  /// camera, to which the pose refers, if it is good enough; else `all`. agrees() matches the
+  /// result.
   [[nodiscard]] PoseFit prefer_left(const Map& map, const Transform& start,
                                     const PoseFit& all) noexcept;
-  /// Each camera for itself. T_camera_left (in/out, as many as cameras): prediction, then this
-  /// frame's; a camera that found no pose keeps its prediction and supports nothing.
+  /// Fits each camera's pose separately. T_camera_left (in/out, one per camera): prediction, then
+  /// this frame's; a camera without a pose keeps its prediction.
   [[nodiscard]] PoseFit fit_unlinked(const Map& map, const Transform& start, bool sample,
                                      std::span<Transform> T_camera_left) noexcept;
-  /// One camera alone, for its own pose T_camera_world; false: none found.
+  /// Fits the pose T_camera_world of one camera. Returns false if none was found.
   [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                 Transform* T_camera_world) noexcept;
 
-  /// Call after settle_points(). Returns true if the points that were found but do not fit the pose
-  /// agree on another motion; wrong matches do not.
+  /// Call after settle_points(). Returns true if the points that do not fit the pose agree on
+  /// another motion; wrong matches do not.
   [[nodiscard]] bool others_move(const Map& map, const Transform& T_left_world) noexcept;
 
-  /// From the next fit on: whether observations that are grossly off are left out of a fit by
-  /// refinement alone (as they are to begin with) or count as much as Huber's loss lets them. What
-  /// sampling began with is rough: there they always count.
+  /// Sets whether a fit by refinement alone leaves out gross outliers (initially true) or weights
+  /// them by Huber's loss. After sampling, whose result is rough, they always count.
   void drop_gross(bool drop) noexcept { drop_gross_ = drop; }
 
-  /// By map point: bit k set if camera k's observation agrees with the last fit, or with the one
-  /// that prefer_left() let stand.
+  /// Per map point, bit k is set if camera k's observation agrees with the last fit or the one that
+  /// prefer_left() returned.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return agrees_; }
 
  private:
@@ -74,7 +79,7 @@ class PoseEstimator {
     Mat6 covariance = Mat6::Zero();
   };
   void collect(const Map& map) noexcept;
-  /// One row of the table; false: it is full.
+  /// Adds a row to the table. Returns false if it is full.
   bool collect_point(const Map& map, std::size_t i, std::uint8_t cameras) noexcept;
   void collect_camera(const Map& map, int k) noexcept;
   [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
@@ -88,8 +93,10 @@ class PoseEstimator {
   RigObservationTable table_;
   RigMlesac mlesac_;
   PoseRefiner refiner_;
-  BoundedVector<std::uint16_t> owner_;           // map index of each row of the table
-  std::span<std::uint8_t> agrees_, agrees_all_;  // the latter while prefer_left() tries another
+  // Map index of each row of the table.
+  BoundedVector<std::uint16_t> owner_;
+  // agrees_all_ keeps the flags while prefer_left() tries another fit.
+  std::span<std::uint8_t> agrees_, agrees_all_;
   Random random_;
   bool drop_gross_ = true;
 };

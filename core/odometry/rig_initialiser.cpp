@@ -3,7 +3,7 @@
 namespace vergence::odometry {
 namespace {
 
-// Sigmas of a tracked corner: patches are aligned without their shape being known.
+// Factor of a tracked corner's sigma, because patches are aligned without a known warp.
 constexpr double kFreeMatchSigma = 2.0;
 
 }  // namespace

@@ -10,11 +10,11 @@
 
 namespace vergence::odometry {
 
-/// The transform between the first two cameras from the matches of one pair of images, where
-/// nothing but lenses and baseline length is known. Memory from the arena; threads one.
+/// Estimates the transform between the first two cameras from the matches of one pair of images,
+/// given only intrinsics and baseline length. Not thread-safe. Memory from the arena.
 class RigInitialiser {
  public:
-  /// `capacity`: matches of a pair. Draws its samples from `seed`.
+  /// `capacity`: maximum number of matches. `seed`: of the sampling.
   RigInitialiser(std::size_t capacity, std::uint64_t seed, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
 
@@ -23,7 +23,8 @@ class RigInitialiser {
 
  private:
   StereoMlesac mlesac_;
-  std::array<std::span<double>, 5> columns_{};  // left x, y, right x, y, sigma of the matches
+  // Columns of the matches: left x, y, right x, y, sigma.
+  std::array<std::span<double>, 5> columns_{};
   Random random_;
 };
 

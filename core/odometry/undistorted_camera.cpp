@@ -11,7 +11,8 @@ bool UndistortedCamera::ray_jacobian(const Vec2& raw, Vec3* ray, Mat2* J) const 
   Vec2 pixel;
   Mat23 by_point;
   if (raw_.project(*ray, &pixel, &by_point) != ProjectStatus::ok) return false;
-  const Mat2 forward = by_point.leftCols<2>();  // at depth 1 the point's x, y are the ray's
+  // At depth 1, the point's x and y are those of the ray.
+  const Mat2 forward = by_point.leftCols<2>();
   const double det = forward.determinant();
   if (!(std::abs(det) > 1.0)) return false;
   *J = forward.inverse();

@@ -3,8 +3,8 @@
 
 namespace vergence::odometry {
 
-/// One camera as the odometry uses it: raw pixels to follow features in, ideal pinhole pixels (same
-/// K, no distortion) to reckon with.
+/// One camera of the odometry: features are followed in raw pixels, and computations use ideal
+/// pinhole pixels (same K, no distortion).
 class UndistortedCamera {
  public:
   UndistortedCamera() noexcept = default;
@@ -14,10 +14,11 @@ class UndistortedCamera {
   [[nodiscard]] const Camera& raw() const noexcept { return raw_; }
   [[nodiscard]] const Camera& ideal() const noexcept { return ideal_; }
 
-  /// Raw pixel → ideal pixel, and how much longer a short length is there. False: outside the lens
-  /// model.
+  /// Converts a raw to an ideal pixel, with the magnification of short lengths. Returns false
+  /// outside the lens model.
   [[nodiscard]] bool undistort(const Vec2& raw, Vec2* ideal, double* magnification) const noexcept;
-  /// ∂(x, y of the ray (x, y, 1))/∂(raw pixel). False: outside the lens model.
+  /// Computes the ray (x, y, 1) of a raw pixel and the derivative of x and y. Returns false outside
+  /// the lens model.
   [[nodiscard]] bool ray_jacobian(const Vec2& raw, Vec3* ray, Mat2* J) const noexcept;
 
  private:

@@ -9,16 +9,22 @@ namespace vergence::odometry {
 namespace {
 
 constexpr std::size_t kMaxWindowPoints = 1024;
-constexpr std::size_t kObservationsAPoint =
-    10;  // on average, of all cameras; more are left out of the step
-constexpr float kOutlier =
-    16.F;  // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
-constexpr int kObservationsOfPose = 3;     // that hold six degrees of freedom
-constexpr double kMinDepthOfPoint = 0.05;  // m in front of every camera that sees it
-constexpr double kReferenceDepth = 20.0;   // m, where a calibration is asked for its depth error
-constexpr double kHeldSigma = 1e-6;        // rad and m, of what a window does not estimate of a rig
-constexpr double kInflation = 100.0;  // of a variance: a lens field of 0.03 px that no model has
-                                      // does not average out over 2000 observations of 0.15 px
+// Average number of observations per point over all cameras; more are left out.
+constexpr std::size_t kObservationsAPoint = 10;
+// Limit of the squared whitened residual with 2 degrees of freedom; Gaussian errors exceed it with
+// 3e-4.
+constexpr float kOutlier = 16.F;
+// Minimum number of observations that determine a pose.
+constexpr int kObservationsOfPose = 3;
+// Minimum depth of a point in every camera that sees it, in metres.
+constexpr double kMinDepthOfPoint = 0.05;
+// Depth in metres at which the calibration's depth error is evaluated.
+constexpr double kReferenceDepth = 20.0;
+// Sigma in rad and m of rig parameters that a window does not estimate.
+constexpr double kHeldSigma = 1e-6;
+// Inflation of a variance: an unmodelled lens field of 0.03 px does not average out over 2000
+// observations of 0.15 px.
+constexpr double kInflation = 100.0;
 
 }  // namespace
 
@@ -67,13 +73,13 @@ void WindowAdjuster::set_rotation_prior() noexcept {
   prior_rig_.covariance = {};
   for (int k = 1; k < rig_.cameras; ++k) {
     const Vec3& t = rig_.T_camera_left[static_cast<std::size_t>(k)].t;
-    // The axis across baseline and view: a turn about it shifts all disparities alike.
+    // A rotation about the axis orthogonal to baseline and view shifts all disparities equally.
     const Vec3 axis = Vec3::UnitZ().cross(t);
     if (!(axis.norm() > kHeldSigma)) {
       rotations_free_ = false;
       return;
     }
-    // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
+    // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
     const double known = 0.01 * calibration::depth_error_percent(rig_, k, kReferenceDepth) *
                          t.norm() / kReferenceDepth;
     const double sigma = known > 0 ? std::min(known, options_.extrinsic_rotation_sigma_rad)
@@ -95,7 +101,8 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
   points_.clear();
   owner_.clear();
   observations_.clear();
-  const int images = linked ? 1 : rig_.cameras;  // poses a keyframe
+  // Number of poses per keyframe.
+  const int images = linked ? 1 : rig_.cameras;
   oldest_ = map.order().size() - std::min<std::size_t>(map.order().size(), effort.window_keyframes);
   for (std::size_t i = oldest_; i < map.order().size(); ++i) {
     const Keyframe& keyframe = map.keyframe(map.order()[i]);
@@ -134,7 +141,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
         fits = observations_.push(o);
       }
     }
-    // Seen from one place only, a point does not constrain poses.
+    // A point seen from one place only does not constrain poses.
     if (!fits || keyframes < 2 || observations_.size() - first < 2) {
       observations_.truncate(first);
       continue;
@@ -142,7 +149,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
     (void)points_.push(p.p_world);
     (void)owner_.push(static_cast<std::uint16_t>(i));
   }
-  // An image that saw nothing of the window stays where it is thought to be.
+  // An image with too few observations keeps its pose.
   std::array<int, kMaxWindow * kMaxCameras> seen{};
   for (const BundleObservation& o : observations_) ++seen[o.pose];
   for (std::size_t i = 0; i < poses_.size(); ++i)
@@ -218,8 +225,8 @@ WindowOutcome WindowAdjuster::adjust_unlinked(Map& map, const FrameWorkload& eff
     const Transform& left = poses_[i * images];
     keyframe.T_left_world = {normalised(left.R), left.t};
     for (std::size_t k = 1; k < images; ++k) {
-      // Held where it was in the world, an image that saw nothing would take on the left one's
-      // correction.
+      // Keep the transform of a constant image; a pose fixed in the world would add the left
+      // image's correction to it.
       if (constant_[i * images + k] != 0) continue;
       const Transform T = poses_[i * images + k] * left.inverse();
       keyframe.T_camera_left[k] = {normalised(T.R), T.t};

@@ -7,39 +7,38 @@
 namespace vergence::odometry {
 
 struct WindowOutcome {
-  bool usable = false;  // poses and points were written back
+  /// True if poses and points were written back.
+  bool usable = false;
   BundleTermination termination = BundleTermination::invalid_input;
   int points = 0;
   int observations = 0;
-  int dropped = 0;  // observations that no longer fit
+  /// Number of observations that no longer fit.
+  int dropped = 0;
   int steps = 0;
   double rms_px = 0;
 };
 
-/// Adjusts the window's poses and points together (stereo odometry): the oldest keyframe
-/// is constant.
+/// Adjusts the window's poses and points together; the oldest keyframe is constant.
 ///
-/// A calibration error moves all depths of a window together, by one disparity common to all
-/// points, rather than by independent errors. So the turn of every further camera that shifts
-/// disparities is estimated with the window, about the calibration's own, by the sigma that the
-/// calibration's depths have (a consider parameter that the window may answer). It is found afresh
-/// in each window, so that nothing is counted twice, and it never leaves the odometry.
+/// A calibration error changes all disparities of a window equally. So the rotation of every
+/// additional camera that shifts disparities is estimated with the window, with the sigma of the
+/// calibration's depths as prior. Each window starts from the calibration, so that nothing counts
+/// twice, and the estimate never leaves the odometry.
 ///
-/// Memory  From the arena at construction. More observations than fit: the rest are left out of
-///         this adjustment.
+/// Memory  From the arena at construction. Observations beyond its capacity are left out.
 class WindowAdjuster {
  public:
   WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
                                                  const RigCalibration& rig) noexcept;
 
-  /// Writes poses and points back if the result is usable, and drops observations beyond the robust
-  /// limit. T_camera_left() is what it found.
-  /// Not more than `effort` allows: the newest keyframes, so many steps.
+  /// Adjusts the newest keyframes within the limits of `effort`. Writes poses and points back if
+  /// the result is usable, and drops observations beyond the robust limit. T_camera_left() has the
+  /// transforms.
   WindowOutcome adjust(Map& map, const FrameWorkload& effort = {}) noexcept;
-  /// As adjust(), with unlinked cameras: every image has a pose of its own, in
-  /// Keyframe::T_camera_left (parallel monocular). Both images of the oldest keyframe
-  /// are constant; the caller renews the scale.
+  /// Same as adjust() for unlinked cameras: every image has its own pose, in
+  /// Keyframe::T_camera_left. All images of the oldest keyframe are constant; the caller renews the
+  /// scale.
   WindowOutcome adjust_unlinked(Map& map, const FrameWorkload& effort = {}) noexcept;
   /// Call when the owner's rig was changed to another calibration.
   void adopt_rig() noexcept;
@@ -51,7 +50,7 @@ class WindowAdjuster {
  private:
   [[nodiscard]] static BundleCapacities capacities(const OdometryOptions& options,
                                                    const RigCalibration& rig) noexcept;
-  /// Sets the prior of the further cameras' rotations from the calibration's covariance.
+  /// Sets the prior of the additional cameras' rotations from the calibration's covariance.
   void set_rotation_prior() noexcept;
   void gather(Map& map, bool linked, const FrameWorkload& effort) noexcept;
   [[nodiscard]] WindowOutcome solve(BundleConfiguration configuration,
@@ -61,16 +60,17 @@ class WindowAdjuster {
   const OdometryOptions& options_;
   const RigCalibration& rig_;
   BundleAdjuster adjuster_;
-  RigCalibration prior_rig_;     // the calibration as it was given; `covariance`: of the turns that
-                                 // are estimated with a window
-  bool rotations_free_ = false;  // they are
+  // The calibration, with the prior covariance of the rotations that are estimated.
+  RigCalibration prior_rig_;
+  bool rotations_free_ = false;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
-  std::size_t oldest_ = 0;  // in the map's order, of the keyframes that are adjusted
+  // Index of the oldest adjusted keyframe in the map's order.
+  std::size_t oldest_ = 0;
   FixedVector<Transform, kMaxWindow * kMaxCameras> poses_;
   FixedVector<std::uint8_t, kMaxWindow * kMaxCameras> constant_;
   BoundedVector<Vec3> points_;
-  BoundedVector<std::uint16_t> owner_;  // index in the map of each point
+  BoundedVector<std::uint16_t> owner_;
   BoundedVector<BundleObservation> observations_;
   std::span<float> residuals_;
 };

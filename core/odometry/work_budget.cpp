@@ -6,9 +6,12 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr double kUsable = 0.9;    // of the budget: what comes after the odometry needs some
-constexpr double kDecay = 0.8;     // a keyframe, of what a piece of work once took
-constexpr double kMinPoints = 25;  // percent: under that the scene is lost sooner or later
+// Share of the budget for the odometry.
+constexpr double kUsable = 0.9;
+// Decay per keyframe of the slowest time of a piece of work.
+constexpr double kDecay = 0.8;
+// Minimum percentage of new points; with fewer, tracking is eventually lost.
+constexpr double kMinPoints = 25;
 constexpr int kMinKeyframes = 4;
 
 void take(double ms, double* dearest) noexcept { *dearest = std::max(ms, kDecay * *dearest); }
@@ -50,7 +53,7 @@ void WorkBudget::add_points_time(double ms, const FrameWorkload& effort) noexcep
 }
 
 void WorkBudget::add_window_time(double ms, int keyframes, int steps) noexcept {
-  // One that was left out is tried again before long: what made the last one dear may be over.
+  // The time of a window that was left out decays, so that it is tried again soon.
   take(keyframes > 0 && steps > 0 ? ms / (keyframes * steps) : 0, &window_step_ms_);
 }
 

@@ -8,16 +8,16 @@ namespace vergence::odometry {
 
 /// Plans the optional work of a frame within its time budget. Work is left out in this order: new
 /// points, down to a quarter; keyframes of the window, down to four; steps of its solver, down to
-/// one; the window. The time of each piece of work is predicted by the slowest of the last frames.
+/// one; the window. Times are predicted from the slowest recent frame.
 ///
 /// Not thread-safe. Does not allocate. Without a budget all work is planned and no clock is read.
 class WorkBudget {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Starts the clock of a frame. A `budget` of zero is no limit.
+  /// Starts the clock of a frame. A `budget` of zero means no limit.
   void begin(Duration budget) noexcept;
-  /// The work there is time for, given a window of `keyframes` and `steps` solver steps.
+  /// Returns the work that fits, for a window of `keyframes` and `steps` solver steps.
   [[nodiscard]] FrameWorkload plan(int keyframes, int steps) const noexcept;
   [[nodiscard]] bool limited() const noexcept { return budget_ms_ > 0; }
 
@@ -28,8 +28,10 @@ class WorkBudget {
  private:
   double budget_ms_ = 0;
   Clock::time_point start_{};
-  double points_ms_ = 0;       // of all that there is room for
-  double window_step_ms_ = 0;  // of one step and keyframe
+  // Time of new points at 100 %.
+  double points_ms_ = 0;
+  // Time of one step of one keyframe.
+  double window_step_ms_ = 0;
 };
 
 }  // namespace vergence::odometry

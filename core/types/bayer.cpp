@@ -7,11 +7,11 @@
 namespace vergence {
 namespace {
 
-constexpr int kPiece =
-    1022;  // columns at a time: what a row of sums on the stack holds, with one more at each end
+// Number of columns per pass, so that a row of sums with one more at each end fits on the stack.
+constexpr int kPiece = 1022;
 
-/// out[0, count) from sums[0, count + 2). No branches, no aliases: the compiler makes vectors of
-/// it, of the sums' rows below, too.
+/// Computes out[0, count) from sums[0, count + 2). Without branches and aliases the compiler
+/// vectorises it, and down() as well.
 void stereo(const std::uint16_t* __restrict sums, int count,
             std::uint8_t* __restrict out) noexcept {
   for (int i = 0; i < count; ++i)
@@ -29,7 +29,8 @@ void down(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_
 void bayer_to_grey(const std::uint8_t* raw, std::ptrdiff_t raw_stride, int width, int height,
                    std::uint8_t* out, std::ptrdiff_t out_stride) noexcept {
   assert(width >= 2 && height >= 2);
-  std::array<std::uint16_t, kPiece + 2> sums;  // of columns first − 1 … first + count
+  // Sums of columns first − 1 … first + count.
+  std::array<std::uint16_t, kPiece + 2> sums;
   for (int y = 0; y < height; ++y) {
     const std::uint8_t* here = raw + y * raw_stride;
     const std::uint8_t* above = raw + (y > 0 ? y - 1 : 1) * raw_stride;

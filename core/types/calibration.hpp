@@ -8,23 +8,30 @@
 
 namespace vergence {
 
-/// Cameras on one rig; fixed, because every per-frame structure is sized by it.
+/// Maximum number of cameras on a rig; every per-frame structure is sized by it.
 inline constexpr int kMaxCameras = 4;
 
 enum class CameraModelKind : std::uint8_t {
-  pinhole_radtan,       // k1 k2 p1 p2 k3 (Brown–Conrady, OpenCV's order)
-  pinhole_equidistant,  // k1 k2 k3 k4 (Kannala–Brandt, OpenCV's fisheye)
+  /// Brown–Conrady in OpenCV's order: k1 k2 p1 p2 k3.
+  pinhole_radtan,
+  /// Kannala–Brandt as OpenCV's fisheye model: k1 k2 k3 k4.
+  pinhole_equidistant,
 };
 
-/// One camera's image formation: x = K d(X/Z), pixels; pixel centres at integer coordinates.
+/// Intrinsics of one camera: x = K d(X/Z) in pixels, with pixel centres at integer coordinates.
 struct Intrinsics {
   CameraModelKind kind = CameraModelKind::pinhole_radtan;
-  int width = 0;                             // px
-  int height = 0;                            // px
-  double fx = 0, fy = 0, cx = 0, cy = 0;     // px
-  std::array<double, 5> distortion{};        // radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4, 0
-  std::array<double, 4> sigma{};             // of fx fy cx cy, px; 0: not given
-  std::array<double, 5> distortion_sigma{};  // of the coefficients; 0: not given
+  /// Size of the images, in pixels.
+  int width = 0;
+  int height = 0;
+  /// Focal lengths and principal point, in pixels.
+  double fx = 0, fy = 0, cx = 0, cy = 0;
+  /// Distortion coefficients in the order of CameraModelKind; unused ones are 0.
+  std::array<double, 5> distortion{};
+  /// Standard deviations of fx, fy, cx and cy, in pixels; 0 if unknown.
+  std::array<double, 4> sigma{};
+  /// Standard deviations of the distortion coefficients; 0 if unknown.
+  std::array<double, 5> distortion_sigma{};
 
   [[nodiscard]] bool has_distortion() const noexcept {
     for (const double d : distortion)
@@ -33,10 +40,12 @@ struct Intrinsics {
   }
 };
 
-inline constexpr int kIntrinsicsSize = 9;                      // fx fy cx cy d0 … d4
-inline constexpr int kExtrinsicsSize = 6 * (kMaxCameras - 1);  // φ, τ of every further camera
-inline constexpr int kRigSize =
-    kExtrinsicsSize + kIntrinsicsSize * kMaxCameras;  // all that a calibration may estimate
+/// Number of intrinsics of a camera: fx fy cx cy and five coefficients.
+inline constexpr int kIntrinsicsSize = 9;
+/// Number of extrinsics of a rig: φ and τ of every additional camera.
+inline constexpr int kExtrinsicsSize = 6 * (kMaxCameras - 1);
+/// Number of all parameters that a calibration may estimate.
+inline constexpr int kRigSize = kExtrinsicsSize + kIntrinsicsSize * kMaxCameras;
 
 /// First row of camera k's transform (k ≥ 1) and of its intrinsics among a rig's parameters.
 [[nodiscard]] constexpr int extrinsic_row(int k) noexcept { return 6 * (k - 1); }
@@ -44,9 +53,9 @@ inline constexpr int kRigSize =
   return kExtrinsicsSize + kIntrinsicsSize * k;
 }
 
-/// Covariance of all of a rig's parameters together: transforms as left perturbations (φ rad, τ m),
-/// then fx fy cx cy (px) and distortion of each camera. Zero rows: held, or not known. Symmetric;
-/// the lower triangle is kept.
+/// Joint covariance of all parameters of a rig: transforms as left perturbations (φ rad, τ m), then
+/// fx fy cx cy (px) and distortion of each camera. Rows of fixed or unknown parameters are zero.
+/// Symmetric; only the lower triangle is stored.
 class RigCovariance {
  public:
   [[nodiscard]] double operator()(int row, int column) const noexcept {
@@ -69,7 +78,7 @@ class RigCovariance {
   std::array<double, kRigSize*(kRigSize + 1) / 2> packed_{};
 };
 
-/// A rig: intrinsics of every camera and where each sits relative to camera 0 (`left`).
+/// Calibration of a rig: intrinsics of every camera and its pose relative to camera 0 (`left`).
 ///
 /// X_k = T_camera_left[k] * X_left, metres; T_camera_left[0] is the identity. Covariances are of
 /// the left perturbation (rotation rad, then translation m): R ← Exp(φ)R, t ← t + τ.
@@ -77,25 +86,33 @@ struct RigCalibration {
   int cameras = 0;
   std::array<Intrinsics, kMaxCameras> intrinsics{};
   std::array<Transform, kMaxCameras> T_camera_left{};
-  std::array<std::array<double, 6>, kMaxCameras>
-      sigma_noise{};  // rx ry rz (rad) tx ty tz (m); 0: not given
-  std::array<std::array<double, 6>, kMaxCameras>
-      sigma_total{};  // the same with uncertain intrinsics
-  // zero: not given (Eigen leaves a Mat6 without initialiser undefined)
+
+  /// Standard deviations rx ry rz (rad) tx ty tz (m) by noise; 0 if unknown.
+  std::array<std::array<double, 6>, kMaxCameras> sigma_noise{};
+  /// Standard deviations including uncertain intrinsics.
+  std::array<std::array<double, 6>, kMaxCameras> sigma_total{};
+  /// Covariances including uncertain intrinsics; zero if unknown, which Eigen does not default to.
   std::array<Mat6, kMaxCameras> covariance_total{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(),
                                                  Mat6::Zero()};
-  RigCovariance covariance{};  // of all parameters together, wide: what a depth is off by follows
-                               // from it; empty: not given
-  double baseline = 0;         // m, |t| of camera 1 as measured once
-  double baseline_sigma = 0;   // m; 0: exact
+  /// Joint covariance of all parameters, from which depth errors follow; empty if unknown.
+  RigCovariance covariance{};
 
-  Stamp found{};               // when the stereo transform was found; 0: given
-  int frames = 0;              // rig frames it was found from, all that its information is of
-  double reprojection_px = 0;  // root mean square of that solve
-  double scale_sigma = 0;  // relative, of lengths driven: by the noise of the tracks it was found
-                           // from, and by what lenses usually are off; not by baseline_sigma
-  double inflation = 0;    // variance of the result over the variance by its solve: weighs it as
-                           // the next one's prior; 0: not known
+  /// Measured length |t| of camera 1's baseline, in metres.
+  double baseline = 0;
+  /// Standard deviation of the baseline, in metres; 0 if exact.
+  double baseline_sigma = 0;
+
+  /// Time of the newest frame of the solve; 0 for a supplied calibration.
+  Stamp found{};
+  /// Number of rig frames that the calibration is based on.
+  int frames = 0;
+  double reprojection_px = 0;
+  /// Relative standard deviation of path lengths, by the noise of the tracks and usual errors of
+  /// intrinsics, without baseline_sigma.
+  double scale_sigma = 0;
+  /// Ratio of the actual variance to that of the solve, which weights the calibration as a prior; 0
+  /// if unknown.
+  double inflation = 0;
 };
 
 }  // namespace vergence

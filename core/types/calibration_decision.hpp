@@ -7,62 +7,76 @@
 
 namespace vergence {
 
-/// Why a calibration was sought. One word each: it stands in calibrations.csv and summary.json.
+/// Cause of an estimation; its name is written to calibrations.csv and summary.json.
 enum class CalibrationCause : std::uint8_t {
-  from_scratch,  // there was none
-  knock,         // the monitor saw the rig change
-  drift,         // the monitor saw it creep
-  collapse,      // left and right found hardly any match any more
-  out_of_sync,   // a camera's images seem to be of another instant
-  requested,     // the user asked
-  refinement,    // the drive goes on: what it has shown since is added to what is known
-  contradicted,  // the calibration that the drive began with, or went on with, is not that of the
-                 // rig
+  /// There was no calibration.
+  from_scratch,
+  /// The monitor detected a sudden change of the rig.
+  knock,
+  /// The monitor detected a slow change of the rig.
+  drift,
+  /// Hardly any stereo match was found any more.
+  collapse,
+  /// A camera's images seem to be from another instant.
+  out_of_sync,
+  /// A recalibration was requested.
+  requested,
+  /// New frames refine the calibration in use.
+  refinement,
+  /// The calibration in use is not that of the rig.
+  contradicted,
 };
 [[nodiscard]] std::string_view to_string(CalibrationCause) noexcept;
 
 /// Focal length measured online, compared with the configured one.
 struct FocalMeasurement {
-  double configured_px = 0;  // fx of the left camera
-  double measured_px = 0;    // 0: it has not been measured
-  double sigma_px = 0;  // 1 sigma, with what lenses leave; 0: the measurement is not at its end,
-                        // and already far from the one given
-  bool contradicted = false;  // the one given is certainly not that of the images
+  double configured_px = 0;
+  /// Measured fx; 0 if not measured.
+  double measured_px = 0;
+  /// Standard deviation including systematic lens errors; 0 if the solve has not converged but is
+  /// already far from the configured value.
+  double sigma_px = 0;
+  /// True if the configured value certainly does not fit the images.
+  bool contradicted = false;
 };
 
 /// Result of one calibration attempt: a line of calibrations.csv. A value.
 struct CalibrationDecision {
-  Stamp stamp{};  // of the frame it was decided at
+  /// Stamp of the frame in which the decision was made.
+  Stamp stamp{};
   CalibrationCause cause = CalibrationCause::from_scratch;
   bool accepted = false;
-  /// True if a calibration was in use meanwhile. If such a decision is not accepted, the
-  /// calibration in use fits as well.
+  /// True if this refines a calibration in use, which fits as well if the decision is not accepted.
   bool is_refinement = false;
   /// Reason of a rejection, a constant without commas; empty when accepted.
   const char* reason = "";
-  /// Calibration found, also when rejected.
+  /// Estimated calibration, also when rejected.
   RigCalibration calibration{};
-  /// Frames from the alarm, the start or the request to the decision.
+
+  /// Number of frames from the alarm, start or request to the decision.
   int latency_frames = 0;
-  /// First frame of the changed rig; 0: does not apply.
+  /// Number of the first frame of the changed rig; 0 if not applicable.
   std::uint64_t onset_frame = 0;
-  /// Median distance of held-out frames' matches from their epipolar lines, of the camera that fits
-  /// worst, with the calibration before and with this one.
+
+  /// Median distance of held-out frames' matches from their epipolar lines for the camera that fits
+  /// worst, with the previous calibration and with the estimate.
   double held_out_before_px = 0;
   double held_out_after_px = 0;
-  /// Depth that the next two errors are of; 0: nothing was measured.
+
+  /// Depth at which the next two errors are evaluated; 0 if they were not.
   double reference_depth_m = 0;
-  /// Predicted depth error of the calibration found, 1 sigma.
+  /// Predicted depth error of the estimate, 1 sigma.
   double depth_sigma_percent = 0;
-  /// Depth error of the calibration before, by the one found; 0: there was none.
+  /// Depth error of the previous calibration relative to the estimate; 0 if there was none.
   double depth_error_percent = 0;
-  /// True if depths of the calibration now in use are within the tolerated error.
+
+  /// True if the depths of the calibration now in use are within the tolerated error.
   bool verified = false;
-  /// That the rig is the one of the calibration before, or, with `contradicted`, another one.
+  /// Evidence that the rig is that of the previous calibration or, with `contradicted`, another
+  /// one.
   ChangeEvidence evidence;
-  /// The newest of the drive.
   FocalMeasurement focal{};
-  /// Time on the solver's thread.
+  ///
   double solve_ms = 0;
 };
 

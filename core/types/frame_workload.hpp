@@ -3,13 +3,16 @@
 
 namespace vergence {
 
-/// Workload of a frame: all of it, or less where its time would be over first
-/// (docs/deployment.md). The pose is sought whatever is left out.
+/// Workload of a frame, reduced if it would exceed its time limit (docs/deployment.md). The pose is
+/// always estimated.
 struct FrameWorkload {
   static constexpr std::uint8_t kAll = 255;
-  std::uint8_t points_percent = 100;     // of `odometry.features`, up to which new points are made
-  std::uint8_t window_keyframes = kAll;  // the newest so many are adjusted at most; 0: none
-  std::uint8_t window_steps = kAll;      // of the window's solver at most
+  /// Share of `odometry.features` up to which new points are created.
+  std::uint8_t points_percent = 100;
+  /// Maximum number of newest keyframes that are adjusted; 0 for none.
+  std::uint8_t window_keyframes = kAll;
+  /// Maximum number of steps of the window's solver.
+  std::uint8_t window_steps = kAll;
 
   friend bool operator==(const FrameWorkload&, const FrameWorkload&) = default;
   [[nodiscard]] bool whole() const noexcept { return *this == FrameWorkload{}; }

@@ -5,17 +5,18 @@
 
 namespace vergence {
 
-/// View of an 8-bit grey image, which it does not own, row 0 on top. Bytes between `width` and
+/// Non-owning view of an 8-bit grey image, with row 0 at the top. Bytes between `width` and
 /// `stride` are padding of any value.
 ///
-/// Ownership  A view; the memory outlives it by contract of who hands it out (FramePool slot,
-///            pyramid level).
+/// Ownership  The memory outlives the view by contract of its provider (FramePool slot, pyramid
+///            level).
 /// Threads    Plain reads; any number of readers while no thread writes.
 struct ImageView {
   const std::uint8_t* data = nullptr;
   int width = 0;
   int height = 0;
-  std::ptrdiff_t stride = 0;  // bytes from a row to the next, ≥ width
+  /// Distance between rows in bytes, ≥ width.
+  std::ptrdiff_t stride = 0;
 
   [[nodiscard]] constexpr bool empty() const noexcept {
     return data == nullptr || width <= 0 || height <= 0;

@@ -4,7 +4,7 @@
 
 namespace vergence {
 
-/// The name of a value of an enumeration that counts from 0; "": of none of its values.
+/// Name of a value of an enumeration that counts from 0; empty if the value is out of range.
 template <typename Enum, std::size_t N>
 [[nodiscard]] constexpr const char* name_of(Enum value,
                                             const std::array<const char*, N>& names) noexcept {

@@ -4,7 +4,7 @@
 
 namespace vergence {
 
-/// A borrowed callable without arguments; no heap. The callable outlives the reference.
+/// Reference to a callable without arguments, which must outlive it. No heap.
 class TaskRef {
  public:
   template <class F>
@@ -18,9 +18,9 @@ class TaskRef {
 };
 
 /// Runs two independent tasks and returns when both are done. The core owns no threads: the app
-/// hands one in.
+/// supplies one.
 ///
-/// Threads  Called from the estimator's thread only. Tasks share nothing they write.
+/// Threads  Called from the estimator's thread only. Tasks share no data that they write.
 /// Errors   None; tasks are noexcept.
 class PairRunner {
  public:
@@ -28,7 +28,7 @@ class PairRunner {
   virtual void run(TaskRef here, TaskRef there) noexcept = 0;
 };
 
-/// One after the other on the caller's thread. Same results by construction of the tasks.
+/// Runs both tasks on the caller's thread, with the same results.
 class SequentialRunner final : public PairRunner {
  public:
   void run(TaskRef here, TaskRef there) noexcept override {
@@ -37,7 +37,7 @@ class SequentialRunner final : public PairRunner {
   }
 };
 
-/// Runs one long task beside the frames: the calibration solver's thread, handed in by the app.
+/// Runs one long task in the background: the calibration solver's thread, supplied by the app.
 ///
 /// Threads  start(), busy() and wait() from one thread. The task runs on another, or within
 ///          start().
@@ -45,15 +45,16 @@ class SequentialRunner final : public PairRunner {
 class BackgroundRunner {
  public:
   virtual ~BackgroundRunner() = default;
-  /// Precondition: !busy(). What the callable refers to lives until the task is done.
+  /// Precondition: !busy(). The callable's data must live until the task is done.
   virtual void start(TaskRef task) noexcept = 0;
-  /// The last task is not done yet. False: everything it wrote is visible to the caller.
+  /// True until the last task is done; afterwards everything it wrote is visible to the caller.
   [[nodiscard]] virtual bool busy() noexcept = 0;
   /// Returns when the last task is done.
   virtual void wait() noexcept = 0;
 };
 
-/// The task at once, on the caller's thread: for tests, and for tools without a second thread.
+/// Runs the task immediately on the caller's thread, for tests and for tools without a second
+/// thread.
 class ImmediateRunner final : public BackgroundRunner {
  public:
   void start(TaskRef task) noexcept override { task(); }

@@ -9,7 +9,6 @@
 
 namespace vergence {
 
-/// State of the estimator.
 enum class State : std::uint8_t {
   initialising,
   parallel_monocular,
@@ -19,49 +18,71 @@ enum class State : std::uint8_t {
   lost
 };
 
-/// Status of a pose.
 enum class PoseStatus : std::uint8_t {
-  ok,        // use it
-  degraded,  // usable, `reason` names what is weak
-  lost,      // there is no pose: do not use
+  /// The pose is reliable.
+  ok,
+  /// The pose is usable; `reason` names its weakness.
+  degraded,
+  /// There is no pose.
+  lost,
 };
 
-/// Why a pose is not `ok`. One word each: it stands in poses.csv.
+/// Reason why a pose is not `ok`; its name is written to poses.csv.
 enum class Reason : std::uint8_t {
   none,
-  no_image,           // a camera delivered nothing for this frame
-  image_no_contrast,  // an image carries no structure: covered, black, saturated
-  image_repeated,     // a camera delivered the image of the frame before once more, now or earlier
-                      // while others went on: it may be an exposure behind until a dozen frames of
-                      // a rig that drives have shown it is not
-  few_features,       // too little texture to start from
-  no_stereo_matches,  // left and right do not fit this calibration
-  cameras_swapped,    // points would lie behind the rig: left and right exchanged
-  few_inliers,        // the pose rests on few points
-  single_camera,      // only one camera supports the pose; its scale is remembered, not measured
-  no_pose,            // tracking failed
-  time_gap,           // no frame for longer than motion can be predicted, up to ten frames ago
-  map_reset,          // the map was rebuilt; the motion across the gap was extrapolated
-  weak_geometry,      // the points do not hold the pose well, or several times worse than usual,
-                      // or the window moved the pose far
-  dynamic_scene,      // more outliers than a rigid scene has
-  unverified_calibration,  // the calibration in use is not verified yet, or no longer
-  recalibrating,           // the rig no longer fits its calibration, up to ten frames ago
-  uncalibrated,  // no calibration yet: each camera's pose is estimated separately, with the scale
-                 // of the assumed baseline
-  out_of_sync,   // a camera's images are of another instant than the others'
-  needs_motion,  // the calibration has to be found and cannot be without driving
-  needs_near_structure,  // the calibration cannot be found without points near the rig
-  needs_texture,         // the calibration cannot be found without texture to match
-  pairing_ambiguous,  // the synchronisation contradicts that its images were exposed together: only
-                      // one of them was used
+  /// A camera delivered no image for this frame.
+  no_image,
+  /// An image has no structure: covered, black or saturated.
+  image_no_contrast,
+  /// A camera delivered its previous image again, now or recently, while others went on. It may be
+  /// an exposure late until a dozen frames in motion show otherwise.
+  image_repeated,
+  /// There is too little texture to start from.
+  few_features,
+  /// Left and right images do not fit this calibration.
+  no_stereo_matches,
+  /// Points would lie behind the rig: left and right are swapped.
+  cameras_swapped,
+  /// The pose is based on few points.
+  few_inliers,
+  /// Only one camera supports the pose; its scale is that of earlier points.
+  single_camera,
+  /// Tracking failed.
+  no_pose,
+  /// No frame arrived for longer than motion can be predicted, up to ten frames ago.
+  time_gap,
+  /// The map was rebuilt; the motion across the gap was extrapolated.
+  map_reset,
+  /// The points constrain the pose poorly or several times worse than usual, or the window
+  /// corrected it strongly.
+  weak_geometry,
+  /// There are more outliers than in a rigid scene.
+  dynamic_scene,
+  /// The calibration in use is not verified.
+  unverified_calibration,
+  /// The rig does not fit its calibration now, or did not up to ten frames ago.
+  recalibrating,
+  /// There is no calibration yet: each camera's pose is estimated separately, with the scale of the
+  /// assumed baseline.
+  uncalibrated,
+  /// A camera's images are from another instant than the others'.
+  out_of_sync,
+  /// The calibration cannot be estimated without motion.
+  needs_motion,
+  /// The calibration cannot be estimated without points near the rig.
+  needs_near_structure,
+  /// The calibration cannot be estimated without texture to match.
+  needs_texture,
+  /// The synchronisation contradicts that the images were exposed together; only one of them was
+  /// used.
+  pairing_ambiguous,
 };
 
 [[nodiscard]] std::string_view to_string(State) noexcept;
 [[nodiscard]] std::string_view to_string(PoseStatus) noexcept;
 [[nodiscard]] std::string_view to_string(Reason) noexcept;
 
-/// Stages of one frame, in order; times of summary.json carry these names.
+/// Stages of one frame, in order; summary.json uses these names.
 enum class Stage : std::uint8_t { pyramid, detect, track, match, pose, window };
 inline constexpr int kStages = 6;
 [[nodiscard]] std::string_view to_string(Stage) noexcept;
@@ -76,20 +97,35 @@ struct PoseSample {
   State state = State::initialising;
   PoseStatus status = PoseStatus::lost;
   Reason reason = Reason::none;
-  Transform T_world_left{};  // identity and meaningless when `lost`
-  Covariance6 covariance{};  // of T_world_left, by dead reckoning since the first pose: position
-                             // (m), rotation (rad), about the world's axes
-  Covariance6 motion_covariance{};  // of the motion since the last pose: translation (m), rotation
-                                    // (rad), about the left camera's axes; without …
-  float length_sigma = 0;  // … the relative error that all lengths share, 1 σ: the calibration's
-  float corrected_m = 0;   // that the window moved the pose by after its fit; in the covariances
-  int inliers = 0;         // points that support the pose
-  int stereo_inliers = 0;  // of these, seen by a second camera in this frame
-  double reprojection_px = 0;  // rms of the inliers' residuals, per coordinate
+
+  /// Pose of the left camera; the identity when `lost`.
+  Transform T_world_left{};
+  /// Covariance of T_world_left by dead reckoning since the first pose: position (m), then rotation
+  /// (rad), about the world's axes.
+  Covariance6 covariance{};
+  /// Covariance of the motion since the last pose, without length_sigma: translation (m), then
+  /// rotation (rad), about the left camera's axes.
+  Covariance6 motion_covariance{};
+
+  /// Relative standard deviation that all lengths share, from the calibration.
+  float length_sigma = 0;
+  /// Distance by which the window moved the fitted pose; included in the covariances.
+  float corrected_m = 0;
+
+  /// Number of points that support the pose.
+  int inliers = 0;
+  /// Number of inliers seen by a second camera in this frame.
+  int stereo_inliers = 0;
+  /// Root mean square residual of the inliers, per coordinate.
+  double reprojection_px = 0;
   bool keyframe = false;
-  FrameWorkload effort{};                 // what was done of the work beside the pose
-  std::array<float, kStages> stage_ms{};  // wall time; the parallel stages as the slower side took
-  float estimate_ms = 0;                  // wall time from the images in hand to this sample
+
+  /// Work done in addition to the pose.
+  FrameWorkload effort{};
+  /// Wall time of each stage; of parallel ones the slower side.
+  std::array<float, kStages> stage_ms{};
+  /// Wall time from the images' arrival to this sample.
+  float estimate_ms = 0;
 };
 
 }  // namespace vergence

@@ -12,25 +12,31 @@ namespace vergence {
 
 /// Evidence that the images of a rig frame were exposed together.
 enum class Pairing : std::uint8_t {
-  assumed,       // nothing proves it: a recording, or images paired by count or by arrival
-  verified,      // pulse numbers or stamps of one clock leave no other
-  contradicted,  // what should prove it contradicts itself: each image is one, nothing more is sure
+  /// There is no evidence: a recording, or images paired by count or arrival.
+  assumed,
+  /// Pulse numbers or stamps of one clock exclude any other pairing.
+  verified,
+  /// The evidence is contradictory; only the images themselves are certain.
+  contradicted,
 };
 
-/// The images of one trigger pulse. `images[k].empty()`: camera k gave none.
+/// Images of one trigger pulse. `images[k]` is empty if camera k gave none.
 ///
 /// Ownership  Views; the frame's producer keeps the slots until Estimator::process() has
 ///            returned.
-/// Time       One stamp for all: camera 0's mid-exposure. `spread`: the largest difference of the
-///            others to it.
+/// Time       One stamp for all: mid-exposure of camera 0. `spread` is the maximum deviation of the
+///            others.
 struct RigFrame {
-  std::uint64_t number = 0;  // of the pulse or of the data set's line; gaps are gaps in time
+  /// Number of the pulse or of the data set's line; gaps are gaps in time.
+  std::uint64_t number = 0;
   Stamp stamp{};
-  Duration stamp_error{};  // bound of the stamp's error; 0 where the source gives none
+  /// Bound of the stamp's error; 0 if unknown.
+  Duration stamp_error{};
   Duration spread{};
   Pairing pairing = Pairing::assumed;
   int cameras = 0;
-  std::optional<FrameWorkload> effort{};  // of a recorded drive: no more and no less is done again
+  /// Workload of a replayed frame, which is repeated exactly.
+  std::optional<FrameWorkload> effort{};
   std::array<ImageView, kMaxCameras> images{};
 };
 

@@ -4,8 +4,8 @@
 
 namespace vergence {
 
-/// Where a body was at a time. p_world = T_world_body * p_body, metres; what `world` and `body` are
-/// states who hands it over.
+/// Pose of a body at a time: p_world = T_world_body * p_body, in metres. The provider defines
+/// `world` and `body`.
 struct StampedPose {
   Stamp stamp{};
   Transform T_world_body{};

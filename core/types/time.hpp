@@ -4,7 +4,7 @@
 
 namespace vergence {
 
-/// A length of time, signed nanoseconds. Integer, so that ten years stay exact.
+/// Signed duration in nanoseconds. An integer stays exact over ten years.
 class Duration {
  public:
   constexpr Duration() noexcept = default;
@@ -23,7 +23,8 @@ class Duration {
   }
 
   [[nodiscard]] constexpr std::int64_t ns() const noexcept { return ns_; }
-  /// For arithmetic of short lengths and for printing; never to be turned back into a stamp.
+  /// For arithmetic with short durations and for printing; never convert the result back to a
+  /// stamp.
   [[nodiscard]] constexpr double to_seconds() const noexcept {
     return static_cast<double>(ns_) * 1e-9;
   }
@@ -58,9 +59,9 @@ class Instant {
   std::int64_t ns_ = 0;
 };
 
-/// Nanoseconds since the Unix epoch: what files and poses carry.
+/// Nanoseconds since the Unix epoch, as used in files and poses.
 using Stamp = Instant<struct UnixEpoch>;
-/// Nanoseconds of CLOCK_MONOTONIC: what drivers and the synchroniser reckon in.
+/// Nanoseconds of CLOCK_MONOTONIC, as used by drivers and the synchroniser.
 using HostStamp = Instant<struct Monotonic>;
 
 }  // namespace vergence

@@ -9,16 +9,17 @@
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger.hpp"
 
-/// Output of an acquisition: plain values of fixed size that go through rings.
+/// Output of an acquisition: values of fixed size that are passed through rings.
 namespace vergence {
 
-/// The images of one pulse. `rig.images` are views of the slots, valid until the frame is released.
+/// Images of one pulse. `rig.images` are views of the slots, valid until the frame is released.
 struct AcquiredFrame {
   RigFrame rig{};
-  SyncedSet set{};  // the slots, and the synchroniser's state of them
+  /// Slots of the images and the synchroniser's state.
+  SyncedSet set{};
 };
 
-/// Something that happened to a device.
+/// Change of state of a device.
 struct DeviceEvent {
   enum class Kind : std::uint8_t {
     camera_disconnected,
@@ -26,31 +27,32 @@ struct DeviceEvent {
     trigger_board_disconnected,
     trigger_board_reconnected,
     trigger_board_restarted,
-    pairing_pending,   // nothing proves any more which pulses the camera's frames belong to
-    pairing_verified,  // now something does
+    /// The association of the camera's frames with pulses is no longer verified.
+    pairing_pending,
+    /// The association is verified again.
+    pairing_verified,
   } kind = Kind::camera_disconnected;
   Stamp stamp{};
-  int camera = 0;      // camera_…, pairing_…
-  double seconds = 0;  // verified: since the first frame that was not
+  /// Camera index, for camera_… and pairing_….
+  int camera = 0;
+  /// For pairing_verified, the time since the first frame that was not verified.
+  double seconds = 0;
 };
 
-/// Receives every whole frame of a camera when it is taken, before it is paired.
-///
-/// Threads  The acquisition's; the call must not wait.
+/// Receives every complete frame of a camera before it is paired. Called on the acquisition's
+/// thread; must not block.
 class FrameObserver {
  public:
   virtual ~FrameObserver() = default;
   virtual void on_frame(std::size_t camera, const Frame& frame) noexcept = 0;
 };
 
-/// Receives the trigger board's pulses as they arrive, to record them.
-///
-/// Threads  The acquisition's; the call must not wait.
+/// Receives the trigger board's pulses on arrival, to record them. Called on the acquisition's
+/// thread; must not block.
 class PulseObserver {
  public:
   virtual ~PulseObserver() = default;
-  /// `arrival`: when the report arrived. `edge`: pulse.host, where pulse.mapped says that the
-  /// driver mapped it.
+  /// `arrival` is when the report arrived. `edge` is pulse.host, valid if pulse.mapped.
   virtual void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept = 0;
 };
 

@@ -14,7 +14,8 @@ void AcquiredQueue::push(const Item& item) noexcept {
       dropped_readings_.fetch_add(1, std::memory_order_relaxed);
       return;
     }
-    freed_.wait(seen);  // images: meanwhile the cameras drop, and count
+    // Waits with images; meanwhile the cameras drop and count frames.
+    freed_.wait(seen);
   }
   high_water_.store(std::max(high_water_.load(std::memory_order_relaxed), ring_.size()),
                     std::memory_order_relaxed);
@@ -35,8 +36,8 @@ void AcquiredQueue::stop() noexcept {
 bool AcquiredQueue::next(Acquired* out) noexcept {
   for (Item item;;) {
     const WakeEvent::Ticket seen = filled_.ticket();
-    const bool finished = finished_.load(
-        std::memory_order_acquire);  // before the ring: what was pushed before is still found
+    // Read before the ring, so that items pushed earlier are still found.
+    const bool finished = finished_.load(std::memory_order_acquire);
     if (!ring_.pop(&item)) {
       if (finished) return false;
       filled_.wait(seen);

@@ -17,55 +17,56 @@
 
 namespace vergence {
 
-/// Output queue of an acquisition, in order, on its way to the consumer's thread.
+/// Ordered output queue of an acquisition, read by the consumer's thread.
 ///
-/// Ownership  Cameras outlive it. Slots that the consumer is not given (of frames that were
-///            refused, of sets that a newer one overtook) go back to their cameras on the
-///            consumer's thread, as those do that it was given and releases.
-/// Threads    push(), finish(): one producer. next(), release(): one consumer, which may be sealed.
-///            stop(), the figures: any.
-/// Full       `wait_when_full`: the producer waits. Else the consumer skips to the newest images,
-///            readings that find the queue full are dropped, all else waits.
-/// Memory     In place. Errors: none; what was left out is counted.
+/// Ownership  The cameras must outlive it. Slots that are not given to the consumer (refused
+///            frames, superseded sets) return to their cameras on the consumer's thread, as
+///            released ones do.
+/// Threads    One producer calls push() and finish(); one consumer, which may be sealed, next() and
+///            release(). The other calls are thread-safe.
+/// Full       With `wait_when_full` the producer waits. Otherwise the consumer skips to the newest
+///            images, INS samples are dropped and counted, and everything else waits.
+/// Memory     Fixed.
 class AcquiredQueue {
  public:
-  /// Slots of a frame that was refused.
+  /// Slots of a refused frame.
   struct Refused {
     SyncedSet set{};
   };
   using Item = std::variant<AcquiredFrame, InsRecord, DeviceEvent, Refused>;
 
-  /// `cameras`: in the order of the rig; the vector outlives it.
+  /// `cameras` are in the order of the rig; the vector must outlive the queue.
   AcquiredQueue(const std::vector<CameraDevice*>& cameras, bool wait_when_full) noexcept
       : cameras_(cameras), wait_when_full_(wait_when_full) {}
 
   void push(const Item& item) noexcept;
-  /// Nothing more will be pushed: next() gives what is there, then false.
+  /// Ends the input: next() returns the remaining items, then false.
   void finish() noexcept;
-  /// The consumer may have stopped: push() does not wait from now on. finish() is still owed.
+  /// Keeps push() from waiting, because the consumer may have stopped. finish() is still required.
   void stop() noexcept;
 
-  /// The oldest item, waiting for it; images are views of their slots. False: finished.
+  /// Waits for the oldest item; images are views of their slots. Returns false once finished.
   [[nodiscard]] bool next(Acquired* item) noexcept;
   /// Call once for every set that next() returned.
   void release(const SyncedSet& set) noexcept;
 
-  /// Sets that the consumer was not given because it was late.
+  /// Number of sets skipped because the consumer was late.
   [[nodiscard]] std::uint64_t skipped_sets() const noexcept { return skipped_sets_.load(); }
   [[nodiscard]] std::uint64_t dropped_readings() const noexcept { return dropped_readings_.load(); }
-  /// Items that waited at once at most.
+  /// Maximum number of waiting items.
   [[nodiscard]] std::size_t high_water() const noexcept { return high_water_.load(); }
 
  private:
   static constexpr std::size_t kItems = 256;
-  // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost
-  // so many come at once.
+  // Live: sets that may wait for the estimator before the oldest is skipped. After a lost image
+  // this many are output together.
   static constexpr int kMaxWaiting = static_cast<int>(OpenSets::kOpen);
 
   const std::vector<CameraDevice*>& cameras_;
   bool wait_when_full_;
   Ring<Item, kItems> ring_;
-  std::atomic<int> waiting_{0};  // sets in the ring
+  // Number of sets in the ring.
+  std::atomic<int> waiting_{0};
   WakeEvent filled_, freed_;
   std::atomic<bool> stopped_{false}, finished_{false};
   std::atomic<std::uint64_t> skipped_sets_{0}, dropped_readings_{0};
@@ -74,22 +75,22 @@ class AcquiredQueue {
 
 /// Tracks whether the frame-to-pulse association of each camera is verified, and reports changes.
 ///
-/// A camera begins as verified, so that where nothing can be verified nothing is told; and as one
-/// of which no frame has come, so that a camera that is not yet there is not told of either.
-///
-/// Not thread-safe. Does not allocate. Constant time per call.
+/// A camera starts as verified and without a frame, so modes without verification and absent
+/// cameras cause no report. Not thread-safe. Does not allocate. Constant time per call.
 class PairingTracker {
  public:
   struct Change {
     bool verified = false;
-    double seconds = 0;  // verified: since the change before it
+    /// If verified, the time since the previous change.
+    double seconds = 0;
   };
 
-  /// A frame of that camera has come.
+  /// Records a frame of that camera.
   void frame(std::size_t camera) noexcept { cameras_[camera].any = true; }
-  /// It was started again.
+  /// Records a restart of that camera.
   void restarted(std::size_t camera) noexcept { cameras_[camera] = {}; }
-  /// Updates with the synchroniser's state. Nullopt: as before, or no frame has come yet.
+  /// Updates with the synchroniser's state. Returns nullopt without a change or before the first
+  /// frame.
   [[nodiscard]] std::optional<Change> update(std::size_t camera, bool verified,
                                              HostStamp now) noexcept {
     Camera& own = cameras_[camera];
@@ -103,7 +104,8 @@ class PairingTracker {
   struct Camera {
     bool any = false;
     bool verified = true;
-    HostStamp since{};  // of the last change
+    // Time of the last change.
+    HostStamp since{};
   };
 
   std::array<Camera, kMaxCameras> cameras_{};

@@ -88,7 +88,8 @@ void Acquisition::join() noexcept {
 Stamp Acquisition::stamp_of(HostStamp host) const noexcept {
   const std::int64_t ns = (options_.tie_stamp + (host - options_.tie_host)).ns(),
                      grid = options_.stamp_grid.ns();
-  return Stamp((ns + grid / 2) / grid * grid);  // after 1970
+  // Rounding is correct for stamps after 1970.
+  return Stamp((ns + grid / 2) / grid * grid);
 }
 
 void Acquisition::work() {
@@ -96,7 +97,7 @@ void Acquisition::work() {
   while (!stop_.load(std::memory_order_acquire)) {
     rounds_.fetch_add(1, std::memory_order_relaxed);
     const WakeEvent::Ticket seen = wake_.ticket();
-    // Twice: whatever arrived before an item of the first poll is there at the second.
+    // Polls twice, so that anything that arrived before an item of the first poll is found.
     poll();
     poll();
     const int device = earliest();
@@ -146,7 +147,8 @@ void Acquisition::poll_ins() {
     if (sync_out_) sync_out_->restart();
   }
   if (!ins_head_.held || !ins_head_.event) return;
-  ins_head_.held = false;  // not reported here: a comparison without readings reports it
+  // Not reported here; the comparison reports missing samples.
+  ins_head_.held = false;
   ins_head_.disconnected = true;
 }
 
@@ -158,7 +160,7 @@ int Acquisition::earliest() const {
       device = static_cast<int>(k);
       first = heads_[k].value.arrival;
     }
-  // At the same instant pulses and then the INS go first: the images may need them.
+  // At equal arrival pulses and then the INS go first, because the images may need them.
   if (ins_head_.held && (device < 0 || ins_head_.value.arrival <= first)) {
     device = ins_place();
     first = ins_head_.value.arrival;
@@ -214,7 +216,8 @@ void Acquisition::record_disconnect(int camera, HostStamp when) {
   auto& head = heads_[static_cast<std::size_t>(camera)];
   head.disconnected = true;
   sync_.absent(camera);
-  // One that started and gave nothing has not been back: it is not gone once more.
+  // A device that restarted without data was not reported as reconnected, so it is not disconnected
+  // again.
   if (!head.back) push_event(DeviceEvent::Kind::camera_disconnected, when, camera);
 }
 
@@ -237,7 +240,8 @@ void Acquisition::push_reading() {
 }
 
 void Acquisition::hand_out_sets() {
-  constexpr std::uint64_t kSettled = 30;  // sets, after which the clocks are known
+  // Number of sets after which the clocks have settled.
+  constexpr std::uint64_t kSettled = 30;
   AcquiredFrame item;
   SyncedSet& set = item.set;
   while (sync_.next(&set)) {
@@ -263,7 +267,7 @@ void Acquisition::poll_board() {
   head.held = false;
   if (head.event) {
     head.disconnected = true;
-    // As a camera: one that started and gave nothing is not gone once more.
+    // As for cameras, a restart without data is no reconnection.
     if (!head.back) push_event(DeviceEvent::Kind::trigger_board_disconnected, head.value.arrival);
     return;
   }
@@ -316,9 +320,9 @@ void Acquisition::pause_pulses() {
   }
   const bool master = options_.sync.mode == SyncMode::master_strobe;
   const Duration gap = options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1);
-  if (!master && ins_->pause(gap) == DeviceStatus::ok) return;  // InsReading::resumed ends it
-  // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not
-  // wait.
+  // InsReading::resumed ends the pause.
+  if (!master && ins_->pause(gap) == DeviceStatus::ok) return;
+  // The source of the pulses has to be stopped. Other data can wait meanwhile.
   if (master)
     cameras_[0]->stop();
   else

@@ -22,10 +22,10 @@
 
 namespace vergence {
 
-/// Counters of a drive; each written by one thread, exact after join().
+/// Counters of a run; each is written by one thread and exact after join().
 struct AcquisitionCounters {
   SyncCounters sync{};
-  /// Incomplete frames, which were refused.
+  /// Incomplete frames, which are not used.
   std::uint64_t torn = 0;
   /// Live: older sets that a newer one replaced.
   std::uint64_t dropped_sets = 0;
@@ -59,17 +59,17 @@ struct StartFailure {
   std::string message{};
 };
 
-/// Cameras, INS and board into one stream of rig frames, INS samples and device events, stamped on
-/// the host's clock tied to Unix time.
+/// Merges cameras, INS and trigger board into one stream of rig frames, INS samples and device
+/// events, with stamps on the host's clock mapped to Unix time.
 ///
-/// The drivers' threads ring a bell; one thread here takes what they have in the order of arrival,
-/// maps the stamps, pairs the images and puts everything into a ring for the consumer's thread.
-/// Merged by arrival: a mock in virtual time gives the same stream on every run.
-/// Pulses     Their reports go into the synchroniser in the order of arrival among the frames; what
-///            the driver has not mapped is mapped here, with a new fit for every boot. A pause that
-///            the synchroniser requires is asked for when a report is taken: in virtual time always
-///            at the same one. With `ins_syncout` the INS's readings report the pulses; where a gap
-///            is wanted its stream is stopped for as long, as camera 0's is with `master_strobe`.
+/// The drivers' threads notify one thread here, which takes their data in order of arrival, maps
+/// stamps, pairs images and fills a ring for the consumer's thread. Since the order is that of
+/// arrival, a mock in virtual time gives the same stream on every run.
+/// Pulses     Reports enter the synchroniser in order of arrival among the frames. Those that the
+///            driver has not mapped are mapped here, with a new fit for every boot. A pause
+///            required by the synchroniser is requested when a report is taken, in virtual time
+///            always at the same one. With `ins_syncout` the INS's samples report the pulses. A gap
+///            is then made by stopping its stream, or camera 0's with `master_strobe`.
 ///
 ///     Acquisition acquisition({&left, &right}, &ins, &board, options);
 ///     if (const auto failure = acquisition.start()) return;  // failure->device does not start
@@ -80,56 +80,58 @@ struct StartFailure {
 ///       }
 ///     acquisition.join();
 ///
-/// Ownership  Devices are configured and outlive it. Slots of a frame are the consumer's until
-///            release(). All slots go back to their cameras on the consumer's thread.
-/// Threads    next(), release(): one consumer, which may be sealed. stop(): any. The rest: the
-///            owner.
-/// Full       wait_when_full (virtual time): the devices wait. Else the consumer skips to the
-///            newest images, readings that find the ring full are dropped; counted.
-/// Errors     start() returns the device that failed; std::system_error where no thread can be had.
-///            A device that goes later is an event, and is asked again every second.
+/// Ownership  Devices are configured and outlive it. Slots of a frame belong to the consumer until
+///            release(). Slots return to their cameras on the consumer's thread.
+/// Threads    One consumer, which may be sealed, calls next() and release(). stop() is thread-safe.
+///            The owner makes the other calls.
+/// Full       With wait_when_full (virtual time) the devices wait. Otherwise the consumer skips to
+///            the newest images and INS samples are dropped; both are counted.
+/// Errors     start() returns the device that failed, or throws std::system_error if there is no
+///            thread. A later disconnect is an event, and the device is retried every second.
 class Acquisition final : private Notifier {
  public:
   struct Options {
     SyncOptions sync{};
     bool wait_when_full = false;
-    Stamp tie_stamp{};     // this stamp …
-    HostStamp tie_host{};  // … was this time of the host's clock
-    Duration stamp_grid =
-        Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
-    FrameObserver* frame_observer = nullptr;  // null: frames are not observed
-    PulseObserver* pulse_observer = nullptr;  // set by start(); null: pulses are not recorded
+    /// Unix time and host time of the same instant, which map stamps.
+    Stamp tie_stamp{};
+    HostStamp tie_host{};
+    /// Stamps are rounded to multiples of this duration, > 0.
+    Duration stamp_grid = Duration::nanoseconds(1);
+    /// Null if frames are not observed.
+    FrameObserver* frame_observer = nullptr;
+    /// Set by start(); null if pulses are not recorded.
+    PulseObserver* pulse_observer = nullptr;
   };
 
-  /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
+  /// `ins` may be null. Cameras are in the order of the rig.
   Acquisition(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger,
               const Options& options);
   ~Acquisition();
 
-  /// Order of starting: waiting for pulses first, making them last: the board, the INS with
-  /// `ins_syncout`, camera 0 with `master_strobe`. → the device that could not be started; the
-  /// stream has not begun then. `observer`: receives the pulses, outlives the acquisition; may be
-  /// null.
+  /// Starts the devices that wait for pulses first and those that make them last: the trigger
+  /// board, the INS with `ins_syncout`, camera 0 with `master_strobe`. Returns the device that
+  /// failed; the stream has then not begun. `observer` receives the pulses and must outlive the
+  /// acquisition; may be null.
   [[nodiscard]] std::optional<StartFailure> start(PulseObserver* observer = nullptr);
-  /// False: the drive is over, or stop() was called.
+  /// Returns false once the run is over or stop() was called.
   [[nodiscard]] bool next(Acquired* item) noexcept { return queue_.next(item); }
   /// Call once for every AcquiredFrame that next() returned.
   void release(const AcquiredFrame& frame) noexcept { queue_.release(frame.set); }
-  /// Devices that are gone are asked to come back at every poll, a second apart at least, and a
-  /// poll follows on whatever a device brings. Called where time passes while no device brings
-  /// anything: some times a second.
+  /// Triggers a poll, which retries disconnected devices at most once per second. A poll also
+  /// follows any data, so call this some times per second while no device delivers.
   void wake() noexcept { notify(); }
-  /// Number of iterations of its thread: it stands still while a device holds that up. Any thread.
+  /// Number of iterations of the thread, constant while a device blocks it. Thread-safe.
   [[nodiscard]] std::uint64_t rounds() const noexcept {
     return rounds_.load(std::memory_order_relaxed);
   }
-  /// Ends the stream: next() gives what is in the ring, then false.
+  /// Ends the stream: next() returns the remaining items, then false.
   void stop() noexcept;
-  /// Waits for the thread, stops the devices. After it the counters are exact.
+  /// Waits for the thread and stops the devices. The counters are exact afterwards.
   void join() noexcept;
 
   [[nodiscard]] const AcquisitionCounters& counters() const noexcept { return counters_; }
-  /// Cameras that were gone at the end.
+  /// Cameras that were disconnected at the end.
   [[nodiscard]] const std::vector<int>& missing() const noexcept { return missing_; }
 
  private:
@@ -137,21 +139,21 @@ class Acquisition final : private Notifier {
   void work();
   void poll();
   void poll_ins();
-  /// Which device's oldest item arrived first: a camera, or after those the INS, the board. −1:
-  /// none.
+  /// Index of the device whose oldest item arrived first: a camera, then the INS and the trigger
+  /// board. −1 if there is none.
   [[nodiscard]] int earliest() const;
   [[nodiscard]] int ins_place() const noexcept { return static_cast<int>(heads_.size()); }
   void push_frame(std::size_t k);
   void push_reading();
   void poll_board();
   void push_pulse(const Pulse& pulse);
-  /// Makes the gap that the synchroniser requires.
+  /// Makes the gap required by the synchroniser.
   void pause_pulses();
-  /// Cameras that have given nothing for ten seconds of pulses hang, whatever their drivers know:
-  /// they are stopped, and asked to come back like any that is gone.
+  /// Stops cameras without a frame during ten seconds of pulses, whatever their drivers report, and
+  /// retries them like disconnected ones.
   void give_up_mute_cameras(HostStamp now);
   void record_disconnect(int camera, HostStamp when);
-  /// Tells of cameras whose pairing was verified, or is not any more.
+  /// Reports cameras whose pairing is newly verified or no longer verified.
   void record_proofs(HostStamp now);
   void hand_out_sets();
   void push_event(DeviceEvent::Kind kind, HostStamp when, int camera = 0, double seconds = 0);

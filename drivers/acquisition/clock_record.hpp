@@ -9,18 +9,16 @@
 
 namespace vergence {
 
-/// A camera's clock on the host's, from its frames.
+/// Maps a camera's clock to the host's by its frames.
 ///
-/// From the end of an exposure to the arrival is always as long, from its start not: exposures that
-/// grow would look like a clock that drifts. So the clock is fitted to where the frame would have
-/// started with the first frame's exposure.
-///
-/// Not thread-safe. Memory: that of a ClockMapper.
+/// The delay from the end of an exposure to its arrival is constant, the one from its start is not:
+/// growing exposures would appear as drift. So the clock is fitted to stamps shifted by the change
+/// of exposure since the first frame. Not thread-safe.
 class CameraClock {
  public:
   explicit CameraClock(const ClockMapperOptions& clock) : clock_(clock) {}
 
-  /// The start of its exposure on the host's clock.
+  /// Start of the exposure on the host's clock.
   [[nodiscard]] MappedStamp start_of(const Frame& frame) noexcept {
     if (exposure_ == Duration{}) exposure_ = frame.exposure;
     const Duration longer = frame.exposure - exposure_;
@@ -28,25 +26,27 @@ class CameraClock {
     start.host = start.host - longer;
     return start;
   }
-  /// It was started again: its clock is another.
+  /// Called after a restart, which changes the camera's clock.
   void restart() noexcept { clock_.restart(); }
-  /// Times that the clock was found set.
+  /// Number of detected steps of the clock.
   [[nodiscard]] std::uint64_t resets() const noexcept { return clock_.resets(); }
 
  private:
   ClockMapper clock_;
-  Duration exposure_{};  // of the first frame: what the mapper's least delay holds for
+  // Exposure of the first frame, for which the minimum delay is valid.
+  Duration exposure_{};
 };
 
-/// Quality of a device clock's mapping, from its stamps and where they were mapped to.
-///
-/// Not thread-safe. Fixed memory. Units: the error of a stamp is a bound.
+/// Quality of the mapping of a device's clock. Not thread-safe. Fixed memory.
 class ClockRecord {
  public:
   void observe(DeviceStamp device, const MappedStamp& mapped) noexcept {
-    constexpr std::uint64_t kSettled = 60;     // stamps after which a clock is known: seconds
-    constexpr std::int64_t kOddDrift = 2'000;  // ppm, no crystal: the clock was set
-    constexpr Duration kEnough = Duration::seconds(5);  // for a drift that means something
+    //  Number of stamps after which the mapping has settled.
+    constexpr std::uint64_t kSettled = 60;
+    // In ppm; a larger drift means that the clock was set.
+    constexpr std::int64_t kOddDrift = 2'000;
+    // Minimum span for a meaningful drift.
+    constexpr Duration kEnough = Duration::seconds(5);
     error_ = mapped.error;
     if (any_ && device > last_device_) {
       const double step = static_cast<double>((device - last_device_).ns()),
@@ -73,16 +73,16 @@ class ClockRecord {
     ++stamps_;
   }
 
-  /// The device was restarted: its stamps so far say nothing of those to come.
+  /// Called after a restart, which makes earlier stamps irrelevant.
   void restart() noexcept { any_ = false; }
 
   [[nodiscard]] std::uint64_t stamps() const noexcept { return stamps_; }
-  /// Drift of the host clock against the device's, ppm; 0 if unknown.
+  /// Drift of the host's clock against the device's, in ppm; 0 if unknown.
   [[nodiscard]] double drift_ppm() const noexcept { return drift_ppm_; }
-  [[nodiscard]] Duration error() const noexcept { return error_; }  // of the newest stamp
-  [[nodiscard]] Duration worst_error() const noexcept {
-    return worst_;
-  }  // once the clock was known
+  /// Error bound of the newest stamp.
+  [[nodiscard]] Duration error() const noexcept { return error_; }
+  /// Largest error bound after the mapping has settled.
+  [[nodiscard]] Duration worst_error() const noexcept { return worst_; }
 
  private:
   bool any_ = false;
@@ -93,15 +93,15 @@ class ClockRecord {
   Duration error_{}, worst_{};
 };
 
-/// Reports of pulses on the host's clock: what the driver has not mapped is mapped here, with a new
-/// fit for every boot.
-///
-/// Not thread-safe. Memory: that of a ClockMapper. Errors: none; a reboot is reported.
+/// Maps reports of pulses to the host's clock if the driver has not, with a new fit for every boot.
+/// Not thread-safe.
 class PulseMapper {
  public:
   struct Report {
-    Pulse pulse{};          // mapped
-    bool rebooted = false;  // of another boot than the one before it
+    /// Mapped pulse.
+    Pulse pulse{};
+    /// True if the previous pulse had another boot.
+    bool rebooted = false;
   };
 
   explicit PulseMapper(const ClockMapperOptions& clock) : clock_(clock) {}
@@ -118,13 +118,14 @@ class PulseMapper {
     report.pulse.host_error = at.error;
     return report;
   }
-  /// Times that the board's clock was found set.
+  /// Number of detected steps of the trigger board's clock.
   [[nodiscard]] std::uint64_t clock_resets() const noexcept { return clock_.resets(); }
 
  private:
   ClockMapper clock_;
   bool any_ = false;
-  std::uint32_t boot_ = 0;  // of the newest pulse
+  // Boot of the newest pulse.
+  std::uint32_t boot_ = 0;
 };
 
 }  // namespace vergence

@@ -7,10 +7,10 @@
 
 namespace vergence {
 
-/// The oldest item of a device that was not consumed yet, and whether the device is there: one
-/// way to poll cameras, INS and board.
+/// Oldest unconsumed item of a device and its connection state: a common way to poll cameras, INS
+/// and trigger board.
 ///
-/// Ownership  The device outlives it. Threads: the acquisition's, which calls all of it.
+/// The device must outlive it. Only the acquisition's thread calls it.
 template <class Device, class Value>
 struct DeviceHead {
   /// Minimum interval of reconnection attempts, ns: opening a bus device takes time.
@@ -25,7 +25,7 @@ struct DeviceHead {
   /// With `held`: the item is a disconnect at value.arrival.
   bool event = false;
   bool disconnected = false;
-  /// The device was started again, which is not reported yet.
+  /// True after a restart that is not reported yet.
   bool back = false;
   bool ended = false;
   /// Pulses reported since the newest frame of a camera.
@@ -34,8 +34,8 @@ struct DeviceHead {
   std::int64_t ask_ns = 0;
   Value value{};
 
-  /// `ready`: what a device that is started again notifies. `ask_always` (virtual time): a device
-  /// that is gone is asked at each poll.
+  /// Polls the device. A restarted device notifies `ready`. With `ask_always` (virtual time) a
+  /// disconnected device is retried at each poll.
   void poll(Notifier* ready, bool ask_always) {
     if (device == nullptr) ended = true;
     if (held || ended || (disconnected && !start_again(ready, ask_always))) return;

@@ -10,82 +10,88 @@
 
 namespace vergence {
 
-/// Time without an image after which a camera of this rate counts as disconnected:
-/// ten intervals, two seconds at least. Zero, any time: it exposes when it is told to.
+/// Time without an image after which a camera of this rate counts as disconnected: ten intervals,
+/// at least two seconds. Zero disables the check, as for a camera that exposes only when triggered.
 [[nodiscard]] Duration longest_silence(CameraTrigger trigger, double rate_hz) noexcept;
 
-/// A camera's frames on their way from the transport to the consumer, who has which slot, and what
-/// state the stream is in: wait() and release() of a CameraDevice.
+/// Queue of a camera's frames from the transport to the consumer. It tracks the owner of each slot
+/// and the state of the stream, and implements wait() and release() of a CameraDevice.
 ///
 ///     queue.begin(ready);                                    // the owner's start()
 ///     if (!queue.offer(frame)) give_back(frame.slot);        // the transport, each image
 ///     if (lost_it) queue.lose(now);                          // `gone`, once all is handed out
 ///     if (queue.release(frame.slot)) give_back(frame.slot);  // the consumer's release()
 ///
-/// Ownership  A slot that was offered is the queue's, one that was handed out the consumer's until
-///            release(); what becomes of it then is the driver's.
-/// Threads    Each call by whom its comment names. One mutex, held for a few assignments and the
-///            Notifier's call only: after end() there are no notifications.
-/// Memory     Fixed, a place for every slot there can be: it is never full.
-/// Time       No call waits but wait(), which ends at its limit.
-/// Errors     Nothing throws.
+/// Ownership  An offered slot belongs to the queue, a handed-out slot to the consumer until
+///            release(). After that it belongs to the driver again.
+/// Threads    The comment above each group of calls names the thread. One mutex is held for a few
+///            assignments and for the Notifier's call, so there are no notifications after end().
+/// Memory     Fixed. The queue has room for every possible slot and is never full.
+/// Time       Only wait() blocks, at most for its limit.
+/// Errors     No call throws.
 class FrameQueue {
  public:
-  /// From streaming to gone by lose(); back: it is still gone, and start() may go on.
+  /// lose() leads from streaming to gone. `back` means that the device has reconnected and start()
+  /// can resume.
   enum class State : std::uint8_t { stopped, streaming, gone, back };
 
-  // The owner.
-  /// Streams from now on. What was offered and not taken stays to be drained first. `ready` may be
-  /// null. `silence`: so long without an image, for the first one longer, and the device is gone;
-  /// zero: it may rest.
+  // Calls of the owner.
+
+  /// Starts streaming. Frames that were offered and not taken stay and are to be drained first.
+  /// `ready` may be null. `silence` is the time without an image after which the device counts as
+  /// disconnected (longer for the first image); zero disables this check.
   void begin(Notifier* ready, Duration silence = {}) noexcept;
-  /// Stopped from now on; who waits is told.
+  /// Stops streaming and wakes the thread in wait().
   void end() noexcept;
-  /// Ends a failed start: disconnected at this time, or since earlier (no `when`).
+  /// Ends a failed start. The disconnect gets the time `when`, or keeps its earlier time.
   void fail(HostStamp when) noexcept;
   void fail() noexcept;
-  /// Takes out a frame that was offered and not consumed; false: there is none. Precondition:
-  /// no thread offers.
+  /// Takes out a frame that was offered and not consumed; returns false if there is none.
+  /// Precondition: no thread offers.
   [[nodiscard]] bool drain(FrameSlot* slot) noexcept;
   void count_start() noexcept;
 
-  // The transport.
-  /// False: it does not stream, the slot stays the transport's. Precondition: the slot is neither
-  /// offered nor held.
+  // Calls of the transport.
+
+  /// Offers a frame. Returns false if the stream is not running; the slot then stays with the
+  /// transport. Precondition: the slot is neither offered nor held.
   [[nodiscard]] bool offer(const Frame& frame) noexcept;
   void count_lost(std::uint64_t exposures) noexcept;
   void count_underrun() noexcept;
-  /// From streaming: the device is gone. What was offered is still handed out first. Elsewhere it
-  /// does nothing.
+  /// Changes from streaming to gone. Frames offered before are still handed out. Does nothing in
+  /// any other state.
   void lose(HostStamp when) noexcept;
-  /// From gone: the stream can be begun again. The Notifier is told, again at every call.
+  /// Changes from gone to back, so that start() can resume, and notifies the Notifier at every
+  /// call.
   void ready_again() noexcept;
 
-  // The consumer.
-  /// As CameraDevice::wait(). Who has not waited for kAway cannot tell a silent device: the
-  /// transport may have been held up as well.
+  // Call of the consumer.
+
+  /// Same contract as CameraDevice::wait(). A consumer that has not waited for kAway does not
+  /// detect a silent device, because the transport may have been held up as well.
   [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept;
-  // The releaser.
-  /// False: the consumer does not have it.
+
+  /// Call of the releaser. Returns false if the consumer does not hold the slot.
   bool release(FrameSlot slot) noexcept;
 
-  // Any thread.
+  // Calls of any thread.
+
   [[nodiscard]] State state() const noexcept;
-  /// Streaming, gone or back: not stopped.
+  /// True if the state is not `stopped`.
   [[nodiscard]] bool started() const noexcept { return state() != State::stopped; }
-  /// Checks whether the device can be queried now. → ok (it streams), stopped, disconnected
+  /// Returns whether the device can be queried now. → ok (it streams), stopped, disconnected
   [[nodiscard]] DeviceStatus standing() const noexcept;
-  /// Slots that the consumer has.
+  /// Number of slots held by the consumer.
   [[nodiscard]] std::size_t held() const noexcept;
-  /// Slots that are offered or that the consumer has.
+  /// Number of slots that are offered or held by the consumer.
   [[nodiscard]] std::size_t out() const noexcept;
   [[nodiscard]] bool is_out(FrameSlot slot) const noexcept;
   [[nodiscard]] CameraStatistics statistics() const noexcept;
 
  private:
   static constexpr Duration kAway = Duration::seconds(1);
-  static constexpr Duration kFirstImage =
-      Duration::seconds(10);  // after begin(), at least: sensors that power up take their time
+  // Minimum time for the first image after begin(), because sensors need time to power up.
+  static constexpr Duration kFirstImage = Duration::seconds(10);
 
   void hear() noexcept;
   [[nodiscard]] DeviceStatus wait_locked(std::unique_lock<std::mutex>* lock, Duration limit,
@@ -96,13 +102,18 @@ class FrameQueue {
   std::condition_variable changed_;
   State state_ = State::stopped;
   HostStamp disconnected_at_{};
-  Duration silence_{};           // zero: no limit
-  bool heard_any_ = false;       // an image since begin()
-  HostStamp heard_{}, asked_{};  // the newest image; the end of the newest wait()
+  // Zero means no limit.
+  Duration silence_{};
+  // True after the first image since begin().
+  bool heard_any_ = false;
+  // Time of the newest image, and end of the newest wait().
+  HostStamp heard_{}, asked_{};
   Notifier* notifier_ = nullptr;
-  std::array<Frame, FramePool::kMaxSlots> frames_{};  // offered, a ring
+  // Ring of the offered frames.
+  std::array<Frame, FramePool::kMaxSlots> frames_{};
   std::size_t first_ = 0, offered_ = 0;
-  std::uint64_t offered_slots_ = 0, held_slots_ = 0;  // a bit a slot
+  // Bit sets, indexed by slot.
+  std::uint64_t offered_slots_ = 0, held_slots_ = 0;
   CameraStatistics statistics_{};
 };
 

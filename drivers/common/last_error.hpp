@@ -6,15 +6,15 @@
 
 namespace vergence {
 
-/// The message about a device's last failure: what, where, what to do. One thread's calls fail
-/// while another asks why.
+/// Message about a device's last failure: the problem, its place and the fix. One thread may read
+/// it while the calls of another fail.
 ///
-/// Threads  Any. Memory: that of the message. Errors: none but std::bad_alloc of get().
+/// Every call is thread-safe. Only get() may throw std::bad_alloc.
 ///
 ///     return last_error_.refuse(DeviceStatus::busy, "the camera streams; stop it first");
 class LastError : public Published<std::string> {
  public:
-  /// The status as it is, with its reason kept.
+  /// Stores the message and returns `status` unchanged.
   template <class Status>
   [[nodiscard]] Status refuse(Status status, std::string message) noexcept {
     set(std::move(message));

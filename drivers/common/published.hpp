@@ -5,19 +5,20 @@
 
 namespace vergence {
 
-/// A value that one thread keeps up to date and others read, whole.
+/// Value that one thread updates and others read without tearing.
 ///
-/// Threads  offer(), set(): the writer. get(): any. Time: offer() never waits for a reader.
-/// Memory   That of the value. Errors: what its copying throws.
+/// The writer calls offer() and set(), any thread get(). offer() never waits for a reader. Errors
+/// are those of copying the value.
 template <class Value>
 class Published {
  public:
-  /// While a reader holds it, the value before stays until the next call.
+  /// Updates the value, unless a reader is copying it: then the old value stays until the next
+  /// call.
   void offer(const Value& value) noexcept(kCopies) {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (lock.owns_lock()) value_ = value;
   }
-  /// Waits for a reader's copy.
+  /// Updates the value; waits while a reader copies it.
   void set(Value value) noexcept {
     const std::lock_guard lock(mutex_);
     value_ = std::move(value);

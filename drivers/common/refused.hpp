@@ -3,13 +3,13 @@
 
 namespace vergence {
 
-/// Thrown where a device or its driver refuses one of several steps; the message is kept
-/// elsewhere. Off the real-time path.
+/// Thrown if a device or its driver refuses one of several steps. The message is stored elsewhere.
+/// Not for the real-time path.
 struct Refused {
   DeviceStatus status = DeviceStatus::failed;
 };
 
-/// Takes the steps up to the first that is Refused. → ok, or its status
+/// Runs the steps up to the first that throws Refused. → ok, or its status
 template <class Steps>
 [[nodiscard]] DeviceStatus run_steps(const Steps& steps) {
   try {

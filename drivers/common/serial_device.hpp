@@ -15,19 +15,19 @@
 
 namespace vergence {
 
-/// Base of devices on a serial link: the link and its factory, the thread that reads
-/// it, the ring to the consumer, and the reopening after the device was gone. A driver derives from
-/// it and fills in what its protocol does.
+/// Base of devices on a serial link. It has the link and its factory, the thread that reads it, the
+/// ring to the consumer and the reopening after a disconnect. A driver derives from it and
+/// implements its protocol.
 ///
-/// States     The thread begins (begin(): the device streams), reads (read_on()), and on anything
-///            but `stopped` and `ended` reports `disconnected` once and reopens every
-///            kReopenInterval until the device is back, also where it opens but does not begin;
-///            `back` precedes its next reading.
-/// Ownership  The derived class calls stop_thread() in its destructor: the hooks are its own.
-/// Threads    Owner's thread: the protected functions named so. The hooks run on the device's
+/// States     The thread calls begin() until the device streams, then read_on(). On any status but
+///            `stopped` and `ended` it reports `disconnected` once and reopens every
+///            kReopenInterval until begin() succeeds. A `back` precedes the next reading.
+/// Ownership  The derived class calls stop_thread() in its destructor, because the hooks are its
+///            members.
+/// Threads    Functions of the owner's thread are marked below. The hooks run on the device's
 ///            thread, which owns line() from start_thread() to stop_thread().
-/// Memory     The thread allocates only while the device is gone or being set up.
-/// Errors     Nothing throws out of the thread; an exception in reopen() is a failed attempt.
+/// Memory     The thread allocates only while the device is disconnected or being configured.
+/// Errors     The thread does not throw; an exception in reopen() is a failed attempt.
 template <class Value, std::size_t kRing>
 class SerialDevice {
  public:
@@ -42,24 +42,25 @@ class SerialDevice {
       : place_(std::move(place)), thread_name_(thread_name) {}
   virtual ~SerialDevice() = default;
 
-  // ---- hooks, on the device's thread
+  // Hooks, called on the device's thread.
 
-  /// Puts the device behind line() into streaming. → ok, stopped, ended; anything else:
+  /// Makes the device behind line() stream. → ok, stopped, ended; anything else counts as
   /// disconnected
   [[nodiscard]] virtual DeviceStatus begin() noexcept = 0;
-  /// Reads and hands out. → ok (begin again), stopped, ended; anything else: disconnected
+  /// Reads and hands out until interrupted. → ok (begin again), stopped, ended; anything else
+  /// counts as disconnected
   [[nodiscard]] virtual DeviceStatus read_on() noexcept = 0;
-  /// Opens the line and finds the device again. → ok, or the attempt failed
+  /// Opens the link and finds the device again. → ok, or the attempt failed
   [[nodiscard]] virtual DeviceStatus reopen() = 0;
-  /// begin() or read_on() returned this, and it was not `stopped`.
+  /// Called after begin() or read_on() returned this status, unless it was `stopped`.
   virtual void interrupted(DeviceStatus /*status*/) noexcept {}
-  /// The thread's last call.
+  /// Last call of the thread.
   virtual void finished() noexcept {}
 
-  // ---- owner's thread
+  // Functions of the owner's thread.
 
   [[nodiscard]] SerialLinkFactory& place() const noexcept { return *place_; }
-  /// Null: not open. Owner's thread while there is no other, else the device's.
+  /// Null if not open. Belongs to the device's thread while it runs, else to the owner's.
   [[nodiscard]] SerialLink* line() const noexcept { return line_.get(); }
   [[nodiscard]] DeviceStatus open_line(const LineSettings& settings) {
     DeviceStatus status = DeviceStatus::ok;
@@ -73,15 +74,16 @@ class SerialDevice {
     const std::lock_guard lock(line_mutex_);
     line = std::move(line_);
   }
-  /// Asked once, when the device is opened.
+  /// Queries once, when the device is opened, whether the link runs in virtual time.
   void query_virtual_time() { virtual_time_ = place_->pass(Duration{}); }
   [[nodiscard]] bool virtual_time() const noexcept { return virtual_time_; }
 
-  /// As CameraDevice::start(). The thread runs on when it is there already: streaming, or gone and
-  /// perhaps back.
+  /// Same contract as CameraDevice::start(). A thread that already runs continues, whether the
+  /// device streams, is disconnected or has reconnected.
   [[nodiscard]] DeviceStatus start_thread(Notifier* ready) noexcept {
     if (thread_.joinable()) return out_.start(ready);
-    out_.clear();  // of the start before: its readings are past
+    // Readings of the previous start are outdated.
+    out_.clear();
     const DeviceStatus status = out_.start(ready);
     if (status != DeviceStatus::ok) return status;
     try {
@@ -111,14 +113,14 @@ class SerialDevice {
   }
   [[nodiscard]] bool running() const noexcept { return thread_.joinable(); }
 
-  // ---- any thread
+  // Functions of any thread.
 
   [[nodiscard]] const std::atomic<bool>& stopping() const noexcept { return stopping_; }
   [[nodiscard]] bool stop_requested() const noexcept {
     return stopping_.load(std::memory_order_acquire);
   }
   [[nodiscard]] bool streaming() const noexcept { return out_.streaming(); }
-  /// Gone, and not back yet.
+  /// True from a disconnect until the device has reconnected.
   [[nodiscard]] bool away() const noexcept { return away_.load(std::memory_order_acquire); }
   [[nodiscard]] std::uint64_t overruns() const noexcept {
     return overruns_.load(std::memory_order_relaxed);
@@ -127,7 +129,7 @@ class SerialDevice {
     return starts_.load(std::memory_order_relaxed);
   }
 
-  /// Consumer's thread. `disconnected`: *value has its `arrival` set.
+  /// Called on the consumer's thread. With `disconnected`, value->arrival is set.
   [[nodiscard]] DeviceStatus take(Duration limit, Value* value) noexcept {
     Item item;
     const DeviceStatus status = out_.take(limit, &item);
@@ -136,14 +138,15 @@ class SerialDevice {
     return status;
   }
 
-  // ---- the device's thread
+  // Functions of the device's thread.
 
-  /// A reading; dropped and counted when the ring is full, but for virtual time, which waits.
+  /// Hands out a reading. If the ring is full, the reading is dropped and counted; in virtual time
+  /// the call waits instead.
   void hand_out(const Value& value, HostStamp arrival) noexcept {
     push({Item::What::item, arrival, value}, virtual_time_);
   }
-  /// The device streams. Called after begin(); a driver that hands out while it begins calls it
-  /// itself before that.
+  /// Reports that the device streams. Called after begin(); a driver that hands out readings during
+  /// begin() calls it first.
   void report_streaming(HostStamp now) noexcept {
     away_.store(false, std::memory_order_release);
     if (std::exchange(reported_disconnect_, false)) push({Item::What::back, now, {}}, true);
@@ -171,19 +174,21 @@ class SerialDevice {
       away_.store(true, std::memory_order_release);
       if (!std::exchange(reported_disconnect_, true)) push({Item::What::gone, when, {}}, true);
       close_line();
-      // It opens well and answers at once: without a pause it would be asked as fast as it answers.
+      // The link opened, but begin() failed: without a pause the device would be retried
+      // continuously.
       if (refused) rest(kReopenInterval);
       if (!come_back()) break;
     }
     finished();
   }
 
-  /// False: stopped.
+  /// Reopens the device until it succeeds. Returns false if stopped.
   [[nodiscard]] bool come_back() noexcept {
     while (!stop_requested()) {
       try {
         if (reopen() == DeviceStatus::ok) return true;
-      } catch (const std::exception&) {  // out of memory: perhaps not the next time
+        // Out of memory; the next attempt may succeed.
+      } catch (const std::exception&) {
       }
       close_line();
       rest(kReopenInterval);
@@ -212,7 +217,8 @@ class SerialDevice {
   std::unique_ptr<SerialLinkFactory> place_;
   const char* const thread_name_;
   bool virtual_time_ = false;
-  std::mutex line_mutex_;  // of the pointer: stop_thread() wakes a line that may be replaced
+  // Guards the pointer line_, because stop_thread() wakes a link that may be replaced.
+  std::mutex line_mutex_;
   std::unique_ptr<SerialLink> line_;
   Stream<Value, kRing> out_;
   std::atomic<bool> stopping_{false}, away_{false};

@@ -11,10 +11,10 @@
 
 namespace vergence {
 
-/// An INS or satellite receiver on a serial line: all of InsDevice except what its protocol
-/// does. Readings of kRing wait for their consumer.
+/// INS or satellite receiver on a serial link: all of InsDevice except its protocol. At most kRing
+/// readings wait for their consumer.
 ///
-/// States, ownership, threads, memory, errors  As SerialDevice and InsDevice.
+/// States, ownership, threads, memory and errors are those of SerialDevice and InsDevice.
 template <std::size_t kRing>
 class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRing> {
  public:
@@ -47,9 +47,10 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
     info_.place = this->place().name();
   }
 
-  /// Opens the line with the device's settings.
+  /// Opens the link with the device's settings.
   [[nodiscard]] virtual DeviceStatus open() = 0;
-  /// Stopped, and opened again. Not ok: last_error_ says why. Owner's thread.
+  /// Stops the device and opens it again. If not ok, last_error_ has the reason. Call from the
+  /// owner's thread.
   [[nodiscard]] DeviceStatus open_anew() {
     stop();
     this->close_line();
@@ -60,20 +61,23 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
     return status;
   }
 
-  /// As a decoder has counted since the device was opened. The device's thread, or the owner's
-  /// while there is none.
+  /// Sets the counters to the decoder's totals since the device was opened. Called on the device's
+  /// thread, or on the owner's while it does not run.
   void count(std::uint64_t lost, std::uint64_t malformed, std::uint64_t restarts) noexcept {
     lost_.store(lost, std::memory_order_relaxed);
     malformed_.store(malformed, std::memory_order_relaxed);
     restarts_.store(restarts, std::memory_order_relaxed);
   }
 
-  // The owner's thread.
+  // The following members belong to the owner's thread.
   DeviceInfo info_{};
   std::string last_error_{}, remark_{};
-  bool configured_ = false;  // start() may go on
+  /// True once start() is allowed.
+  bool configured_ = false;
   double rate_hz_ = 0;
-  std::uint32_t baud_ = 0;  // at which the device last sent something; 0: not yet. As line()
+  /// Baud rate at which the device last sent data; 0 if unknown. Owned by the same thread as
+  /// line().
+  std::uint32_t baud_ = 0;
 
  private:
   std::atomic<std::uint64_t> delivered_{0}, lost_{0}, malformed_{0}, restarts_{0};

@@ -11,19 +11,19 @@
 
 namespace vergence {
 
-/// One kind of INS or satellite receiver on serial lines.
+/// Driver for one kind of INS or satellite receiver on serial links.
 ///
-/// open() takes a port (`/dev/ttyUSB0`, a link to one), not a serial number: a device is found by
-/// the line it is on; empty: the only serial port on USB. enumerate() lists the ports on USB, and
-/// sends nothing to them.
+/// A device is identified by its port (`/dev/ttyUSB0` or a link to one) instead of a serial number.
+/// An empty port selects the only serial port on USB. enumerate() lists the ports on USB and sends
+/// nothing to them.
 template <class Device, class Options>
 class SerialInsDriver final : public InsDriver {
  public:
-  /// `name`: of the row in the table of INS drivers.
+  /// `name` is that of the row in the table of INS drivers.
   SerialInsDriver(const char* name, const Options& options) : name_(name), options_(options) {}
 
   [[nodiscard]] std::vector<DeviceInfo> enumerate() override { return usb_serial_ports(name_); }
-  /// → as Device::connect()
+  /// → the same statuses as Device::connect()
   [[nodiscard]] std::unique_ptr<InsDevice> open(std::string_view port,
                                                 DeviceStatus* status) override {
     const std::string found = only_usb_serial_port(port, status, &last_error_);

@@ -7,11 +7,12 @@
 
 namespace vergence {
 
-/// Serial ports on USB, for a driver's enumerate(). Nothing is sent to them.
+/// Serial ports on USB, for a driver's enumerate(). Sends nothing to them.
 [[nodiscard]] std::vector<DeviceInfo> usb_serial_ports(std::string_view driver);
 
-/// `port`, or, where it is empty, the only serial port on USB. Empty: there is none (*status
-/// not_found) or more than one (bad_configuration), *error says which.
+/// Returns `port`, or the only serial port on USB if `port` is empty. Returns an empty string if
+/// there is none (*status is not_found) or more than one (bad_configuration); *error has the
+/// reason.
 [[nodiscard]] std::string only_usb_serial_port(std::string_view port, DeviceStatus* status,
                                                std::string* error);
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array<const char*, 2> kHalf{"left", "right"};
 
-/// The camera behind both halves.
+/// The camera behind both halves. It receives the camera's notifications.
 class Whole final : public Notifier {
  public:
   explicit Whole(std::unique_ptr<CameraDevice> camera) : camera_(std::move(camera)) {}
@@ -97,7 +97,8 @@ class Whole final : public Notifier {
   }
 
   void stop() noexcept {
-    camera_->stop();  // wakes who waits
+    // Wakes the thread that waits.
+    camera_->stop();
     const std::lock_guard fetching(fetching_);
     const std::lock_guard lock(mutex_);
     for (Waiting& w : waiting_)
@@ -126,7 +127,7 @@ class Whole final : public Notifier {
     int width = 0, height = 0;
     bool operator==(const Size&) const = default;
   };
-  /// Frames that one half has not handed out yet.
+  /// Frames that one half has not yet handed out.
   struct Waiting {
     std::array<Frame, FramePool::kMaxSlots> frames{};
     std::size_t first = 0, count = 0;
@@ -152,7 +153,7 @@ class Whole final : public Notifier {
     return true;
   }
 
-  /// A slot is held once at a time, and there are kMaxSlots: it always fits.
+  /// Never overflows: a slot is queued at most once, and there are kMaxSlots places.
   void queue(const Frame& frame) noexcept {
     for (Waiting& w : waiting_) {
       w.frames[(w.first + w.count) % w.frames.size()] = frame;
@@ -177,16 +178,21 @@ class Whole final : public Notifier {
   std::unique_ptr<CameraDevice> camera_;
   std::array<std::atomic<Notifier*>, 2> ready_{};
 
-  std::mutex fetching_;  // held by who waits for the camera's next frame; before mutex_
+  // Held while waiting for the camera's next frame; locked before mutex_.
+  std::mutex fetching_;
 
-  mutable std::mutex mutex_;  // of what follows, never held across a wait
+  // Guards the members below; never held during a wait.
+  mutable std::mutex mutex_;
   std::array<std::optional<Size>, 2> sizes_{};
   std::array<Waiting, 2> waiting_{};
-  std::array<std::uint8_t, FramePool::kMaxSlots> users_{};  // halves that have a slot, by slot
-  std::size_t held_ = 0;                                    // slots
+  // Number of halves that hold a slot, indexed by slot.
+  std::array<std::uint8_t, FramePool::kMaxSlots> users_{};
+  // Number of slots held by the halves.
+  std::size_t held_ = 0;
   bool disconnected_ = false;
   HostStamp disconnected_at_{};
-  std::array<bool, 2> noticed_{};  // that it is gone
+  // True for a half that has reported the disconnect.
+  std::array<bool, 2> noticed_{};
 };
 
 class Half final : public CameraDevice {

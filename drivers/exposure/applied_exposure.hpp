@@ -4,11 +4,11 @@
 
 namespace vergence::exposure {
 
-/// Which exposure a frame had, of a camera that does not say: the one that was in its registers
-/// when the frame's exposure began.
+/// Exposure of a frame from a camera that does not report it: the setting in its registers when the
+/// frame's exposure began.
 ///
-/// Threads  reset(): while no other call runs. change(): one thread. at(): the transport's
-///          thread.
+/// reset() requires that no other call runs. One thread calls change(), the transport's thread
+/// at().
 class AppliedExposure {
  public:
   void reset(const ExposureSetting& setting) noexcept {
@@ -16,12 +16,12 @@ class AppliedExposure {
     current_ = setting;
     any_ = false;
   }
-  /// The camera has it from `written` on. False: more changes than frames come, the camera's say
-  /// would be wrong; not made.
+  /// Records that the camera has this setting since `written`. Returns false, without recording, if
+  /// there are more changes than frames.
   [[nodiscard]] bool change(const ExposureSetting& setting, HostStamp written) noexcept {
     return changes_.push({written, setting});
   }
-  /// Setting of an exposure that began then; later ones do not begin earlier.
+  /// Setting of an exposure that began then; calls must be in order of time.
   [[nodiscard]] const ExposureSetting& at(HostStamp began) noexcept {
     while (any_ || changes_.pop(&next_)) {
       any_ = true;
@@ -40,7 +40,8 @@ class AppliedExposure {
   Ring<Change, 8> changes_;
   ExposureSetting current_{};
   Change next_{};
-  bool any_ = false;  // next_ is one that is not yet due
+  // True if next_ is not yet due.
+  bool any_ = false;
 };
 
 }  // namespace vergence::exposure

@@ -6,8 +6,10 @@
 namespace vergence::exposure {
 namespace {
 
-constexpr double kDbAStop = 6.020599913279624;  // 20 log10 2
-constexpr double kDarkest = 1.0;                // grey level: below it the mean is noise
+// 20 log10 2.
+constexpr double kDbAStop = 6.020599913279624;
+// Grey level below which the mean is noise.
+constexpr double kDarkest = 1.0;
 
 double to_stops(const ExposureOptions& o, const ExposureSetting& s) noexcept {
   return std::log2(static_cast<double>(s.exposure.ns()) / static_cast<double>(o.least.ns())) +
@@ -56,7 +58,8 @@ std::optional<ExposureSetting> ExposureController::step(const Brightness& image)
   if (std::abs(requested) <= options_.dead_band) return std::nullopt;
   const ExposureSetting next = split(stops_ + requested);
   const double stops = to_stops(options_, next);
-  if (std::abs(stops - stops_) < 0.5 * options_.dead_band) return std::nullopt;  // at a bound
+  // The setting is at a bound.
+  if (std::abs(stops - stops_) < 0.5 * options_.dead_band) return std::nullopt;
   stops_ = stops;
   setting_ = next;
   since_change_ = 0;

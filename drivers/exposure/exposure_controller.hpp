@@ -19,32 +19,32 @@ struct ExposureOptions {
   Duration most = Duration::microseconds(8000);
   /// Used once the exposure is at its longest.
   double max_gain_db = 18;
-  double up_stops = 1,
-         down_stops = 2;  // a change at most; down is faster: saturated pixels tell nothing
+  /// Maximum change, in stops; larger downwards, because the excess of saturated pixels is unknown.
+  double up_stops = 1, down_stops = 2;
   /// Frames from a change to the next evaluated image; longer than the latency of every camera.
   int settle_frames = 5;
 };
 
-/// Exposure and gain of a rig, from the brightness of its reference camera.
+/// Controls exposure and gain of a rig by the brightness of its reference camera.
 ///
-/// Method   In stops. An image is log2(target / mean) too dark, but never asked so far up that more
-///          than `may_saturate` of it would saturate; where that share is saturated already, how
-///          far is unknown, and it goes down by half of `down_stops`, by all of it where half of
-///          the picture is. The sum of exposure and gain moves by that, exposure first, gain beyond
-///          its longest.
-/// Delay    A change shows after an unknown number of frames: until `settle_frames` images
-///          have been seen since, none is judged. So each change is measured before the next is
-///          made, and a sensor whose response is between linear and its square root does not swing.
+/// Method   In stops. An image is log2(target / mean) too dark, but the increase is limited so that
+///          at most `may_saturate` of it saturates. If that share is already exceeded, the excess
+///          is unknown: exposure decreases by half of `down_stops`, or by all if half of the image
+///          is saturated. Gain is used only beyond the longest exposure.
+/// Delay    A change takes effect after an unknown number of frames, so `settle_frames` images are
+///          skipped after it. Each change is thus measured before the next, and a sensor whose
+///          response is between linear and its square root does not oscillate.
+///
 /// Not thread-safe. Does not allocate.
 class ExposureController {
  public:
-  /// Precondition: 0 < least ≤ most. `start`: what the cameras have, brought inside the bounds.
+  /// Clamps `start`, the cameras' present setting, to the bounds. Precondition: 0 < least ≤ most.
   ExposureController(const ExposureOptions& options, const ExposureSetting& start) noexcept;
 
-  /// One image of the reference camera. → what all cameras are to have from now on; nothing: as it
-  /// is.
+  /// Evaluates an image of the reference camera. Returns a new setting for all cameras, or nothing
+  /// if it stays.
   [[nodiscard]] std::optional<ExposureSetting> step(const Brightness& image) noexcept;
-  /// The cameras were asked only now: images are counted from here on.
+  /// Restarts the count of images, because the cameras were changed only now.
   void restart_settling() noexcept { since_change_ = 0; }
   [[nodiscard]] const ExposureSetting& setting() const noexcept { return setting_; }
 
@@ -54,11 +54,13 @@ class ExposureController {
 
   ExposureOptions options_;
   ExposureSetting setting_;
-  double stops_ = 0;  // above the shortest exposure without gain
-  int since_change_;  // images
+  // Sum of exposure and gain above the shortest exposure.
+  double stops_ = 0;
+  // Images since the last change.
+  int since_change_;
 };
 
-/// Brought inside the bounds: exposure first.
+/// Clamps to the bounds, exposure first.
 [[nodiscard]] ExposureSetting within(const ExposureOptions& options,
                                      const ExposureSetting& requested) noexcept;
 

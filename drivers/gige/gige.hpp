@@ -6,10 +6,10 @@
 /// GigE Vision cameras, by Aravis 0.8.
 namespace vergence::gige {
 
-/// Cameras that answer a broadcast, and any by its address: `serial` may be an IPv4 address.
+/// Driver for cameras that respond to a broadcast. open() also takes an IPv4 address as `serial`.
 ///
-/// enumerate() takes a second (the standard's time for answers); open() of a camera that is not
-/// there two to four.
+/// enumerate() takes one second (the standard's time for responses), open() of an absent camera two
+/// to four.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_driver();
 
 }  // namespace vergence::gige

@@ -3,25 +3,28 @@
 
 namespace vergence::gige {
 
-/// Load of a link: identical cameras.
+/// Load on a link from identical cameras.
 struct LinkDemand {
   std::int64_t image_bytes = 0;
   double rate_hz = 0;
   int cameras = 1;
-  int mtu = 1500;          // bytes, of the interface
-  int packet_size = 0;     // bytes, wished for; 0: what the driver takes
-  std::int64_t speed = 0;  // bit/s, > 0
+  /// MTU of the interface, in bytes.
+  int mtu = 1500;
+  /// Requested packet size, in bytes; 0 lets the driver choose.
+  int packet_size = 0;
+  /// Speed of the link, in bit/s; must be positive.
+  std::int64_t speed = 0;
 };
 struct LinkBudget {
-  int packet_size = 0;  // bytes, with the IP, UDP and GVSP headers
-  double used = 0;  // of what the link may be used for (90 % of the time between two images): above
-                    // 1 it does not fit
-  double highest_hz = 0;  // rate at which it just does
+  /// Packet size in bytes, including the IP, UDP and GVSP headers.
+  int packet_size = 0;
+  /// Share of the usable link capacity (90 % of the frame interval). Above 1 it does not fit.
+  double used = 0;
+  /// Highest frame rate that fits.
+  double highest_hz = 0;
 };
-/// The driver's own plan, without a camera: packets of the interface's size, pauses so that those
-/// of several cameras interleave.
-///
-/// A pure function. Precondition: speed > 0, cameras > 0.
+/// Computes the driver's plan without a camera: packets of the interface's MTU, with delays that
+/// interleave the packets of several cameras. Preconditions: speed > 0, cameras > 0.
 [[nodiscard]] LinkBudget link_budget(const LinkDemand& demand) noexcept;
 
 }  // namespace vergence::gige

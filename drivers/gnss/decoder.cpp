@@ -15,12 +15,13 @@ using nmea::Sentence;
 using nmea::Type;
 
 constexpr std::int64_t kDay = 86'400'000'000'000;
-constexpr Duration kFresh = Duration::milliseconds(1100);  // VTG and HDT, at 1 Hz and faster
+// Maximum age of VTG and HDT, at 1 Hz and faster.
+constexpr Duration kFresh = Duration::milliseconds(1100);
 
 unsigned bit(Type type) noexcept { return 1U << static_cast<unsigned>(type); }
 
 FixStatus to_fix_status(const Sentence& gga, bool has_height) noexcept {
-  // NovAtel's 9 is a fix with corrections of satellites.
+  // NovAtel's 9 is a fix with satellite-based corrections.
   constexpr std::uint8_t kFirstFix = 1, kLastFix = 5, kEstimated = 6, kOfNovatel = 9;
   if (gga.quality == kEstimated) return FixStatus::dead_reckoning;
   if (gga.quality < kFirstFix || (gga.quality > kLastFix && gga.quality != kOfNovatel))
@@ -51,7 +52,8 @@ bool NmeaEpochs::accept(const Sentence& s, std::size_t bytes, HostStamp arrival,
   } else if (open_ && *s.time_of_day_ns == time_) {
     merge(s);
   } else if (!open_ && *s.time_of_day_ns == last_time_) {
-    usual_ |= bit(s.type);  // the epoch before was finished too soon: the next one waits for it
+    // The previous epoch was finished too early; the next one waits for this type.
+    usual_ |= bit(s.type);
     return false;
   } else {
     const bool complete = flush(fix);
@@ -97,7 +99,7 @@ void NmeaEpochs::merge(const Sentence& s) noexcept {
   if (s.days) date_ = s.days;
 }
 
-/// Once a date was known it goes on by midnights.
+/// Once a date is known, it advances at midnight.
 DeviceStamp NmeaEpochs::stamp() noexcept {
   if (date_) {
     days_ = *date_;
@@ -165,14 +167,18 @@ void NmeaEpochs::finish(Fix* fix) noexcept {
 
 namespace {
 
-constexpr Duration kClockSet = Duration::seconds(10);  // backwards: the receiver's time was set
-constexpr Duration kShortest = Duration::milliseconds(10);  // no receiver sends faster
-constexpr double kMaxLost = 1000;  // at once; beyond: the line was away, or the time was set
+// A larger step backwards means that the receiver's time was set.
+constexpr Duration kClockSet = Duration::seconds(10);
+// No receiver sends faster.
+constexpr Duration kShortest = Duration::milliseconds(10);
+// More missing epochs mean that the link was down or the time was set.
+constexpr double kMaxLost = 1000;
 
 ClockMapperOptions mapping(const Options& o) noexcept {
   ClockMapperOptions m;
   m.min_delay = o.processing;
-  m.delay_spread = Duration::milliseconds(20);  // a solution takes longer with more satellites
+  // A solution takes longer with more satellites.
+  m.delay_spread = Duration::milliseconds(20);
   m.jump = Duration::milliseconds(200);
   m.resolution = Duration::milliseconds(1);
   return m;
@@ -199,7 +205,7 @@ void fill(const ubx::Pvt& p, InsReading* r) noexcept {
   InsSample& s = r->sample;
   s.fix = to_fix_status(p);
   s.position = {p.latitude_deg, p.longitude_deg, p.height_m};
-  // The horizontal accuracy is of the plane, both axes together.
+  // The horizontal accuracy combines both axes.
   s.position_sigma = p.horizontal_sigma_m / std::numbers::sqrt2;
   s.height_sigma = p.vertical_sigma_m;
   s.velocity_sigma = p.speed_sigma;
@@ -240,7 +246,8 @@ void Decoder::begin(std::uint32_t baud) noexcept {
   at_ = size_ = 0;
   quiet_ = false;
   any_ = false;
-  period_ = {};  // the receiver may be back at another rate
+  // The receiver may have restarted at another rate.
+  period_ = {};
 }
 
 void Decoder::accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept {
@@ -292,7 +299,7 @@ bool Decoder::next_ubx(Fix* fix) noexcept {
       fill(pvt, &fix->reading);
       return true;
     }
-    // An incomplete frame on a quiet link is discarded; there may be one within it.
+    // An incomplete frame on a quiet link is discarded; it may contain a complete one.
     if (!quiet_ || ubx_.waiting() == 0) break;
     ubx_.abandon();
   }
@@ -320,8 +327,8 @@ void Decoder::count(Duration step) noexcept {
   counters_.lost += steps - 1;
 }
 
-/// Without a fix the time may be that of the receiver's own clock, which a night puts off by
-/// tenths of a second: it is no witness of the fit.
+/// Without a fix the time may be that of the receiver's own clock, which deviates by tenths of a
+/// second overnight, so it is not used for the mapping.
 MappedStamp Decoder::host_stamp(const Fix& fix, HostStamp arrival) noexcept {
   constexpr Duration kClose = Duration::seconds(1);
   if (fix.reading.sample.fix != FixStatus::none) return mapper_.map(fix.measured, arrival);
@@ -346,14 +353,15 @@ bool Decoder::map(const Fix& fix, InsReading* reading) noexcept {
       count(step);
     }
   } else if (counters_.readings > 0) {
-    ++number_;  // after the line was away: the number of missing ones is unknown
+    // After a disconnect the number of missing fixes is unknown.
+    ++number_;
   }
   any_ = true;
   last_ = fix.measured;
   const Duration on_wire =
       Duration::nanoseconds(std::llround(byte_ns_ * static_cast<double>(fix.bytes)));
   const MappedStamp mapped = host_stamp(fix, fix.arrival - on_wire);
-  // The map still improves after a start: time would turn back.
+  // The mapping still improves after a start, which could reverse time.
   if (counters_.readings > 0 && mapped.host <= last_host_) return false;
   last_host_ = mapped.host;
   ++counters_.readings;

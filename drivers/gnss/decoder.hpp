@@ -12,35 +12,34 @@
 
 namespace vergence::gnss {
 
-/// Below this speed a course is noise.
-inline constexpr double kMoving = 1.0;  // m/s
+/// Speed below which a course is noise, in m/s.
+inline constexpr double kMoving = 1.0;
 
-/// A fix with the time that the receiver gives it.
+/// Fix with the receiver's time.
 struct Fix {
-  /// UTC since 1970; without a date, since the midnight before the first fix.
+  /// UTC since 1970 or, without a date, since midnight before the first fix.
   DeviceStamp measured{};
   /// Arrival of the epoch's first message.
   HostStamp arrival{};
-  /// Bytes of that message.
+  /// Size of that message.
   std::size_t bytes = 0;
   /// Sample and quality, without stamps.
   InsReading reading{};
 };
 
-/// NMEA sentences into fixes: those of one time of day are one epoch.
+/// Groups NMEA sentences into fixes; those of one time of day form an epoch.
 ///
-/// Method   An epoch is complete when it has every type of sentence the one before had, when a
-///          sentence has another time, or when the line goes quiet (flush()). VTG and HDT have no
-///          time: the newest is used while it is fresh.
-/// Not thread-safe. Fixed memory.
+/// An epoch is complete when it has every type of sentence of the previous one, when a sentence has
+/// another time, or when the link is quiet (flush()). VTG and HDT have no time: the newest is used
+/// while it is fresh. Not thread-safe. Fixed memory.
 class NmeaEpochs {
  public:
-  /// True: *fix is a complete epoch. A sentence of the next one is kept.
+  /// Returns true if *fix is a complete epoch. A sentence of the next one is kept.
   [[nodiscard]] bool accept(const nmea::Sentence& sentence, std::size_t bytes, HostStamp arrival,
                             Fix* fix) noexcept;
-  /// The line is quiet. True: the open epoch is complete.
+  /// Called when the link is quiet. Returns true if the open epoch is complete.
   [[nodiscard]] bool flush(Fix* fix) noexcept;
-  /// The line was opened again.
+  /// Called after the link was reopened.
   void restart() noexcept;
 
  private:
@@ -54,20 +53,24 @@ class NmeaEpochs {
   [[nodiscard]] DeviceStamp stamp() noexcept;
 
   bool open_ = false;
-  std::int64_t time_ = -1, last_time_ = -1;  // ns of the day, of the open epoch, of the one before
-  std::optional<std::int32_t> date_;         // of the open epoch
-  std::int64_t days_ = 0, previous_ = 0;     // date of the newest epoch, and its time of day
+  // Time of day in ns, of the open epoch and the previous one.
+  std::int64_t time_ = -1, last_time_ = -1;
+  // Date of the open epoch.
+  std::optional<std::int32_t> date_;
+  // Date of the newest epoch, and its time of day.
+  std::int64_t days_ = 0, previous_ = 0;
   bool dated_ = false;
   HostStamp arrival_{};
   std::size_t bytes_ = 0;
-  unsigned types_ = 0, usual_ = 0;  // bit by Type: of the open epoch, of the one before
+  // Bit sets by Type, of the open epoch and the previous one.
+  unsigned types_ = 0, usual_ = 0;
   nmea::Sentence gga_{}, rmc_{}, gst_{};
   Motion vtg_{};
   std::optional<double> heading_deg_;
   HostStamp heading_at_{};
 };
 
-/// ENU yaw of a compass heading, rad in (−π, π].
+/// ENU yaw of a compass heading, in rad, in (−π, π].
 [[nodiscard]] double yaw_of_heading(double heading_deg) noexcept;
 
 /// Counters of a stream; all only grow.
@@ -81,42 +84,45 @@ struct DecoderCounters {
   std::uint64_t restarts = 0;
 };
 
-/// Bytes of a satellite receiver into readings with times.
+/// Decodes the bytes of a satellite receiver into samples with times.
 ///
-/// Time     A fix's UTC is the device's clock, mapped to the host's by a ClockMapper: the bytes of
-///          an epoch's first message arrive Options::processing and their time on the wire after
-///          the fix, or later. By what `processing` is wrong all stamps are, beyond their bound.
-/// Order    Of measurement; a fix that is not newer than the last, or without a time, is dropped.
+/// Time     A fix's UTC is the device's clock, mapped to the host's by a ClockMapper: an epoch's
+///          first message arrives no earlier than Options::processing plus its wire time after the
+///          fix. An error of `processing` shifts all stamps, beyond their bound.
+/// Order    By measurement; a fix that is not newer than the last, or without a time, is dropped.
+/// Errors   Counted; the stream always continues.
+///
 /// Not thread-safe. Does not allocate.
-/// Errors   Counted; nothing stops the stream.
 class Decoder {
  public:
   static constexpr std::size_t kMaxBytes = 1024;
 
   explicit Decoder(const Options& options) noexcept;
-  /// The line was opened, at this rate; 0: bytes take no time (USB). Counters go on.
+  /// Called after the link was opened at this rate; 0 if bytes have no wire time (USB). Counters
+  /// continue.
   void begin(std::uint32_t baud) noexcept;
-  /// Adds the bytes of a read. Precondition: next() has said false since the last; at most
-  /// kMaxBytes.
+  /// Adds the bytes of a read, at most kMaxBytes. Precondition: next() has returned false since the
+  /// last call.
   void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
-  /// The next reading. False: none, *reading untouched.
+  /// Returns the next sample. If false, *reading is unchanged.
   [[nodiscard]] bool next(InsReading* reading) noexcept;
-  /// The line was quiet for longer than a pause within an epoch: what waits is complete.
+  /// Called after a silence longer than pauses within an epoch; waiting data are then complete.
   void quiet() noexcept { quiet_ = true; }
 
-  /// The receiver's interval since begin(): the shortest between two fixes that came several times
-  /// in a row, until then the first; 0: not known yet.
+  /// Interval of the receiver since begin(): the shortest that repeated several times, before that
+  /// the first; 0 if unknown.
   [[nodiscard]] Duration period() const noexcept { return period_.interval(); }
-  /// Whole messages of either protocol, right in checksum.
+  /// Messages of either protocol with a correct checksum.
   [[nodiscard]] std::uint64_t sentences() const noexcept { return nmea_.counters().sentences; }
   [[nodiscard]] std::uint64_t frames() const noexcept { return ubx_.counters().frames; }
-  /// Messages that hold a fix, of the protocol asked for.
+  /// Messages of the selected protocol with a fix.
   [[nodiscard]] std::uint64_t fixes() const noexcept { return fixes_; }
   [[nodiscard]] HeadingSource best_heading() const noexcept { return best_heading_; }
   [[nodiscard]] DecoderCounters counters() const noexcept;
 
  private:
-  /// The receiver's interval. A single short step, as where a fix is acquired again, is none.
+  /// Estimates the receiver's interval. A single short step, as at reacquisition of a fix, is
+  /// ignored.
   class Period {
    public:
     void add(Duration step) noexcept;
@@ -124,8 +130,10 @@ class Decoder {
 
    private:
     Duration interval_{}, newest_{};
-    int alike_ = 0;      // newest steps
-    bool sure_ = false;  // the interval came several times in a row
+    // Number of equal newest steps.
+    int alike_ = 0;
+    // True once the interval repeated several times.
+    bool sure_ = false;
   };
 
   [[nodiscard]] bool next_nmea(Fix* fix) noexcept;
@@ -138,7 +146,8 @@ class Decoder {
   ClockMapper mapper_;
   double byte_ns_ = 0;
   std::array<std::uint8_t, kMaxBytes> bytes_{};
-  std::size_t at_ = 0, size_ = 0;  // of bytes_: not read yet, of the newest read
+  // Read position in bytes_, and size of the newest read.
+  std::size_t at_ = 0, size_ = 0;
   HostStamp arrival_{};
   bool quiet_ = false;
   nmea::SentenceStream nmea_;

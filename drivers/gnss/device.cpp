@@ -11,12 +11,16 @@
 namespace vergence::gnss {
 namespace {
 
-constexpr Duration kQuiet = Duration::milliseconds(40);     // longer than pauses within an epoch
-constexpr Duration kListen = Duration::milliseconds(1300);  // at a baud rate: an epoch of 1 Hz
+// Exceeds pauses within an epoch.
+constexpr Duration kQuiet = Duration::milliseconds(40);
+// Time per baud rate: an epoch at 1 Hz.
+constexpr Duration kListen = Duration::milliseconds(1300);
 constexpr Duration kMeasure = Duration::milliseconds(3500);
-constexpr std::uint64_t kIntervals = 3;  // of them the shortest is the receiver's interval
+// The shortest of these is the receiver's interval.
+constexpr std::uint64_t kIntervals = 3;
 constexpr std::array<std::uint32_t, 7> kBauds{9600, 38400, 115200, 460800, 230400, 57600, 4800};
-constexpr double kOtherRate = 0.2;  // relative; beyond, the receiver's rate is not what was asked
+// Relative difference above which the rate counts as another.
+constexpr double kOtherRate = 0.2;
 
 const char* name_of(Protocol protocol) noexcept {
   return protocol == Protocol::nmea ? "nmea" : "ubx";
@@ -49,7 +53,7 @@ DeviceStatus Device::connect() {
   return status;
 }
 
-/// The baud rate asked for alone, or that of the last fix and the usual ones.
+/// The requested baud rate only, or that of the last fix and the usual ones.
 DeviceStatus Device::search() {
   if (options_.baud != 0) return listen(options_.baud);
   DeviceStatus status = baud_ != 0 ? listen(baud_) : DeviceStatus::not_found;
@@ -103,7 +107,7 @@ DeviceStatus Device::listen(std::uint32_t baud) {
   return DeviceStatus::not_found;
 }
 
-/// A receiver without a fix may send no time: then its rate shows later.
+/// A receiver without a fix may send no time; its rate is then determined later.
 DeviceStatus Device::measure_rate() {
   const std::uint64_t before = decoder_.counters().readings;
   for (const HostStamp until = line()->now() + kMeasure; line()->now() < until;) {
@@ -144,7 +148,8 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
     configured_ = true;
     if (actual_hz != nullptr) *actual_hz = rate_hz_ > 0 ? rate_hz_ : rate_hz;
     return DeviceStatus::ok;
-  } catch (const std::exception&) {  // out of memory
+    // Out of memory.
+  } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
 }
@@ -160,7 +165,8 @@ DeviceTiming Device::timing() const noexcept {
 // ---- the device's thread
 
 DeviceStatus Device::begin() noexcept {
-  line()->discard_input();  // what waited says nothing about when it was sent
+  // The transmission time of buffered bytes is unknown.
+  line()->discard_input();
   decoder_.begin(has_native_usb_ ? 0 : line()->baud());
   return DeviceStatus::ok;
 }
@@ -195,7 +201,7 @@ DeviceStatus Device::read_once(Duration limit, bool discard) noexcept {
   return r.status;
 }
 
-/// A receiver that lost its supply may be back at the rate it was made with.
+/// A receiver that lost its supply may return to its default rate.
 DeviceStatus Device::reopen() {
   if (const DeviceStatus s = open(); s != DeviceStatus::ok) return s;
   return search();

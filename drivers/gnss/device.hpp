@@ -7,28 +7,25 @@
 
 namespace vergence::gnss {
 
-/// A satellite receiver on a serial line, NMEA 0183 or UBX. It is listened to, never written to:
-/// what it sends and how often is its own setting.
+/// Satellite receiver on a serial link, NMEA 0183 or UBX, with the contract of InsDevice. The
+/// driver never writes: messages and rate are the receiver's own settings.
 ///
-/// As InsDevice says. connect() listens at the baud rate asked for or at the usual ones, up to 1.3
-/// s each, and then until the interval between fixes is known; so the owner calls it before the
-/// drive. After `disconnected` the line is opened again, and listened at likewise, until fixes
-/// come. Silent for kSilent is gone.
-///
-/// Time     Readings are mapped: `host` and `host_error` are set (decoder.hpp).
-/// Samples  No attitude; heading_source says what the heading is of.
-class Device final : public SerialInsDevice<256> {  // 12 s at 20 Hz
+/// connect() listens at the requested or the usual baud rates, up to 1.3 s each, and then until the
+/// interval of fixes is known. After `disconnected` the link is reopened likewise until fixes
+/// arrive. Silence for kSilent counts as disconnected. Readings are mapped: `host` and `host_error`
+/// are set (decoder.hpp). Samples have no attitude; heading_source gives the kind of heading.
+class Device final : public SerialInsDevice<256> {
  public:
   static constexpr Duration kSilent = Duration::seconds(3);
 
   Device(std::unique_ptr<SerialLinkFactory> place, const Options& options);
   ~Device() override;
 
-  /// Opens the line and listens. → ok, not_found (silent, or another protocol), no_permission,
+  /// Opens the link and listens. → ok, not_found (silent, or another protocol), no_permission,
   /// busy, disconnected, failed
   [[nodiscard]] DeviceStatus connect();
 
-  /// `unsupported`: the receiver's rate is another.
+  /// Returns `unsupported` if the receiver's rate differs.
   [[nodiscard]] DeviceStatus configure(double rate_hz, double* actual_hz) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
 
@@ -47,7 +44,8 @@ class Device final : public SerialInsDevice<256> {  // 12 s at 20 Hz
 
   const Options options_;
   bool has_native_usb_ = false;
-  Decoder decoder_;  // of the thread while it runs, else the owner's
+  // Belongs to the thread while it runs, else to the owner.
+  Decoder decoder_;
 };
 
 }  // namespace vergence::gnss

@@ -9,8 +9,9 @@ enum class Protocol : std::uint8_t { nmea, ubx };
 
 struct Options {
   Protocol protocol = Protocol::nmea;
-  std::uint32_t baud = 0;  // 0: found by listening
-  // From the instant of the fix to the first byte on the line.
+  /// 0 finds the rate by listening.
+  std::uint32_t baud = 0;
+  // Delay from the instant of the fix to its first byte on the link.
   Duration processing = Duration::milliseconds(2);
 };
 

@@ -56,11 +56,11 @@ void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width
 
 namespace {
 
-constexpr double kRateSlack =
-    0.01;  // a rate is met when it is short by less: 29.96 Hz is called 30 Hz
+// Tolerance of a rate: 29.96 Hz counts as 30 Hz.
+constexpr double kRateSlack = 0.01;
 constexpr unsigned kFormat7Modes = 8;
 
-/// From the cheapest to the dearest on the bus.
+/// Ordered from the cheapest to the most expensive on the bus.
 constexpr std::array kCodings{ColorCoding::mono8, ColorCoding::raw8, ColorCoding::mono16,
                               ColorCoding::raw16, ColorCoding::yuv422};
 
@@ -92,7 +92,7 @@ class Planner {
   }
 
  private:
-  /// A register that failed outranks what was read of it.
+  /// A failed register takes precedence over the values read.
   void check_registers() {
     if (r_.status() == DeviceStatus::ok) return;
     const DeviceStatus failed = r_.pop_status();
@@ -164,7 +164,8 @@ class Planner {
   }
 
   void choose_features() {
-    constexpr double kFloat = 1e-6;  // single precision in the camera
+    // Relative tolerance for the camera's single-precision values.
+    constexpr double kFloat = 1e-6;
     const AbsoluteRange shutter = r_.absolute_range(Feature::shutter);
     const double s = requested_.exposure.to_seconds();
     if (!shutter.present)
@@ -225,8 +226,8 @@ class Planner {
            (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " + offers());
   }
 
-  /// `exactly`: a free-running camera at the rate that is wanted, not at the next higher one; and
-  /// packets of which every camera of the rig can send one a cycle.
+  /// If `exactly`, a free-running camera must run at the requested rate instead of the next higher
+  /// one, and every camera of the rig must be able to send a packet in each cycle.
   bool fixed(ColorCoding coding, bool exactly) {
     for (const FixedMode& m : fixed_modes()) {
       if (m.coding != coding || m.width != requested_.width || m.height != requested_.height ||
@@ -281,7 +282,8 @@ class Planner {
           requested_.offset_x % step.width != 0 || requested_.offset_y % step.height != 0)
         continue;
       const std::size_t bytes = frame_bytes(plan_.size.width, plan_.size.height, coding);
-      const Size limits = Size::of(r_.get_at(csr + kPacketLimits));  // unit, most
+      // Unit and maximum size of packets.
+      const Size limits = Size::of(r_.get_at(csr + kPacketLimits));
       if (!choose_packet(bytes, limits)) continue;
       if (requested_.trigger == CameraTrigger::free && frame_rate_.present &&
           (requested_.rate_hz < frame_rate_.least * (1 - kRateSlack) ||
@@ -305,7 +307,7 @@ class Planner {
     return false;
   }
 
-  /// `limits`: unit and largest, as the camera says; zeros: anything.
+  /// `limits` are the camera's unit and largest packet; zeros mean no limit.
   bool choose_packet(std::size_t bytes, const Size& limits) {
     const std::size_t unit = limits.width == 0 ? 4 : limits.width;
     const std::size_t most =
@@ -322,15 +324,15 @@ class Planner {
                       best, most, unit, packet_rate(bytes, best)));
       return false;
     }
-    // Larger ones bring the image sooner, where it is not the packets that set a free camera's
-    // rate.
+    // Larger packets transfer the image faster, if they do not set the rate of a free-running
+    // camera.
     const bool paced = requested_.trigger != CameraTrigger::free || frame_rate_.present;
     plan_.shape.packet_bytes =
         asked == 0 && paced ? std::max(packet, std::min(share(), most) / unit * unit) : packet;
     return true;
   }
 
-  /// Bytes of each cycle that are this camera's when all of the rig share the bus alike.
+  /// Bytes per cycle for this camera if the rig's cameras share the bus equally.
   [[nodiscard]] std::size_t share() const {
     const auto cameras = static_cast<unsigned>(std::max(requested_.sharing, 1));
     if (bus_.isochronous) return packet_for_units(kBandwidthUnits / cameras, plan_.shape.speed);
@@ -387,7 +389,8 @@ class Planner {
   const CameraConfiguration& requested_;
   CameraPlan& plan_;
   std::string& last_error_;
-  std::size_t largest_ = 0;  // packet
+  // Largest packet size.
+  std::size_t largest_ = 0;
   AbsoluteRange frame_rate_{};
   std::string why_not_;
 };
@@ -404,7 +407,8 @@ DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus,
 
 namespace {
 
-/// The size and packets of a Format 7 mode, in the order in which region and sensor always agree.
+/// Writes size and packets of a Format 7 mode, in the order in which region and sensor always
+/// agree.
 bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* error) {
   using namespace reg::format7;
   r.set_at(plan.csr + kCoding, static_cast<std::uint32_t>(plan.coding) << 24U);
@@ -416,7 +420,8 @@ bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* erro
                          plan.size.height, plan.position.width, plan.position.height);
     return false;
   }
-  const Size limits = Size::of(r.get_at(plan.csr + kPacketLimits));  // they may depend on the size
+  // The limits may depend on the size.
+  const Size limits = Size::of(r.get_at(plan.csr + kPacketLimits));
   const std::size_t packet = plan.shape.packet_bytes;
   if (limits.height != 0 &&
       (packet > limits.height || (limits.width != 0 && packet % limits.width != 0))) {
@@ -433,7 +438,7 @@ bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* erro
   return true;
 }
 
-/// Exposure and gain by hand, every automatic that would change them off.
+/// Sets exposure and gain manually and turns off every automatic control of them.
 void write_features(CameraRegisters& r, CameraPlan* plan) {
   for (const Feature f : {Feature::auto_exposure, Feature::gamma, Feature::trigger_delay})
     r.switch_off(f);
@@ -445,7 +450,8 @@ void write_features(CameraRegisters& r, CameraPlan* plan) {
     plan->rate_hz = r.set_absolute(Feature::frame_rate,
                                    std::clamp(plan->requested_rate_hz, rate.least, rate.most));
   } else if (plan->trigger != CameraTrigger::free) {
-    r.switch_off(Feature::frame_rate);  // on, it shortens exposures and skips pulses
+    // When on, this feature would shorten exposures and skip pulses.
+    r.switch_off(Feature::frame_rate);
   }
 }
 
@@ -480,7 +486,8 @@ FrameInfoLayout write_frame_info(CameraRegisters& r, bool requested) {
   const std::uint32_t items =
       frame_info_bit(FrameInfoItem::time) | frame_info_bit(FrameInfoItem::counter);
   r.set(reg::kFrameInfo, kFrameInfoPresent | (requested ? items : 0));
-  return FrameInfoLayout::of(r.get(reg::kFrameInfo));  // what a camera lacks stays off
+  // Items that the camera lacks stay off.
+  return FrameInfoLayout::of(r.get(reg::kFrameInfo));
 }
 
 unsigned effective_bits(CameraRegisters& r, const CameraPlan& plan) {
@@ -498,7 +505,8 @@ DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, Camera
                         std::string* error) {
   CameraRegisters& r = *registers;
   CameraPlan out = *plan;
-  r.transmit(false);  // also what a program that crashed has left on
+  // Stops a stream left running by a program that crashed.
+  r.transmit(false);
   if (BasicFunctions::of(r.get(reg::kBasicFunctions)).power_switch) r.set(reg::kPower, bit(31));
   r.set(reg::kVideoFormat, out.format << 29U);
   r.set(reg::kVideoMode, out.mode << 29U);
@@ -511,8 +519,8 @@ DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, Camera
   if (out.format == 7) {
     if (!write_format7(r, out, error) && r.status() == DeviceStatus::ok)
       return DeviceStatus::unsupported;
-    const std::uint32_t total =
-        r.get_at(out.csr + reg::format7::kTotalBytesLow);  // the high half: frames of 4 GB
+    // The high half is not read: it is for frames above 4 GB.
+    const std::uint32_t total = r.get_at(out.csr + reg::format7::kTotalBytesLow);
     if (total >= out.shape.image_bytes && total <= out.shape.image_bytes + out.shape.packet_bytes)
       out.shape.frame_bytes = total;
   } else {

@@ -13,9 +13,11 @@ namespace vergence::iidc {
 /// Conversion of a transmitted image to 8-bit grey.
 struct GreyConversion {
   ColorCoding coding = ColorCoding::mono8;
-  bool mosaic = false;           // 8 bits behind a Bayer filter
-  unsigned effective_bits = 16;  // of 16-bit pixels, in the low bits; 8 … 16
-  /// Nothing to do: the transport's bytes are the image.
+  /// True for 8 bits behind a Bayer filter.
+  bool mosaic = false;
+  /// Effective bits of 16-bit pixels, 8 to 16, in the low bits.
+  unsigned effective_bits = 16;
+  /// True if the received bytes are the image.
   [[nodiscard]] bool none() const noexcept {
     return !mosaic && (coding == ColorCoding::mono8 || coding == ColorCoding::raw8);
   }
@@ -23,28 +25,29 @@ struct GreyConversion {
   [[nodiscard]] bool possible() const noexcept;
 };
 
-/// Converts width × height pixels, rows of `stride` bytes in `out`.
+/// Converts width × height pixels into rows of `stride` bytes in one pass.
 ///
-/// Method  Mosaic: bayer_to_grey(). 16 bits: the eight highest of the effective ones. YUV 4:2:2:
-///         the luma.
-/// Time    One pass. Memory: none beside the images.
-/// Precondition  conversion.possible() and not none(); a mosaic has at least two rows and columns;
-///               `in` holds frame_bytes(width, height, coding).
+/// A mosaic uses bayer_to_grey(). Of 16 bits the eight highest effective ones are kept; of YUV
+/// 4:2:2 the luma. Preconditions: conversion.possible() and not none(); a mosaic has at least two
+/// rows and columns; `in` holds frame_bytes(width, height, coding).
 void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width, int height,
              std::uint8_t* out, std::size_t stride) noexcept;
 
-/// Plan for one camera's configuration: the mode, its packets, what is embedded.
+/// Plan of a camera's configuration: mode, packets and embedded information.
 struct CameraPlan {
   Options options{};
   CameraTrigger trigger = CameraTrigger::hardware;
-  unsigned trigger_mode = 0;  // 0 or 14
+  /// IIDC trigger mode, 0 or 14.
+  unsigned trigger_mode = 0;
   unsigned format = 0, mode = 0;
-  unsigned rate_code = 0;  // formats 0 to 2
-  std::uint64_t csr = 0;   // Format 7
+  /// Rate code, used by formats 0 to 2.
+  unsigned rate_code = 0;
+  /// Address of the mode's registers, used by Format 7.
+  std::uint64_t csr = 0;
   Size size{}, position{};
   ColorCoding coding = ColorCoding::mono8;
   double requested_rate_hz = 0;
-  // As the camera rounds them, once applied:
+  // Values rounded by the camera, valid once the plan is applied.
   double rate_hz = 0;
   Duration exposure{};
   double gain_db = 0;
@@ -53,16 +56,16 @@ struct CameraPlan {
   FrameInfoLayout info{};
 };
 
-/// Finds a mode for it: the fixed one of that size and rate, else a region of Format 7; the
-/// cheapest pixels that give grey first. Only reads registers. → ok, unsupported,
-/// bad_configuration, or why a register failed; then *error says what the camera offers.
+/// Finds a mode: the fixed one of that size and rate, else a region of Format 7, with the cheapest
+/// pixels that give grey. Only reads registers. On failure *error says what the camera offers. →
+/// ok, unsupported, bad_configuration, or a register's failure
 [[nodiscard]] DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus,
                                      const CameraConfiguration& requested, CameraPlan* plan,
                                      std::string* error);
 
-/// Stops the camera and writes the plan into it; fills in what the camera made of it. The camera
-/// stays quiet.
-/// → ok, unsupported, or why a register failed; then *error says it.
+/// Stops the camera, writes the plan and fills in the values that the camera applied. The camera
+/// does not transmit yet. On failure *error has the reason. → ok, unsupported, or a register's
+/// failure
 [[nodiscard]] DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus,
                                       CameraPlan* plan, std::string* error);
 

@@ -13,8 +13,8 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr Duration kPollInterval =
-    Duration::milliseconds(1);  // between two looks at a register that is to change
+// Interval of polling a register.
+constexpr Duration kPollInterval = Duration::milliseconds(1);
 
 void pause(Duration d) noexcept {
   timespec t{static_cast<time_t>(d.ns() / 1'000'000'000),
@@ -55,7 +55,8 @@ std::uint32_t CameraRegisters::get_optional(std::uint32_t offset) noexcept {
 }
 
 std::uint64_t CameraRegisters::table(std::uint32_t offset) noexcept {
-  constexpr std::uint32_t kLargest = 0x0FFF'FFFF / 4;  // inside the node's register space
+  // Largest offset inside the node's register space.
+  constexpr std::uint32_t kLargest = 0x0FFF'FFFF / 4;
   const std::uint32_t quadlets = get(offset);
   return quadlets == 0 || quadlets > kLargest
              ? 0
@@ -153,7 +154,7 @@ DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* message) 
     *message = "its configuration ROM cannot be read";
     return status;
   }
-  // Some end their ROM with a time-out instead of a refusal; what was read decides.
+  // Some cameras end their ROM with a timeout instead of a refusal; the data read so far decide.
   const RomStatus parsed = parse_config_rom(std::span(quadlets).first(n), rom);
   if (parsed == RomStatus::ok) return DeviceStatus::ok;
   *message = to_string(parsed);

@@ -20,8 +20,8 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr Duration kSlow = Duration::milliseconds(
-    90);  // a register access that takes longer met the kernel's split time-out
+// A register access that takes longer has met the kernel's split timeout.
+constexpr Duration kSlow = Duration::milliseconds(90);
 
 constexpr const char* kNoStack = "this kernel has no FireWire stack: modprobe firewire-ohci";
 
@@ -30,7 +30,7 @@ DeviceInfo to_device_info(const FirewireNode& node) {
           node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
 }
 
-/// libdc1394 writes to stderr unless told otherwise; what matters is said by status and message.
+/// Disables libdc1394's messages on stderr; status and last_error() replace them.
 void silence_library() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -67,8 +67,8 @@ DeviceStatus FirewireBus::open_node(std::string_view requested) {
       if (!requested.empty()) return status;
       continue;
     }
-    // The kernel lets any number of programs at a camera; two that stream would spoil each other's
-    // registers.
+    // The kernel admits any number of programs to a camera; two that stream would corrupt each
+    // other's registers.
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
       status = DeviceStatus::busy;
       last_error_ = node.device + " is locked";
@@ -105,14 +105,15 @@ void FirewireBus::close_node() noexcept {
 
 FirewireBus::~FirewireBus() {
   stop();
-  ring_.discard_kept();  // the consumer is gone by contract
+  // By contract the consumer no longer uses images.
+  ring_.discard_kept();
   end_ring();
   close_node();
   if (wake_ >= 0) (void)::close(wake_);
 }
 
-/// A camera that was given up while its node is there (silent, out of step) still captures where an
-/// image is held: close_node() would free what the capture works on.
+/// A camera given up while its node exists (silent, misaligned) still captures while an image is
+/// held; close_node() would free the memory in use.
 void FirewireBus::end_capture() noexcept {
   if (ring_.any_kept()) {
     ring_.abandon();
@@ -148,7 +149,7 @@ DeviceStatus FirewireBus::reopen() noexcept {
 
 // ---- registers
 
-/// libdc1394 says only that it failed.
+/// Derives the status from the duration, because libdc1394 reports only a failure.
 DeviceStatus FirewireBus::failure(HostStamp begun) const noexcept {
   if (::access(node_.device.c_str(), F_OK) != 0) return DeviceStatus::disconnected;
   return monotonic_now() - begun > kSlow ? DeviceStatus::timeout : DeviceStatus::unsupported;
@@ -172,7 +173,7 @@ DeviceStatus FirewireBus::write(std::uint64_t address, std::uint32_t value) noex
 
 // ---- the ring
 
-/// Precondition: no slot of it is kept.
+/// Precondition: no slot of the ring is kept.
 void FirewireBus::end_ring() noexcept {
   if (lost_.load(std::memory_order_acquire)) {
     ring_.abandon();
@@ -213,7 +214,8 @@ class FirewireDriver final : public CameraDriver {
   std::string last_error() const override { return last_error_; }
 
  private:
-  std::map<std::string, std::shared_ptr<SharedClock>> clocks_;  // by bus
+  // Clocks by bus name.
+  std::map<std::string, std::shared_ptr<SharedClock>> clocks_;
   std::string last_error_;
 };
 

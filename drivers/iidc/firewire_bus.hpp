@@ -13,15 +13,14 @@
 
 namespace vergence::iidc {
 
-/// An IIDC camera on IEEE 1394, by libdc1394.
+/// IIDC camera on IEEE 1394, by libdc1394.
 ///
-/// Stream     FirewireRing: slots are libdc1394's DMA ring, and survive an unplug while they are
-///            held.
-/// Threads    A thread polls the capture between start() and stop(), never without a limit:
-///            libdc1394's own wait has none.
+/// Slots are libdc1394's DMA ring (FirewireRing) and survive a disconnect while they are held.
+/// Between start() and stop() a thread polls the capture with a limit, because libdc1394's own wait
+/// has none.
 class FirewireBus final : public CameraBus {
  public:
-  /// `requested` as names_camera(). Null: *status and *error say why.
+  /// `requested` as in names_camera(). Returns null on failure; *status and *error have the reason.
   [[nodiscard]] static std::unique_ptr<FirewireBus> open(std::string_view requested,
                                                          DeviceStatus* status, std::string* error);
   ~FirewireBus() override;
@@ -29,7 +28,7 @@ class FirewireBus final : public CameraBus {
   FirewireBus& operator=(const FirewireBus&) = delete;
 
   [[nodiscard]] const ConfigRom& rom() const noexcept { return node_.rom; }
-  /// The bus it hangs on: cameras of one bus have one clock.
+  /// Bus of the camera; all cameras of a bus share its clock.
   [[nodiscard]] const std::string& bus() const noexcept { return node_.bus; }
   [[nodiscard]] DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override;
   [[nodiscard]] DeviceStatus write(std::uint64_t address, std::uint32_t value) noexcept override;
@@ -61,12 +60,14 @@ class FirewireBus final : public CameraBus {
   std::string last_error_;
   dc1394_t* library_ = nullptr;
   dc1394camera_t* camera_ = nullptr;
-  int lock_ = -1;  // descriptor that keeps other programs of ours away
+  // Descriptor of the lock against other instances of this program.
+  int lock_ = -1;
 
   FirewireRing ring_;
   StreamSink* sink_ = nullptr;
   std::thread thread_;
-  int wake_ = -1;  // eventfd
+  // Descriptor of an eventfd.
+  int wake_ = -1;
   std::atomic<bool> stopping_{false}, lost_{false};
 };
 

@@ -12,8 +12,8 @@ constexpr const char* kDevices = "bus/firewire/devices";
 
 std::vector<std::uint32_t> read_rom_file(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
-  std::vector<std::uint32_t> quadlets(
-      kMaxRomQuadlets);  // in the processor's order, as the kernel shows them
+  // Quadlets in host byte order, as the kernel provides them.
+  std::vector<std::uint32_t> quadlets(kMaxRomQuadlets);
   in.read(reinterpret_cast<char*>(quadlets.data()),
           static_cast<std::streamsize>(4 * quadlets.size()));
   quadlets.resize(static_cast<std::size_t>(in.gcount()) / 4);
@@ -33,8 +33,8 @@ std::vector<FirewireNode> list_firewire_cameras(const fs::path& root) {
   for (fs::directory_iterator it(root / kDevices, error), end; !error && it != end;
        it.increment(error)) {
     const std::string name = it->path().filename().string();
-    if (!name.starts_with("fw") || name.find('.') != std::string::npos)
-      continue;  // fw1.0 is a unit of fw1
+    // Skips units: fw1.0 is a unit of fw1.
+    if (!name.starts_with("fw") || name.find('.') != std::string::npos) continue;
     FirewireNode node;
     node.device = "/dev/" + name;
     if (parse_config_rom(read_rom_file(it->path() / "config_rom"), &node.rom) != RomStatus::ok)

@@ -8,14 +8,16 @@
 
 namespace vergence::iidc {
 
-/// One camera on an IEEE 1394 bus, as the kernel lists it.
+/// Camera on an IEEE 1394 bus, as listed by the kernel.
 struct FirewireNode {
-  std::string device;  // /dev/fw1
-  std::string bus;     // same text: same bus
+  /// Path of the node, as in /dev/fw1.
+  std::string device;
+  /// Identifies the bus: equal texts mean the same bus.
+  std::string bus;
   ConfigRom rom{};
 };
 
-/// The cameras on all buses; nothing is opened. `root`: /sys, elsewhere in tests.
+/// Cameras on all buses; opens no device. `root` differs from /sys only in tests.
 [[nodiscard]] std::vector<FirewireNode> list_firewire_cameras(
     const std::filesystem::path& root = "/sys");
 

@@ -48,7 +48,8 @@ DeviceStatus FirewireRing::set_up(dc1394camera_t* camera, const std::string& dev
   return DeviceStatus::ok;
 }
 
-/// The library tells where its ring is only with the first frame; an unplug may come before.
+/// The library reveals the ring's address only with the first frame, and a disconnect may come
+/// first.
 bool FirewireRing::find_map(const std::string& device) {
   std::ifstream maps("/proc/self/maps");
   const std::uint8_t* known = maps_[1 - generation()].base;
@@ -74,16 +75,16 @@ void FirewireRing::end() noexcept {
   maps_[generation()] = {};
 }
 
-/// Images that are held stay at their addresses, in memory of their own: as long as anything of the
-/// node's file is mapped the kernel keeps the capture, and its channel, which the next capture
-/// needs.
+/// Moves held images to private memory at the same addresses. While any of the node's file is
+/// mapped, the kernel keeps the capture and its channel, which the next capture needs.
 void FirewireRing::detach_kept() noexcept {
   const Map& m = maps_[generation()];
   std::uint64_t bits = kept_in(generation());
   if (m.base == nullptr || bits == 0) return;
   void* const own =
       ::mmap(nullptr, m.length, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (own == MAP_FAILED) return;  // it ends when they come back, then
+  // The capture then ends when the images are released.
+  if (own == MAP_FAILED) return;
   for (; bits != 0; bits &= bits - 1) {
     const auto at = static_cast<std::size_t>(std::countr_zero(bits)) * m.stride;
     std::memcpy(static_cast<std::uint8_t*>(own) + at, m.base + at, m.stride);
@@ -128,37 +129,38 @@ const std::uint8_t* FirewireRing::bytes(FrameSlot slot) const noexcept {
 
 bool FirewireRing::give_back(FrameSlot slot) noexcept {
   const bool current = slot / kMaxBuffers == generation_.load(std::memory_order_acquire);
-  if (current)
-    returned_.put(
-        slot);  // before it leaves kept_: an owner that sees none kept finds all of them here
+  // Added before the slot leaves kept_, so that an owner that sees none kept finds all of them
+  // here.
+  if (current) returned_.put(slot);
   (void)kept_.remove(slot);
   return current;
 }
 
 void FirewireRing::enqueue(std::size_t buffer) noexcept {
-  dc1394video_frame_t frame{};  // the library looks at these two only
+  // The library reads only these two fields.
+  dc1394video_frame_t frame{};
   frame.camera = camera_;
   frame.id = static_cast<std::uint32_t>(buffer);
-  if (dc1394_capture_enqueue(camera_, &frame) != DC1394_SUCCESS)
-    return;  // gone: told by the next poll
+  // The device is disconnected; the next poll reports it.
+  if (dc1394_capture_enqueue(camera_, &frame) != DC1394_SUCCESS) return;
   queue_[(queue_first_ + queued_++) % queue_.size()] = static_cast<std::uint8_t>(buffer);
 }
 
 void FirewireRing::enqueue_returned() noexcept {
   const std::uint64_t all = returned_.take_all();
-  // Accepts slots of this ring only: a slot of the one before may have come back while it was
-  // replaced.
+  // Accepts slots of this ring only: a slot of the previous ring may have been released during the
+  // change.
   std::uint64_t bits = all >> generation() * kMaxBuffers & 0xFFFF'FFFFU;
   for (; bits != 0; bits &= bits - 1) enqueue(static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
-/// False: the device is gone. *frame null: nothing is filled.
+/// Returns false if the device is disconnected. *frame is null if no buffer is filled.
 bool FirewireRing::dequeue(dc1394video_frame_t** frame) noexcept {
   *frame = nullptr;
   return dc1394_capture_dequeue(camera_, DC1394_CAPTURE_POLICY_POLL, frame) == DC1394_SUCCESS;
 }
 
-/// The buffer that was queued first is the one that was filled. Precondition: queued_ > 0.
+/// The buffer that was queued first was filled. Precondition: queued_ > 0.
 std::size_t FirewireRing::pop_queued() noexcept {
   const std::size_t buffer = queue_[queue_first_];
   queue_first_ = (queue_first_ + 1) % queue_.size();
@@ -178,8 +180,10 @@ void FirewireRing::resume() noexcept {
 FirewireRing::Take FirewireRing::take(Filled* filled) noexcept {
   dc1394video_frame_t* frame = nullptr;
   if (!dequeue(&frame)) return Take::gone;
-  if (frame == nullptr) return Take::nothing;  // a bus reset, or nothing
-  if (queued_ == 0) return Take::nothing;      // cannot be: the kernel filled what it did not have
+  // A bus reset, or no frame.
+  if (frame == nullptr) return Take::nothing;
+  // Cannot happen: the kernel would have filled a buffer that was not queued.
+  if (queued_ == 0) return Take::nothing;
   filled->slot = static_cast<FrameSlot>(generation() * kMaxBuffers + pop_queued());
   filled->broken = frame->total_bytes != shape_.frame_bytes;
   filled->spare = queued_ >= kReserve;

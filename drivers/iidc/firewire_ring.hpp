@@ -12,21 +12,20 @@
 
 namespace vergence::iidc {
 
-/// libdc1394's DMA ring: its buffers are the slots of an IEEE 1394 camera.
+/// libdc1394's DMA ring, whose buffers are the slots of an IEEE 1394 camera.
 ///
-/// The library hands its buffers out by counting, whatever was filled; which one was filled is told
-/// by the order in which they were queued, kept here. So buffers can come back in any order, and
-/// one that finds no taker goes back at once; kReserve stay with the kernel, that it never runs
-/// dry.
-/// Slots      Two ranges of kMaxBuffers: after an unplug images that are still held stay where they
-///            are in one, the new ring takes the other.
-/// Unplug     libdc1394's capture_stop fails on a node that is gone, and leaves mapping and
-///            descriptor: they are undone here. (Some kilobytes of its heap stay.)
-/// Ownership  The camera is the caller's and open from set_up() to end() or abandon().
-/// Threads    set_up, resume, end, …: the owner, while no thread takes. take, refuse,
-///            enqueue_returned: the stream's thread. give_back, bytes: any.
-/// Memory     The kernel's and the library's, at set_up(). Time: no call waits for a frame.
-/// Errors     Nothing throws but set_up(), where a message finds no memory.
+/// The library returns buffers in order of its counter, whichever was filled. The filled one
+/// follows from the order of queueing, recorded here. So buffers may be released in any order.
+/// kReserve buffers stay with the kernel, so that it never runs out.
+/// Slots      Two ranges of kMaxBuffers. After a disconnect, held images keep their place in one
+///            and the new ring takes the other.
+/// Unplug     libdc1394's capture_stop fails on a disconnected node and leaves mapping and
+///            descriptor, which are released here. (Some kilobytes of its heap are leaked.)
+/// Ownership  The caller owns the camera and keeps it open from set_up() to end() or abandon().
+/// Threads    The comment above each group of calls names the thread; the owner's calls require
+///            that no thread takes.
+/// Memory     Allocated by kernel and library in set_up(). No call waits for a frame.
+/// Errors     Only set_up() may throw, std::bad_alloc.
 class FirewireRing {
  public:
   static constexpr std::size_t kReserve = 3;
@@ -34,10 +33,13 @@ class FirewireRing {
   /// Result of take().
   enum class Take : std::uint8_t { filled, nothing, gone };
   struct Filled {
-    FrameSlot slot = 0;  // kept until give_back() or refuse()
+    /// Held until give_back() or refuse().
+    FrameSlot slot = 0;
     bool broken = false;
-    bool spare = false;       // it can be kept: the kernel has enough without it
-    std::uint64_t at_us = 0;  // of its first packet, by the system's clock; 0: not known
+    /// True if the slot can be kept because the kernel has enough buffers without it.
+    bool spare = false;
+    /// Time of the first packet on the system's clock, in µs; 0 if unknown.
+    std::uint64_t at_us = 0;
   };
 
   ~FirewireRing();
@@ -45,48 +47,51 @@ class FirewireRing {
   FirewireRing(const FirewireRing&) = delete;
   FirewireRing& operator=(const FirewireRing&) = delete;
 
-  // The owner.
-  /// For the next set_up(). Precondition: !captured().
+  // Calls of the owner.
+
+  /// Sets the shape for the next set_up(). Precondition: !captured().
   void set_shape(const StreamShape& shape) noexcept { shape_ = shape; }
   [[nodiscard]] const StreamShape& shape() const noexcept { return shape_; }
-  /// All buffers are with the kernel. `device`: the camera's node. → ok, disconnected,
-  /// no_bandwidth, failed; then *error says why
+  /// Starts a capture and queues all buffers. `device` is the camera's node. On failure *error has
+  /// the reason. → ok, disconnected, no_bandwidth, failed
   [[nodiscard]] DeviceStatus set_up(dc1394camera_t* camera, const std::string& device,
                                     std::string* error);
-  /// Between set_up() and end() or abandon().
+  /// True between set_up() and end() or abandon().
   [[nodiscard]] bool captured() const noexcept { return captured_; }
-  /// Images of the ring in use are held.
+  /// True if images of the present ring are held.
   [[nodiscard]] bool any_kept() const noexcept;
-  /// Goes on with a ring of which images are still held: what came meanwhile goes back.
+  /// Continues with a ring of which images are still held; returns those released meanwhile.
   void resume() noexcept;
-  /// Ends a capture whose node is there, if it still is. Precondition: !any_kept().
+  /// Ends a capture whose node still exists. Precondition: !any_kept().
   void end() noexcept;
-  /// Ends a capture whose node is gone or about to be closed, unless its images are in use.
+  /// Ends a capture whose node is disconnected or about to be closed, unless its images are in use.
   void abandon() noexcept;
-  /// Unmaps what is left of captures that ended, once nothing in it is kept.
+  /// Unmaps the remains of ended captures once none of their slots is kept.
   void drop_orphans() noexcept;
-  /// A range of slots is free for a ring beside the images that are held.
+  /// True if a range of slots is free for a new ring.
   [[nodiscard]] bool has_room() const noexcept;
-  /// The next ring takes the range that is free. Precondition: !captured(), has_room().
+  /// Assigns the free range to the next ring. Precondition: !captured(), has_room().
   void use_free_range() noexcept;
-  /// Images are no longer in use.
+  /// Called when images are no longer in use.
   void discard_kept() noexcept { kept_.clear(); }
 
-  // The stream's thread. Precondition: captured().
-  /// Readable when a buffer is filled.
+  // Calls of the stream's thread. Precondition: captured().
+  /// Descriptor that is readable when a buffer is filled.
   [[nodiscard]] int descriptor() const noexcept { return dc1394_capture_get_fileno(camera_); }
   [[nodiscard]] Take take(Filled* filled) noexcept;
-  /// Gives back unused buffers of take().
+  /// Returns a buffer of take() that is not used.
   void refuse(FrameSlot slot) noexcept;
   void enqueue_returned() noexcept;
 
-  // Any thread.
-  /// True: a buffer of the ring in use came back, the stream's thread has something to enqueue.
+  // Calls of any thread.
+
+  /// Returns true if the buffer is of the present ring, so that the stream's thread has to enqueue
+  /// it.
   [[nodiscard]] bool give_back(FrameSlot slot) noexcept;
   [[nodiscard]] const std::uint8_t* bytes(FrameSlot slot) const noexcept;
 
  private:
-  /// One range of slots and what is mapped for it.
+  /// Mapping of one range of slots.
   struct Map {
     std::uint8_t* base = nullptr;
     std::size_t length = 0;
@@ -108,11 +113,15 @@ class FirewireRing {
   StreamShape shape_{};
   bool captured_ = false;
   std::array<Map, 2> maps_{};
-  std::atomic<std::size_t> generation_{0};         // of maps_, in use
-  std::array<std::uint8_t, kMaxBuffers> queue_{};  // buffers with the kernel, in order
+  // Index of the present range in maps_.
+  std::atomic<std::size_t> generation_{0};
+  // Buffers queued in the kernel, in order.
+  std::array<std::uint8_t, kMaxBuffers> queue_{};
   std::size_t queue_first_ = 0, queued_ = 0;
-  SlotSet kept_;      // slots that the sink has
-  SlotSet returned_;  // slots of this generation on their way back to the kernel
+  // Slots held by the sink.
+  SlotSet kept_;
+  // Released slots of this generation that are to be enqueued.
+  SlotSet returned_;
 };
 
 }  // namespace vergence::iidc

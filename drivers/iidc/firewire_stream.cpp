@@ -13,11 +13,12 @@
 #include "drivers/clock.hpp"
 #include "drivers/iidc/firewire_bus.hpp"
 
-/// The thread that takes images from the ring of an IEEE 1394 camera.
+/// Thread that takes images from the ring of an IEEE 1394 camera.
 namespace vergence::iidc {
 namespace {
 
-constexpr int kPollMs = 100;  // a thread that polls looks up at least so often
+// Longest poll of the stream's thread, in milliseconds.
+constexpr int kPollMs = 100;
 
 std::int64_t realtime_us() noexcept {
   timespec t{};
@@ -77,7 +78,7 @@ void FirewireBus::stream() noexcept {
   sink_->gone(monotonic_now());
 }
 
-/// False: the device is gone.
+/// Returns false if the device is disconnected.
 bool FirewireBus::read_event() noexcept {
   FirewireRing::Filled filled;
   switch (ring_.take(&filled)) {

@@ -7,8 +7,10 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr double kHighestRate = 250;   // Hz: no camera of this kind exposes more often
-constexpr std::int64_t kBacklog = 64;  // exposures that may arrive at once after a hold-up
+// In Hz; no camera of this kind exposes more often.
+constexpr double kHighestRate = 250;
+// Maximum number of exposures that arrive together after a delay.
+constexpr std::int64_t kBacklog = 64;
 
 }  // namespace
 
@@ -47,14 +49,15 @@ bool FrameReader::continues(const Embedded& next, HostStamp at) const noexcept {
 }
 
 bool FrameReader::holds_next_frame(const Arrival& arrival, const Embedded& own) const noexcept {
-  constexpr std::uint32_t kLater = 1000;  // frames
+  // Maximum difference of the next frame's counter.
+  constexpr std::uint32_t kLater = 1000;
   const std::size_t packet = shape_.packet_bytes;
   if (!isochronous_ || packet == 0 || !info_.has(FrameInfoItem::time)) return false;
   for (std::size_t at = packet; at + info_.size() <= arrival.bytes; at += packet) {
     const Embedded e = embedded(arrival.data + at, arrival.bytes - at);
     const std::int64_t later =
         (e.wrapped_ns - own.wrapped_ns + kCycleTimeWrapNs) % kCycleTimeWrapNs;
-    // Two quadlets that both fit: pixels do so by chance once in 10¹⁰ packets.
+    // Requires two matching quadlets, which pixels produce by chance once in 10¹⁰ packets.
     if (e.valid && e.counter - own.counter - 1 < kLater && later > 0 &&
         later < kCycleTimeWrapNs / 4)
       return true;
@@ -86,7 +89,8 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
     suspect_ = true;
     suspect_counter_ = e.counter;
     if (!follows) return f;
-    f.counter = counter_.rebase(e.counter);  // the camera counts from zero
+    // The camera has restarted its counter.
+    f.counter = counter_.rebase(e.counter);
   } else {
     f.missing = counter_.known() ? static_cast<std::uint64_t>(counter_.step(e.counter) - 1) : 0;
     f.counter = counter_.take(e.counter);

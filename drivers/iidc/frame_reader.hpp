@@ -8,21 +8,21 @@
 
 namespace vergence::iidc {
 
-/// Kind of one arrival.
+/// Result of reading one arrival.
 struct ReadFrame {
-  bool taken = false;  // false: nothing an exposure could be told from; its number, if it had one,
-                       // shows as a gap
-  bool stray = false;  // not taken, and long enough to be a frame: the stream may be out of step
+  /// False if no exposure could be identified; its number, if any, appears as a gap.
+  bool taken = false;
+  /// True if not taken although long enough for a frame, which suggests a misaligned stream.
+  bool stray = false;
   FrameStatus status = FrameStatus::complete;
   std::uint64_t counter = 0;
-  std::uint64_t missing = 0;  // exposures between this one and the last taken
+  /// Exposures missing between the last taken frame and this one.
+  std::uint64_t missing = 0;
   DeviceStamp exposure_start{};
 };
 
-/// The clock that cameras stamp by, which wraps after 128 s: all cameras of an IEEE 1394 bus share
-/// one, so that their counts of wraps agree.
-///
-/// Threads  Any, for nanoseconds each.
+/// Unwraps the clock of the cameras' stamps, which wraps after 128 s. All cameras of an IEEE 1394
+/// bus share one, so that their counts of wraps agree. Thread-safe.
 class SharedClock {
  public:
   [[nodiscard]] std::int64_t unwrap(std::int64_t wrapped_ns, HostStamp at) noexcept {
@@ -35,19 +35,20 @@ class SharedClock {
   CycleUnwrapper unwrapper_;
 };
 
-/// Reads number, stamp and wholeness out of what the stream brings.
+/// Extracts number, stamp and completeness from the stream's buffers.
 ///
-/// With embedded information: counter and stamp are the camera's; a number that the time since the
-/// last frame cannot explain is not believed, unless the next one continues it. Without: frames are
-/// counted as they come, gaps told from bus stamps if there are any. A packet lost on an
-/// isochronous bus leaves the buffer to be filled by the beginning of the next frame: the stamp of
-/// that one stands at a packet's place inside the image, and is looked for.
-/// Threads  One (the stream's), after begin(). Memory: in place. Time: one look per packet.
+/// With embedded information, counter and stamp are the camera's. A number that disagrees with the
+/// time since the last frame is ignored unless the next one continues it. Without it, frames are
+/// counted on arrival and gaps derived from bus stamps if available. If an isochronous packet is
+/// lost, the next frame's beginning fills the buffer; its stamp is then found at a packet boundary
+/// inside the image.
+/// Only the stream's thread may call it after begin(). Does not allocate.
 class FrameReader {
  public:
   void begin(const CameraPlan& plan, bool isochronous, SharedClock* clock) noexcept;
   [[nodiscard]] ReadFrame read(const Arrival& arrival) noexcept;
-  /// Sets the exposure of the next frame: stamps of other instants are brought to its start.
+  /// Sets the exposure of the next frame, which is needed to refer its stamp to the start of
+  /// exposure.
   void set_exposure(Duration exposure) noexcept { exposure_ = exposure; }
 
  private:
@@ -75,7 +76,8 @@ class FrameReader {
   bool any_ = false;
   HostStamp last_at_{};
   HostStamp last_bus_stamp_{};
-  bool suspect_ = false;  // a number that could not be
+  // True after an implausible number.
+  bool suspect_ = false;
   std::uint32_t suspect_counter_ = 0;
 };
 

@@ -3,17 +3,16 @@
 
 #include "drivers/camera.hpp"
 
-/// FireWire-class industrial cameras (IIDC 1.31), over USB and over IEEE 1394.
-/// drivers/iidc/README.md, drivers/iidc/README.md
+/// Industrial cameras of the FireWire class (IIDC 1.31), on USB and IEEE 1394; see
+/// drivers/iidc/README.md.
 namespace vergence::iidc {
 
-/// Cameras that carry IIDC's registers over USB (Point Grey's Firefly, Chameleon, Flea3,
-/// Grasshopper3), through libusb.
-/// `serial`: GUID in hexadecimal, or the number on the label.
+/// Driver for cameras that have IIDC's registers on USB (Point Grey's Firefly, Chameleon, Flea3,
+/// Grasshopper3), by libusb. `serial` is the GUID in hexadecimal or the number on the label.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_usb_driver();
 
-/// Cameras on IEEE 1394, through libdc1394 and the kernel's juju stack. Cameras that are opened by
-/// one driver and hang on one bus share its budget of bandwidth and its clock.
+/// Driver for cameras on IEEE 1394, by libdc1394 and the kernel's juju stack. Cameras of one driver
+/// on one bus share its bandwidth and clock.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_1394_driver();
 
 }  // namespace vergence::iidc

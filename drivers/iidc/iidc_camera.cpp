@@ -26,7 +26,8 @@ DeviceStatus IidcCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   try {
     return configure_or_throw(requested, actual);
-  } catch (const std::exception&) {  // no memory for the slots, or for a message
+    // Out of memory for slots or a message.
+  } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
 }
@@ -63,7 +64,7 @@ DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& requested
   return DeviceStatus::ok;
 }
 
-/// From one packet a cycle on 1394; on USB as fast as the wire at best.
+/// On 1394 one packet per cycle; on USB the speed of the wire at best.
 Duration IidcCamera::transfer_time() const noexcept {
   const BusTraits& bus = bus_->traits();
   if (bus.isochronous)
@@ -80,7 +81,8 @@ DeviceTiming IidcCamera::timing() const noexcept {
   const bool stamped = plan_.info.has(FrameInfoItem::time);
   t.resolution = stamped ? Duration::nanoseconds(kCycleNs / kTicksPerCycle + 1)
                          : Duration::nanoseconds(kCycleNs);
-  if (!stamped && !bus.isochronous) {  // the stamp is the arrival
+  // The arrival serves as stamp.
+  if (!stamped && !bus.isochronous) {
     t.min_delay = plan_.exposure;
     t.resolution = Duration::milliseconds(1);
   }
@@ -101,7 +103,8 @@ DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
       (void)registers_.pop_status();
     }
     bus_->stop();
-    if (again) {  // still gone, until it comes back or stop()
+    // Remains disconnected until the camera reconnects or stop() is called.
+    if (again) {
       lost_.store(true, std::memory_order_release);
       queue_.fail();
     } else {
@@ -123,20 +126,20 @@ DeviceStatus IidcCamera::begin(Notifier* ready) {
   }
   CameraPlan plan = plan_;
   DeviceStatus status = apply_plan(&registers_, bus_->traits(), &plan, &why);
-  if (status == DeviceStatus::disconnected)
-    lost_.store(true, std::memory_order_release);  // unplugged while stopped
+  // The camera was disconnected while stopped.
+  if (status == DeviceStatus::disconnected) lost_.store(true, std::memory_order_release);
   if (status == DeviceStatus::timeout || status == DeviceStatus::failed ||
       status == DeviceStatus::unsupported) {
     lost_.store(true, std::memory_order_release);
-    status = DeviceStatus::disconnected;  // it does not answer as it did; asked again, it is opened
-                                          // again
+    // The camera no longer responds as before; the next start() opens it again.
+    status = DeviceStatus::disconnected;
   }
   if (status == DeviceStatus::ok && !(plan.shape == plan_.shape)) {
     why = "the camera's frames are not those it was configured for; configure it again";
     status = DeviceStatus::bad_configuration;
   }
   if (status != DeviceStatus::ok) return refused(status, std::move(why));
-  // Field by field: a consumer may be looking at an image of before, by plan_.size.
+  // Assigns field by field, because a consumer may be viewing an earlier image by plan_.size.
   plan_.exposure = plan.exposure;
   plan_.gain_db = plan.gain_db;
   plan_.rate_hz = plan.rate_hz;
@@ -171,7 +174,8 @@ void IidcCamera::stop() noexcept {
   const bool was = queue_.started();
   queue_.end();
   if (!was) return;
-  const std::lock_guard lock(asking_);  // libdc1394 takes no question while a capture ends
+  // libdc1394 permits no register access while a capture ends.
+  const std::lock_guard lock(asking_);
   if (!lost_.load(std::memory_order_acquire)) {
     registers_.transmit(false);
     if (registers_.pop_status() == DeviceStatus::disconnected)
@@ -218,7 +222,8 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
   const DeviceStatus status = registers_.pop_status();
   if (status != DeviceStatus::ok)
     return status == DeviceStatus::disconnected ? status : DeviceStatus::failed;
-  plan_.exposure = taken.exposure;  // also after a stop or a replug
+  // The setting also applies after a stop or a reconnect.
+  plan_.exposure = taken.exposure;
   plan_.gain_db = taken.gain_db;
   (void)exposures_.change(taken, monotonic_now());
   if (actual != nullptr) *actual = taken;
@@ -233,7 +238,8 @@ std::string IidcCamera::remark() const {
 // ---- the stream's thread
 
 bool IidcCamera::frame(const Arrival& arrival) noexcept {
-  if (lost_.load(std::memory_order_acquire)) return false;  // nothing follows a `gone`
+  // No frame follows a `gone`.
+  if (lost_.load(std::memory_order_acquire)) return false;
   const ExposureSetting& had = exposures_.at(arrival.at - transfer_ - exposure_now_);
   exposure_now_ = had.exposure;
   reader_.set_exposure(had.exposure);
@@ -262,7 +268,8 @@ bool IidcCamera::frame(const Arrival& arrival) noexcept {
     return false;
   }
   const bool offered = queue_.offer(frame);
-  if (!offered && convert) converted_.release(frame.slot);  // it was stopped just now
+  // The stream was stopped meanwhile.
+  if (!offered && convert) converted_.release(frame.slot);
   return offered && !convert;
 }
 
@@ -275,8 +282,8 @@ void IidcCamera::gone(HostStamp at) noexcept {
 
 DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
   const DeviceStatus status = queue_.wait(limit, frame);
-  if (status == DeviceStatus::disconnected)
-    lost_.store(true, std::memory_order_release);  // silent, then
+  // The camera is silent.
+  if (status == DeviceStatus::disconnected) lost_.store(true, std::memory_order_release);
   return status;
 }
 
@@ -299,7 +306,7 @@ void IidcCamera::release(FrameSlot slot) noexcept {
   if (queue_.release(slot)) return_slot(slot);
 }
 
-/// Discards frames left between stream and consumer. Precondition: the stream is stopped.
+/// Discards frames between stream and consumer. Precondition: the stream is stopped.
 void IidcCamera::drain() noexcept {
   for (FrameSlot slot = 0; queue_.drain(&slot);) return_slot(slot);
 }

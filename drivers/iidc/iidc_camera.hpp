@@ -15,24 +15,23 @@
 
 namespace vergence::iidc {
 
-/// An IIDC camera, whatever it hangs on.
+/// IIDC camera on any bus, with the contract of drivers/camera.hpp. Slots are the bus's buffers;
+/// only modes that are not 8-bit grey are converted, on the stream's thread, into memory of the
+/// camera.
 ///
-/// Contract as drivers/camera.hpp. Slots are the bus's buffers; only modes that are not 8-bit grey
-/// are converted, on the stream's thread, into memory of the camera's own.
-/// Counter   The camera's, where it embeds one: gaps are exposures that never arrived. `lost`
-///           counts them as soon as a later one is here.
-/// Stamps    The camera's own clock where it embeds it (on one 1394 bus common to all cameras),
-///           else the arrival.
-/// Gone      When the bus says so, when the stream is out of step for kStrays frames, or when a
-///           free running camera is silent (longest_silence()): start() begins again.
-/// Restart   start() writes all registers again: after a stop or a replug the camera is as
-///           configured.
+/// Counter   The camera's embedded one, if any: gaps are exposures that were not received. `lost`
+///           counts them once a later frame has arrived.
+/// Stamps    The camera's embedded clock (common to all cameras of a 1394 bus), else the arrival.
+/// Gone      Reported by the bus, after kStrays misaligned frames, or when a free-running camera is
+///           silent (longest_silence()); start() resumes.
+/// Restart   start() writes all registers again, so the configuration survives a stop or a
+///           reconnect.
 class IidcCamera final : public CameraDevice, private StreamSink {
  public:
   static constexpr int kStrays = 8;
 
-  /// `rom` of this camera. `clock` null: the camera's clock is its own. `patience`: how long a
-  /// register may take to become ready.
+  /// `rom` is that of this camera. A null `clock` means that the camera has its own. `patience`
+  /// limits the wait for a register to become ready.
   IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom,
              std::shared_ptr<SharedClock> clock, Duration patience = Duration::seconds(1));
   ~IidcCamera() override;
@@ -57,7 +56,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
     return queue_.statistics();
   }
 
-  /// The plan in force; its mode and packets are what the diagnosis of a bus needs. Owner's thread.
+  /// The applied plan; mode and packets serve the diagnosis of a bus. Owner's thread only.
   [[nodiscard]] const CameraPlan& plan() const noexcept { return plan_; }
 
  private:
@@ -75,21 +74,26 @@ class IidcCamera final : public CameraDevice, private StreamSink {
 
   std::unique_ptr<CameraBus> bus_;
   std::shared_ptr<SharedClock> clock_;
-  std::mutex asking_;  // of registers_, plan_ and the bus's start and stop: the owner's, and
-                       // trigger_once(), set_exposure()
+  // Guards registers_, plan_ and the bus's start and stop between the owner, trigger_once() and
+  // set_exposure().
+  std::mutex asking_;
   CameraRegisters registers_;
   CameraPlan plan_{};
   bool configured_ = false;
   std::string last_error_;
 
-  FrameReader reader_;  // the stream's thread
+  // Used only by the stream's thread.
+  FrameReader reader_;
   exposure::AppliedExposure exposures_;
-  Duration transfer_{}, exposure_now_{};  // of a frame over the bus; of the last frame
-  SlotMemory converted_;                  // where the bus's buffers are not the image
+  // Transfer time of a frame, and exposure of the last one.
+  Duration transfer_{}, exposure_now_{};
+  // Converted images, if the bus's buffers are not the images.
+  SlotMemory converted_;
   int strays_ = 0;
 
   FrameQueue queue_;
-  std::atomic<bool> lost_{false};  // the device is gone, whether told or not
+  // True if the device is disconnected, reported or not.
+  std::atomic<bool> lost_{false};
 };
 
 }  // namespace vergence::iidc

@@ -12,10 +12,10 @@
 
 namespace vergence::iidc {
 
-/// A set of slot numbers that any thread may put into and take from: one word, no lock.
+/// Lock-free set of slot numbers, in one word. Thread-safe.
 class SlotSet {
  public:
-  /// The first n numbers; n ≤ 64.
+  /// Fills the set with the first n numbers; n ≤ 64.
   void fill(std::size_t n) noexcept {
     bits_.store(n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1,
                 std::memory_order_release);
@@ -24,12 +24,12 @@ class SlotSet {
   void put(FrameSlot slot) noexcept {
     bits_.fetch_or(std::uint64_t{1} << slot, std::memory_order_acq_rel);
   }
-  /// Takes it out; false: it was not in.
+  /// Removes the slot; returns false if it was not in the set.
   bool remove(FrameSlot slot) noexcept {
     const std::uint64_t one = std::uint64_t{1} << slot;
     return (bits_.fetch_and(~one, std::memory_order_acq_rel) & one) != 0;
   }
-  /// Takes the lowest out.
+  /// Removes the lowest slot.
   [[nodiscard]] std::optional<FrameSlot> take() noexcept {
     std::uint64_t bits = bits_.load(std::memory_order_acquire);
     while (bits != 0)
@@ -51,17 +51,16 @@ class SlotSet {
   std::atomic<std::uint64_t> bits_{0};
 };
 
-/// Buffers of one size, page aligned, that are slots.
+/// Page-aligned buffers of one size that serve as slots.
 ///
-/// Ownership  acquire() makes a slot the caller's, until release().
-/// Threads    acquire, release, bytes: any.
-/// Memory     All of it at allocate(); neither lock nor system call afterwards.
+/// acquire() gives a slot to the caller until release(); both, and bytes(), are thread-safe. Only
+/// allocate() allocates; the other calls use neither lock nor system call.
 class SlotMemory {
  public:
   /// Throws std::bad_alloc. Precondition: 0 < slots ≤ FramePool::kMaxSlots; none is out.
   void allocate(std::size_t slots, std::size_t bytes) {
     assert(slots > 0 && slots <= FramePool::kMaxSlots && bytes > 0);
-    // Whole pages for each; a vector load that begins inside an image never leaves the memory.
+    // Whole pages, with room for a vector load that begins inside an image.
     const std::size_t each = (bytes + kCacheLine + kPage - 1) / kPage * kPage;
     memory_.reset(static_cast<std::byte*>(::operator new (slots* each, std::align_val_t{kPage})));
     each_ = each;

@@ -34,8 +34,10 @@ constexpr std::array kProducts{
     Product{0x3103, "Grasshopper3"}, Product{0x3300, "Flea3"},      Product{0x3800, "Ladybug5"},
 };
 
-constexpr unsigned char kReadRequest = 0xC0, kWriteRequest = 0x40;  // vendor, device
-constexpr unsigned char kQuadlets = 0x7F;                           // addresses 0xFFFF….
+// Vendor requests to the device.
+constexpr unsigned char kReadRequest = 0xC0, kWriteRequest = 0x40;
+// Stands for addresses 0xFFFF….
+constexpr unsigned char kQuadlets = 0x7F;
 unsigned limit_ms() noexcept { return static_cast<unsigned>(kUsbRegisterLimit.ns() / 1'000'000); }
 
 const Product* find_product(const libusb_device_descriptor& d) noexcept {
@@ -100,7 +102,7 @@ DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t addre
   return sent == static_cast<int>(b.size()) ? DeviceStatus::ok : DeviceStatus::failed;
 }
 
-/// Registers of a device that is opened, but not in use as a camera yet.
+/// Registers of a device that is open but not yet used as a camera.
 class HandlePort final : public RegisterPort {
  public:
   explicit HandlePort(libusb_device_handle* handle) : handle_(handle) {}
@@ -115,15 +117,18 @@ class HandlePort final : public RegisterPort {
   libusb_device_handle* handle_;
 };
 
-/// One attached device that may be an IIDC camera.
+/// Attached device that may be an IIDC camera.
 struct UsbCandidate {
-  DeviceInfo info{};             // serial: the GUID; empty when it could not be opened
-  std::string transport_serial;  // the USB string
+  // Its `serial` is the GUID; empty if the device could not be opened.
+  DeviceInfo info{};
+  // Serial number of the USB descriptor.
+  std::string transport_serial;
   std::uint64_t guid = 0;
-  DeviceStatus access = DeviceStatus::ok;  // why it could not be asked
+  // Reason why the device could not be queried.
+  DeviceStatus access = DeviceStatus::ok;
 };
 
-/// One that is looked at; `handle` is null where `who.access` is not ok.
+/// Device under inspection; `handle` is null if `who.access` is not ok.
 struct FoundUsbCamera {
   UsbCandidate who;
   ConfigRom rom;
@@ -133,7 +138,7 @@ struct FoundUsbCamera {
 
 constexpr const char* kNoUsb = "the system's USB devices cannot be listed";
 
-/// Opens a device and asks who it is.
+/// Opens a device and reads its identity.
 FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product,
                    std::string* message) {
   FoundUsbCamera found;
@@ -169,8 +174,9 @@ FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, con
   return found;
 }
 
-/// Opens each in turn and calls back; true ends it. A callback that does not take the handle (sets
-/// it to null) has it closed. False: the system's devices cannot be listed.
+/// Opens each device in turn and passes it to the callback, which returns true to end the search. A
+/// handle that the callback does not take (set to null) is closed. Returns false if devices cannot
+/// be listed.
 bool for_each_usb_camera(libusb_context* context, std::string* message,
                          const std::function<bool(FoundUsbCamera*)>& look) {
   libusb_device** list = nullptr;
@@ -193,7 +199,7 @@ bool for_each_usb_camera(libusb_context* context, std::string* message,
   return true;
 }
 
-/// Every device with a known id, each asked for its GUID; in that order.
+/// Every device with a known id, sorted by GUID.
 std::vector<UsbCandidate> find_usb_cameras(std::string* message) {
   std::vector<UsbCandidate> all;
   libusb_context* context = nullptr;
@@ -206,16 +212,17 @@ std::vector<UsbCandidate> find_usb_cameras(std::string* message) {
     return false;
   });
   libusb_exit(context);
-  // By GUID, those that do not tell theirs last: the order in which ports were found changes from
-  // one start to the next.
+  // Sorts by GUID, unknown ones last, because the order of ports changes between starts.
   std::sort(all.begin(), all.end(), [](const UsbCandidate& a, const UsbCandidate& b) {
     return std::pair(a.guid == 0, a.guid) < std::pair(b.guid == 0, b.guid);
   });
   return all;
 }
 
-constexpr int kMaxErrors = 8;  // transfers in a row that failed: the device is given up
-constexpr std::size_t kSuperSpeedBlock = 1024;  // transfers of USB 3 are whole packets of this size
+// Consecutive failed transfers after which the device counts as disconnected.
+constexpr int kMaxErrors = 8;
+// Transfers of USB 3 are multiples of this packet size, in bytes.
+constexpr std::size_t kSuperSpeedBlock = 1024;
 
 }  // namespace
 
@@ -232,8 +239,8 @@ std::unique_ptr<UsbBus> UsbBus::open(std::string_view requested, DeviceStatus* s
 
 DeviceStatus UsbBus::open_device(std::string_view requested) {
   last_error_.clear();
-  // A context of its own: libusb's list of devices is as old as its context where no udev daemon
-  // tells it of new ones.
+  // Uses a new context, because without a udev daemon libusb updates its device list only when a
+  // context is created.
   if (libusb_init(&context_) != LIBUSB_SUCCESS) {
     context_ = nullptr;
     last_error_ = kNoUsb;
@@ -241,15 +248,16 @@ DeviceStatus UsbBus::open_device(std::string_view requested) {
   }
   DeviceStatus status = DeviceStatus::not_found;
   const bool listed = for_each_usb_camera(context_, &last_error_, [&](FoundUsbCamera* found) {
-    if (found->handle == nullptr) {  // it may have been the one
+    // This may be the requested camera.
+    if (found->handle == nullptr) {
       if (status == DeviceStatus::not_found && found->who.access == DeviceStatus::no_permission)
         status = found->who.access;
       return false;
     }
     if (!names_camera(requested, found->who.guid, found->who.transport_serial)) return false;
     status = claim(found->handle);
-    if (status != DeviceStatus::ok)
-      return !requested.empty();  // any other will do when none is named
+    // Without a requested name any other camera will do.
+    if (status != DeviceStatus::ok) return !requested.empty();
     handle_ = std::exchange(found->handle, nullptr);
     info_ = found->who.info;
     rom_ = found->rom;
@@ -266,7 +274,7 @@ DeviceStatus UsbBus::open_device(std::string_view requested) {
 
 DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
   int active = 0;
-  // Setting the configuration that is active already would reset what another program does with it.
+  // Setting the active configuration again would disturb another program.
   if (libusb_get_configuration(handle, &active) == LIBUSB_SUCCESS && active != 1)
     (void)libusb_set_configuration(handle, 1);
   libusb_config_descriptor* config = nullptr;
@@ -361,7 +369,7 @@ DeviceStatus UsbBus::write(std::uint64_t address, std::uint32_t value) noexcept 
 DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
   try {
     const bool super = traits_.largest_packet > largest_packet(BusSpeed::s800);
-    // USB 3 sends the image, USB 2 the packets with their padding.
+    // USB 3 sends the image, USB 2 packets with padding.
     transfer_bytes_ =
         super ? (shape.image_bytes + kSuperSpeedBlock - 1) / kSuperSpeedBlock * kSuperSpeedBlock
               : shape.frame_bytes;
@@ -381,9 +389,9 @@ DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
 }
 
 int UsbBus::submit(Flight* flight) noexcept {
+  // No timeout: a camera may be silent, and cancelling ends the transfer.
   libusb_fill_bulk_transfer(flight->transfer, handle_, endpoint_, memory_->bytes(flight->slot),
-                            static_cast<int>(transfer_bytes_), &UsbBus::on_transfer, flight,
-                            0);  // no limit: a camera may be silent, cancelling ends it
+                            static_cast<int>(transfer_bytes_), &UsbBus::on_transfer, flight, 0);
   flying_.fetch_add(1, std::memory_order_acq_rel);
   flight->flying = true;
   const int error = libusb_submit_transfer(flight->transfer);
@@ -397,16 +405,19 @@ DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
   if (handle_ == nullptr) return DeviceStatus::disconnected;
   stop();
   if (abandoned()) return DeviceStatus::disconnected;
-  flying_.store(0, std::memory_order_release);  // one given up that came back was subtracted twice
+  // Corrects the count: an abandoned transfer that returned was subtracted twice.
+  flying_.store(0, std::memory_order_release);
   sink_ = sink;
   errors_ = 0;
   stopping_.store(false, std::memory_order_release);
   lost_.store(false, std::memory_order_release);
-  (void)libusb_clear_halt(handle_, endpoint_);  // what a program before us left
+  // Clears a halt left by an earlier program.
+  (void)libusb_clear_halt(handle_, endpoint_);
   int error = LIBUSB_SUCCESS;
   for (Flight& f : flights_) {
     const auto slot = memory_->acquire();
-    if (!slot) {  // the consumer holds the others
+    // The consumer holds all other slots.
+    if (!slot) {
       error = LIBUSB_ERROR_NO_MEM;
       break;
     }
@@ -438,8 +449,8 @@ void UsbBus::on_transfer(libusb_transfer* transfer) {
   flight->bus->completed(flight);
 }
 
-/// A transfer has come back. One that is not sent again keeps its slot until stop(): the owner may
-/// be cancelling it at this moment.
+/// Handles a returned transfer. If it is not submitted again, it keeps its slot until stop(),
+/// because the owner may be cancelling it.
 void UsbBus::completed(Flight* flight) noexcept {
   bool again = !stopping_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire);
   if (again) {
@@ -460,7 +471,8 @@ void UsbBus::completed(Flight* flight) noexcept {
     if (!again) lose();
   }
   if (!again) flight->flying = false;
-  flying_.fetch_sub(1, std::memory_order_acq_rel);  // the last: from here on stop() may free it
+  // Must be last: afterwards stop() may free the flight.
+  flying_.fetch_sub(1, std::memory_order_acq_rel);
 }
 
 void UsbBus::filled(Flight* flight) noexcept {
@@ -480,7 +492,7 @@ void UsbBus::filled(Flight* flight) noexcept {
   }
 }
 
-/// A transfer that flies no more gives its slot back. Owner's thread.
+/// Releases the slot of a transfer that is no longer in flight. Owner's thread.
 void UsbBus::land(Flight* flight) noexcept {
   if (flight->bus == nullptr) return;
   memory_->release(flight->slot);
@@ -488,14 +500,14 @@ void UsbBus::land(Flight* flight) noexcept {
   *flight = {};
 }
 
-/// libusb still has transfers of the stream before, given up by stop(): they may come back and find
+/// True if libusb still has abandoned transfers of the previous stream, which may return and access
 /// their flights.
 bool UsbBus::abandoned() const noexcept {
   return std::any_of(flights_.begin(), flights_.end(), [](const Flight& f) { return f.flying; });
 }
 
-/// The device is closed: the kernel has no transfer any more, and none calls back. Those that were
-/// given up are not freed; libusb says of none what it still does with it.
+/// Called when the device is closed and the kernel has no transfers. Abandoned transfers are not
+/// freed, because libusb may still use them.
 void UsbBus::let_go() noexcept {
   for (Flight& f : flights_) {
     if (!f.flying) continue;
@@ -525,8 +537,8 @@ void UsbBus::handle_events() noexcept {
 void UsbBus::stop() noexcept {
   stopping_.store(true, std::memory_order_release);
   const HostStamp end = monotonic_now() + kCancelLimit;
-  // Asked again while some fly: a transfer may have been between its callback and its next
-  // submission.
+  // Cancels again while any is in flight: a transfer may have been between its callback and its
+  // next submission.
   while (flying_.load(std::memory_order_acquire) > 0 && monotonic_now() < end) {
     for (Flight& f : flights_)
       if (f.transfer != nullptr) (void)libusb_cancel_transfer(f.transfer);
@@ -534,8 +546,9 @@ void UsbBus::stop() noexcept {
     (void)libusb_handle_events_timeout_completed(context_, &limit, nullptr);
   }
   if (flying_.load(std::memory_order_acquire) > 0) {
-    given_up_ = true;  // the host controller does not give them back: their memory stays for as
-                       // long as the program runs
+    // The host controller does not return these transfers; their memory is kept until the program
+    // ends.
+    given_up_ = true;
     flying_.store(0, std::memory_order_release);
   }
   if (context_ != nullptr && thread_.joinable()) libusb_interrupt_event_handler(context_);

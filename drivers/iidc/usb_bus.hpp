@@ -18,27 +18,27 @@ namespace vergence::iidc {
 
 inline constexpr Duration kUsbRegisterLimit = Duration::seconds(1);
 
-/// An IIDC camera on USB.
+/// IIDC camera on USB.
 ///
-/// Registers  Control requests, kUsbRegisterLimit at most each. Stream: kTransfers bulk transfers
-///            of a whole frame each, straight into the slots; a full slot is replaced by a free one
-///            in the same callback, so the camera never waits for us. A short or empty packet ends
-///            a frame.
-/// Threads    A thread handles libusb's events between start() and stop(). Arrivals are stamped in
-///            its callbacks; while a register is accessed the owner's thread may run one in its
-///            place, never at the same time.
-/// Stop       Transfers are cancelled, and waited for until each has come back, at most
-///            kCancelLimit; those that have not are given up with their memory, never freed under
-///            the kernel's hands; then only reopen() goes on.
-/// Unplug     Seen by the transfers' ends. reopen() looks with a context of its own each time: it
-///            needs no hot-plug events, which containers and small systems do not have.
+/// Registers  Control requests, each at most kUsbRegisterLimit.
+/// Stream     kTransfers bulk transfers of a whole frame each, directly into the slots. A full slot
+///            is replaced in the same callback, so the camera never waits. A short or empty packet
+///            ends a frame.
+/// Threads    A thread handles libusb's events between start() and stop() and stamps arrivals in
+///            its callbacks. During a register access the owner's thread may run a callback
+///            instead, never simultaneously.
+/// Stop       Transfers are cancelled and awaited for at most kCancelLimit. The others are
+///            abandoned with their memory, which the kernel may still write; then only reopen()
+///            recovers.
+/// Unplug     Detected by failed transfers. reopen() searches with its own context each time, so it
+///            needs no hot-plug events, which containers and small systems lack.
 class UsbBus final : public CameraBus {
  public:
-  static constexpr std::size_t kTransfers =
-      4;  // 130 ms at 30 Hz: longer than any scheduling hold-up seen
+  /// Enough for 130 ms at 30 Hz, longer than any observed scheduling delay.
+  static constexpr std::size_t kTransfers = 4;
   static constexpr Duration kCancelLimit = Duration::seconds(2);
 
-  /// `requested` as names_camera(). Null: *status and *error say why.
+  /// `requested` as in names_camera(). Returns null on failure; *status and *error have the reason.
   [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view requested,
                                                     DeviceStatus* status, std::string* error);
   ~UsbBus() override;
@@ -94,13 +94,15 @@ class UsbBus final : public CameraBus {
   StreamShape shape_{};
   std::size_t transfer_bytes_ = 0;
   std::unique_ptr<SlotMemory> memory_;
-  bool given_up_ = false;  // transfers never came back: memory_ is never freed
+  // True if transfers were abandoned; memory_ is then never freed.
+  bool given_up_ = false;
   std::vector<Flight> flights_;
   StreamSink* sink_ = nullptr;
   std::thread thread_;
   std::atomic<int> flying_{0};
   std::atomic<bool> stopping_{false}, lost_{false};
-  int errors_ = 0;  // in a row
+  // Number of consecutive failed transfers.
+  int errors_ = 0;
 };
 
 }  // namespace vergence::iidc

@@ -38,23 +38,35 @@ enum class FaultKind : std::uint8_t {
   disk_full,
 };
 
-/// Something that goes wrong at a time of the drive. Parameters that a kind does not have are zero.
+/// Fault injected at a time of the drive. Parameters that a kind does not use are zero.
 struct Fault {
   FaultKind kind = FaultKind::knock;
-  Duration at{};              // since the drive's start
-  Duration duration{};        // zero: to the end
-  int camera = -1;            // −1: every camera
-  Vec3 turn = Vec3::Zero();   // rad about the camera's x (pitch), y (yaw), z (roll); of occluder: z
-                              // alone, about the vertical
-  Vec3 shift = Vec3::Zero();  // m along the camera's x, y, z; of position_jump: east, north, up; of
-                              // occluder: ahead, to the left, 0
-  double speed = 0;           // m/s, along its own length, relative to the vehicle
-  double factor = 1;          // of the brightness
-  double share = 0;           // of the frames, 0..1
-  double delay = 0;           // s
-  double jump = 0;            // s
-  int pulses = 0;             // one after the other
-  bool powered = false;       // it has a supply of its own
+  /// Time since the start of the drive.
+  Duration at{};
+  /// Zero lasts to the end.
+  Duration duration{};
+  /// −1 means every camera.
+  int camera = -1;
+  /// Rotation in rad about the camera's x (pitch), y (yaw) and z (roll). For `occluder` only z is
+  /// used, about the vertical.
+  Vec3 turn = Vec3::Zero();
+  /// Translation in m along the camera's x, y, z. For `position_jump` east, north, up; for
+  /// `occluder` forward, left, 0.
+  Vec3 shift = Vec3::Zero();
+  /// Speed in m/s along its own length, relative to the vehicle.
+  double speed = 0;
+  /// Factor of the brightness.
+  double factor = 1;
+  /// Share of the frames, 0 to 1.
+  double share = 0;
+  /// Delay in s.
+  double delay = 0;
+  /// Step of the clock in s.
+  double jump = 0;
+  /// Number of consecutive pulses.
+  int pulses = 0;
+  /// True if the device has its own supply.
+  bool powered = false;
 
   [[nodiscard]] bool active(Duration time) const noexcept {
     return time >= at && (duration <= Duration{} || time < at + duration);
@@ -62,10 +74,12 @@ struct Fault {
   [[nodiscard]] bool concerns(int k) const noexcept { return camera < 0 || camera == k; }
 };
 
-/// Parameter of a fault kind; the table behind docs/simulated_rig.md.
+/// Parameter of a fault kind; documented in docs/simulated_rig.md.
 struct FaultParameter {
-  const char* name;  // its unit is its ending: _deg, _m, _s
-  double fallback;   // when not given
+  /// The name ends in its unit: _deg, _m, _s.
+  const char* name;
+  /// Default value.
+  double fallback;
   double least, most;
   const char* meaning;
 };
@@ -76,19 +90,19 @@ struct FaultRow {
   std::span<const FaultParameter> parameters;
 };
 
-/// Every kind that acts, in the order of FaultKind.
+/// All implemented kinds, in the order of FaultKind.
 [[nodiscard]] std::span<const FaultRow> fault_rows() noexcept;
 [[nodiscard]] std::string_view to_string(FaultKind) noexcept;
 
-/// A fault from its kind, time in seconds and parameters. Throws std::invalid_argument: half a
-/// message about what is wrong.
+/// Makes a fault from its kind, time in seconds and parameters. Throws std::invalid_argument with a
+/// message fragment about the problem.
 [[nodiscard]] Fault make_fault(const std::string& kind, double at_s,
                                const std::vector<std::pair<std::string, double>>& parameters);
 
-/// `knock@42 camera=1 pitch_deg=0.2`. Throws as make_fault().
+/// Parses a text such as `knock@42 camera=1 pitch_deg=0.2`. Throws as make_fault() does.
 [[nodiscard]] Fault parse_fault(std::string_view text);
 
-/// The table of docs/simulated_rig.md.
+/// Table of faults in docs/simulated_rig.md.
 [[nodiscard]] std::string fault_document();
 
 }  // namespace vergence::mock

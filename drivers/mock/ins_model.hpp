@@ -9,7 +9,7 @@
 
 namespace vergence::mock {
 
-/// Where the mock's world lies: St Lucia, Brisbane.
+/// Origin of the simulated world: St Lucia, Brisbane.
 inline constexpr Geodetic kWorldOrigin{-27.4975, 153.0137, 60.0};
 
 struct InsModelOptions {
@@ -18,20 +18,19 @@ struct InsModelOptions {
   double rate_hz = 120;
 };
 
-/// An INS of the MTi-G's class: each error is a first-order Gauss–Markov process, as slow as the
-/// real thing's.
+/// INS of the MTi-G's class. Each error is a first-order Gauss–Markov process with a realistic
+/// correlation time.
 ///
-///   position  2.5 m CEP (2.12 m each axis), height 4 m, wandering over 60 s
-///   velocity  0.1 m/s each axis over 5 s
+///   position  2.5 m CEP (2.12 m per axis), height 4 m, over 60 s
+///   velocity  0.1 m/s per axis over 5 s
 ///   attitude  roll and pitch 0.5° over 30 s, heading 1° over 60 s
-/// Ideal: no errors at all. Geodetic coordinates from the exact tangent plane at kWorldOrigin,
-/// attitude in the axes at the place itself.
-/// Threads  One caller; samples in order of their numbers.
+/// If ideal, there are no errors. Geodetic coordinates use the exact tangent plane at kWorldOrigin,
+/// the attitude the local axes at the position. One caller; samples in order of their numbers.
 class InsModel {
  public:
   InsModel(const InsModelOptions& options, const RigTruth& truth);
 
-  /// The reading of this number (from 0, none left out) at a time of the drive; stamps are not set.
+  /// Sample of this number (from 0, without gaps) at a time of the drive; stamps are not set.
   [[nodiscard]] InsSample sample(std::uint64_t number, Duration time);
 
  private:
@@ -44,7 +43,8 @@ class InsModel {
   const RigTruth& truth_;
   GeographicLib::LocalCartesian plane_;
   Random random_;
-  std::array<Wander, 9> wander_;  // east north up, velocity, roll pitch heading
+  // Order: position east north up, velocity, roll pitch heading.
+  std::array<Wander, 9> wander_;
 };
 
 }  // namespace vergence::mock

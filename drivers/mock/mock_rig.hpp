@@ -16,51 +16,55 @@ namespace vergence::mock {
 
 /// Properties of the simulated devices in addition to their configuration.
 struct MockRigOptions {
-  bool real_time = false;  // false: virtual time, the producer waits for the consumer
+  /// In virtual time the producer waits for the consumer.
+  bool real_time = false;
   std::uint64_t seed = 1;
-  Pattern pattern =
-      Pattern::grey;  // gbrg: grey is made of the mosaic, as the drivers of colour cameras do
-  bool raw = false;   // with gbrg: the cameras hand out the mosaic itself, to write a data set
-  bool noise = true;  // shot and read noise of the sensors
-  int blur_samples =
-      1;  // poses averaged over an exposure: 1 is none; the time to render grows with it
+  /// With `gbrg` the grey image is made of the mosaic, as drivers of colour cameras do.
+  Pattern pattern = Pattern::grey;
+  /// With `gbrg`, outputs the mosaic itself, to write a data set.
+  bool raw = false;
+  /// Adds shot and read noise of the sensors.
+  bool noise = true;
+  /// Number of poses averaged over an exposure; 1 means no blur. The rendering time is
+  /// proportional.
+  int blur_samples = 1;
   bool ideal_ins = false;
-  double clock_drift_ppm = 30;  // largest of the devices' clocks; each has its own
-  Duration duration{};          // of the drive; zero: all of it
-  std::array<Duration, kMaxCameras>
-      trigger_delay{};  // from a pulse's edge to the start of the exposure, by camera
-  /// Virtual time: the consumer takes the board's reports, in the order of arrival. The board then
-  /// runs no farther ahead of them than what decides at which pulse a pause begins: the fourth
-  /// after the newest report taken, on every run.
+  /// Maximum drift of the devices' clocks; each clock has its own.
+  double clock_drift_ppm = 30;
+  /// Duration of the drive; zero means all of it.
+  Duration duration{};
+  /// Delay from a pulse's edge to the start of the exposure, by camera.
+  std::array<Duration, kMaxCameras> trigger_delay{};
+  /// Virtual time: the consumer takes the trigger board's reports in order of arrival. The
+  /// simulation then stays close behind the reports, so that a pause begins at the same pulse on
+  /// every run: the fourth after the newest report taken.
   bool reports_read = false;
-  /// Virtual time: who waits for camera 0 asks for the next image once the last is done with, and
-  /// may set the exposure before. No image is then made while one is still looked at:
-  /// set_exposure() acts at the same image on every run.
+  /// Virtual time: the consumer finishes an image before it waits for camera 0 again, and may set
+  /// the exposure in between. No image is then rendered ahead, so set_exposure() takes effect at
+  /// the same image on every run.
   bool exposures_follow = false;
 };
 
-/// A rig that does not exist: cameras, INS and trigger board behind the drivers' interfaces, on a
-/// vehicle driving through a world.
+/// Simulated rig: cameras, INS and trigger board behind the drivers' interfaces, on a vehicle that
+/// drives through a world.
 ///
-/// The drive begins when the trigger is started (the cameras and the INS before it), with pulse 0
-/// at the drive's time 0. Every device has a clock of its own, with offset and drift; arrivals have
-/// a least delay and a jitter above it. Pulse n of a boot goes to every camera whose line is
-/// pulsed; a camera's exposure starts `trigger_delay` later. With feedback wired the report has
-/// every exposure in whole microseconds, its edge on the host's clock to 20 µs, and comes after the
-/// last of them, or just before the next pulse where one never came.
-/// Ownership  The devices live in the rig; it outlives their use.
-/// Threads    Pictures are rendered on two threads of the rig's, one camera each; in real time
-///            another hands them out when they are due.
-/// Time       Virtual: arrivals are what they would be, nothing waits for a clock; items become
-///            visible in the order of their arrivals over all devices, so that a consumer that
-///            merges by arrival sees the same on every run. Real: a pulse that the renderer cannot
-///            keep up with has no frames (Camera statistics `lost`), a frame that finds no slot is
-///            dropped (`underruns`).
-/// Errors     The constructor throws std::invalid_argument. The devices as their interfaces say.
+/// The drive starts with the trigger (after the cameras and the INS), with pulse 0 at time 0. Every
+/// device has a clock with offset and drift; arrivals have a minimum delay and jitter. A pulse goes
+/// to every camera whose line is pulsed; the exposure starts `trigger_delay` later. With feedback
+/// the report has the exposures in whole microseconds and its edge on the host's clock to 20 µs. It
+/// follows the last exposure, or just precedes the next pulse if one did not happen.
+/// Ownership  The rig owns the devices and must outlive their use.
+/// Threads    Two threads render images, one camera each; in real time another delivers them when
+///            due.
+/// Time       Virtual: arrivals are computed and nothing waits for a clock. Items become visible in
+///            order of arrival over all devices, so a consumer that merges by arrival gets the same
+///            on every run. Real: a pulse that the renderer cannot keep up with has no frames
+///            (`lost`), a frame without a slot is dropped (`underruns`).
+/// Errors     The constructor throws std::invalid_argument. The devices follow their interfaces.
 class MockRig {
  public:
-  static constexpr std::size_t kSlots =
-      24;  // of each camera: the synchroniser's, the estimator's and the ones being rendered
+  /// Slots per camera, for the synchroniser, the estimator and the images being rendered.
+  static constexpr std::size_t kSlots = 24;
 
   MockRig(std::shared_ptr<const RigTruth> truth, const MockRigOptions& options);
   ~MockRig();
@@ -70,16 +74,16 @@ class MockRig {
   [[nodiscard]] InsDevice& ins() noexcept;
   [[nodiscard]] TriggerDevice& trigger() noexcept;
   [[nodiscard]] const RigTruth& truth() const noexcept;
-  /// Image memory, bytes; after the cameras are configured.
+  /// Image memory in bytes, valid once the cameras are configured.
   [[nodiscard]] std::size_t image_bytes() const noexcept;
 
-  /// The host's time at the drive's start; known once the trigger was started (virtual time: always
-  /// the same).
+  /// Host time at the start of the drive, valid once the trigger was started (in virtual time
+  /// always the same).
   [[nodiscard]] HostStamp start() const noexcept;
-  /// When the board pulses, pauses apart: since the drive's start, by the host's clock. After the
-  /// trigger is configured.
+  /// Times of the pulses without pauses, on the host's clock since the start of the drive. Valid
+  /// once the trigger is configured.
   [[nodiscard]] std::vector<Duration> pulse_times() const;
-  /// Pulses of the whole drive at this rate.
+  /// Number of pulses of the whole drive at this rate.
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
 
  private:

@@ -10,14 +10,12 @@
 
 namespace vergence::mock {
 
-/// Where everything on the vehicle truly is at a time of the drive: the drive's spline, the mounts,
-/// and the faults that move them.
-///
-/// Threads  Const after construction. Time: since the drive's start.
+/// Ground truth of everything on the vehicle at a time since the start of the drive: the drive's
+/// spline, the mounts, and the faults that move them. Constant after construction.
 class RigTruth {
  public:
-  /// `rig`: as mounted, before any fault. p_body = T_body_left · p_left, p_body = T_body_ins ·
-  /// p_ins.
+  /// `rig` is the calibration before any fault. p_body = T_body_left · p_left, p_body = T_body_ins
+  /// · p_ins.
   RigTruth(std::shared_ptr<const World> world, const DriveOptions& drive, const RigCalibration& rig,
            const Transform& T_body_left, const Transform& T_body_ins, std::vector<Fault> faults);
 
@@ -37,17 +35,18 @@ class RigTruth {
   [[nodiscard]] Transform ins_in_enu(Duration time) const noexcept {
     return drive_.at(time).T_enu_body * T_body_ins_;
   }
-  /// p_enu = T · p_bus (x forward, y left, z up, the middle of its floor): the bus that is in the
-  /// way then, if one is. It stands level on the ground.
+  /// Pose of the bus of an active occluder: p_enu = T · p_bus (x forward, y left, z up, origin in
+  /// the middle of its floor). It stands level on the ground. Empty if there is none.
   [[nodiscard]] std::optional<Transform> bus_in_enu(Duration time) const noexcept;
-  /// The rig's calibration as it truly is then.
+  /// True calibration of the rig at that time.
   [[nodiscard]] RigCalibration calibration(Duration time) const noexcept;
 
  private:
   std::shared_ptr<const World> world_;
   Drive drive_;
   RigCalibration rig_;
-  std::array<Transform, kMaxCameras> mounts_{};  // T_body_camera
+  // Transforms T_body_camera.
+  std::array<Transform, kMaxCameras> mounts_{};
   Transform T_body_ins_;
   std::vector<Fault> faults_;
 };

@@ -12,24 +12,31 @@ namespace vergence::gige {
 enum class Resend : std::uint8_t { automatic, on, off };
 enum class TriggerEdge : std::uint8_t { rising, falling };
 
-/// Options of GigE Vision cameras. Ranges and meaning: option_table().
+/// Options of GigE Vision cameras. option_table() has ranges and meaning.
 struct Options {
-  int packet_size = 0;                                // bytes; 0: computed
-  Duration packet_delay = Duration::nanoseconds(-1);  // negative: computed
-  int link_mbps = 0;                                  // Mbit/s; 0: what the system says
-  int link_cameras = 0;                               // 0: CameraConfiguration::sharing
+  /// In bytes; 0: computed.
+  int packet_size = 0;
+  /// Negative: computed.
+  Duration packet_delay = Duration::nanoseconds(-1);
+  /// In Mbit/s; 0: as reported by the system.
+  int link_mbps = 0;
+  /// 0: CameraConfiguration::sharing.
+  int link_cameras = 0;
   Resend resend = Resend::automatic;
-  int socket_buffer_kb = 0;    // KiB; 0: eight frames, at least 4 MiB
-  int buffers = 12;            // slots
-  std::string line = "Line1";  // input of the hardware trigger, the camera's own name
+  /// In KiB; 0: eight frames, at least 4 MiB.
+  int socket_buffer_kb = 0;
+  /// Number of slots.
+  int buffers = 12;
+  /// Input of the hardware trigger, by the camera's own name.
+  std::string line = "Line1";
   TriggerEdge edge = TriggerEdge::rising;
   bool stamp_at_end = false;
   bool ptp = false;
-  std::vector<std::pair<std::string, std::string>>
-      features{};  // of the camera, by its own names, last
+  /// Further features by the camera's own names, applied last.
+  std::vector<std::pair<std::string, std::string>> features{};
 };
 
-/// The table behind drivers/gige/README.md.
+/// Options documented in drivers/gige/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::gige

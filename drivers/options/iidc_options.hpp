@@ -9,29 +9,36 @@
 
 namespace vergence::iidc {
 
-/// The instant of the exposure that the camera stamps.
+/// Instant of the exposure that the camera stamps.
 enum class StampedInstant : std::uint8_t { start, middle, end };
 
-inline constexpr std::size_t kMaxBuffers =
-    32;  // half of FramePool::kMaxSlots: two generations of a ring fit into one range of slots
+/// Half of FramePool::kMaxSlots, so that one range of slots holds two generations of a ring.
+inline constexpr std::size_t kMaxBuffers = 32;
 
-/// Options of IIDC cameras. Ranges and meaning: option_table().
+/// Options of IIDC cameras. option_table() has ranges and meaning.
 struct Options {
-  std::optional<bool> format7{};              // only it, or never; empty: where needed
-  std::optional<std::size_t> packet_bytes{};  // of Format 7
-  std::optional<unsigned> trigger_mode{};     // 0 or 14; empty: 14 if the camera has it
-  unsigned trigger_source = 0;                // input
+  /// Always or never use Format 7; empty: if needed.
+  std::optional<bool> format7{};
+  /// Packet size of Format 7.
+  std::optional<std::size_t> packet_bytes{};
+  /// 0 or 14; empty: 14 if the camera supports it.
+  std::optional<unsigned> trigger_mode{};
+  /// Input number.
+  unsigned trigger_source = 0;
   bool trigger_rising = true;
-  std::optional<unsigned> strobe_pin{};  // output that shows the exposure
+  /// Output that signals the exposure.
+  std::optional<unsigned> strobe_pin{};
   bool strobe_high = true;
-  Duration strobe_delay{}, strobe_duration{};  // duration 0: as long as the exposure
+  /// If `strobe_duration` is 0, the strobe lasts as long as the exposure.
+  Duration strobe_delay{}, strobe_duration{};
   std::optional<BusSpeed> speed{};
   std::size_t buffers = 20;
-  bool embedded = true;  // ask for the embedded stamp and counter
+  /// Requests the embedded stamp and counter.
+  bool embedded = true;
   StampedInstant stamped = StampedInstant::end;
 };
 
-/// The table behind drivers/iidc/README.md.
+/// Options documented in drivers/iidc/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::iidc

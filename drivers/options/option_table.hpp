@@ -16,23 +16,27 @@ namespace vergence {
 
 // Syntax of option values.
 
-/// The whole text is one finite number.
+/// Parses a text that is one finite number.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);
-/// on, yes, true; off, no, false.
+/// Parses on, yes, true; off, no, false.
 [[nodiscard]] std::optional<bool> parse_switch(std::string_view text);
-/// The shortest text that reads back as the same number.
+/// Shortest text that is parsed as the same number.
 [[nodiscard]] std::string shortest_text(double value);
 
-/// One option as people read it.
+/// Documentation of one option.
 struct OptionRow {
-  std::string name;      // `feature.NAME`: any name after the dot
-  std::string values;    // the unit, what it takes: `µs, 0 to 10000`, `on, off`
-  std::string fallback;  // description of the default; empty: none
-  std::string meaning;   // one message
+  /// Name; `feature.NAME` stands for any name after the dot.
+  std::string name;
+  /// Unit and permitted values, as in `µs, 0 to 10000` or `on, off`.
+  std::string values;
+  /// Description of the default; empty if there is none.
+  std::string fallback;
+  /// Description of the option.
+  std::string meaning;
 };
 
-/// The options of one kind of camera, a row for each member of the struct `Options`, in the order
-/// of the documentation.
+/// Options of one kind of camera: a row for each member of the struct `Options`, in the order of
+/// the documentation.
 ///
 ///     const std::vector<std::pair<std::string, At>> instants{{"start", At::start},
 ///                                                            {"end", At::end}};
@@ -42,17 +46,18 @@ struct OptionRow {
 ///     Options o;
 ///     const bool known = table.set("delay_us", "12.5", &o);  // o.delay is 12.5 µs
 ///
-/// Threads  A table that is made is only read. Memory: ordinary.
+/// A completed table is constant.
 template <class Options>
 class OptionTable {
  public:
-  /// Both ends are allowed; `step` (0: any): whole multiples of it only.
+  /// Both ends are permitted. If `step` is not 0, values are multiples of it.
   struct Range {
     double least = 0, most = 0, step = 0;
   };
 
-  /// A member that is a number of the option's unit, a Duration, or an optional of these. Integral
-  /// members take whole numbers only. `fallback` null: the value that the struct begins with.
+  /// Adds a member that is a number in the option's unit, a Duration, or an optional of these.
+  /// Integral members take whole numbers only. If `fallback` is null, the struct's default is
+  /// shown.
   template <class Field>
   OptionTable& number(const char* name, Field Options::*field, Range range, const char* unit,
                       const char* fallback, const char* meaning) {
@@ -72,7 +77,7 @@ class OptionTable {
         [field, scale](const Options& o) { return format_number(o.*field, scale); });
   }
 
-  /// A member that takes one of a few values, each with its word.
+  /// Adds a member with a few named values.
   template <class Field, class Value>
   OptionTable& choice(const char* name, Field Options::*field,
                       std::vector<std::pair<std::string, Value>> words, const char* fallback,
@@ -94,7 +99,7 @@ class OptionTable {
         });
   }
 
-  /// A bool, or an optional one.
+  /// Adds a bool or an optional bool.
   template <class Field>
   OptionTable& on_off(const char* name, Field Options::*field, const char* fallback,
                       const char* meaning) {
@@ -111,7 +116,7 @@ class OptionTable {
         });
   }
 
-  /// A name of the device, not empty.
+  /// Adds a name of the device, which must not be empty.
   OptionTable& text(const char* name, std::string Options::*field, const char* values,
                     const char* fallback, const char* meaning) {
     return add(
@@ -123,7 +128,7 @@ class OptionTable {
         [field](const Options& o) { return o.*field; });
   }
 
-  /// Whatever the device has by its own names, each an option `prefix` and name.
+  /// Adds all settings of the device by its own names, each an option of `prefix` and name.
   OptionTable& others(const char* prefix,
                       std::vector<std::pair<std::string, std::string>> Options::*field,
                       const char* values, const char* meaning) {
@@ -134,14 +139,15 @@ class OptionTable {
 
   [[nodiscard]] const std::vector<OptionRow>& rows() const noexcept { return rows_; }
 
-  /// The row of a name; null: there is none.
+  /// Row of an option; null if there is none.
   [[nodiscard]] const OptionRow* find(std::string_view name) const {
     for (const Entry& e : entries_)
       if (rows_[e.row].name == name) return &rows_[e.row];
     return is_other(name) ? &rows_.back() : nullptr;
   }
 
-  /// False: no such option, or it does not take that; *options is as it was.
+  /// Sets an option. Returns false, with *options unchanged, for an unknown name or an invalid
+  /// value.
   [[nodiscard]] bool set(std::string_view name, std::string_view text, Options* options) const {
     for (const Entry& e : entries_)
       if (rows_[e.row].name == name) return e.set(text, options);
@@ -153,7 +159,8 @@ class OptionTable {
     return true;
   }
 
-  /// The options that are not as they begin, by name: `NAME=VALUE …`. Equal options, equal text.
+  /// Options that differ from their defaults, sorted by name: `NAME=VALUE …`. Equal options give
+  /// equal text.
   [[nodiscard]] std::string to_text(const Options& options) const {
     std::vector<std::string> given;
     const Options begin{};
@@ -169,7 +176,7 @@ class OptionTable {
     return all;
   }
 
-  /// The first option whose value its row would refuse; null: all are possible.
+  /// First option with an invalid value; null if all are valid.
   [[nodiscard]] const OptionRow* find_impossible(const Options& options) const {
     const Options begin{};
     Options copy;
@@ -203,7 +210,7 @@ class OptionTable {
     return others_ && name.starts_with(others_->prefix) && name.size() > others_->prefix.size();
   }
 
-  /// Nanoseconds in the unit of a Duration.
+  /// Nanoseconds per unit of a Duration.
   static double scale_of(std::string_view unit) { return unit == "ms" ? 1e6 : 1e3; }
 
   template <class Field>

@@ -53,7 +53,8 @@ namespace {
 
 OptionTable<Options> make_table() {
   using O = Options;
-  constexpr double kMaxStrobeUs = 3998;  // 12 bits of 1/1024 ms
+  // Maximum of 12 bits of 1/1024 ms.
+  constexpr double kMaxStrobeUs = 3998;
   OptionTable<O> t;
   t.number("trigger_source", &O::trigger_source, {0, 3}, "", nullptr,
            "Input of the hardware trigger.");
@@ -111,7 +112,8 @@ OptionTable<Options> make_table() {
            "From the end of the exposure to the last pixel.");
   t.number("thin", &O::thin, {1, 60}, "", nullptr,
            "The camera runs at so many times the rate, one image in each interval is kept.");
-  t.number("buffers", &O::buffers, {4, 32}, "", nullptr,  // 32: the kernel's own limit
+  // 32 is the kernel's limit.
+  t.number("buffers", &O::buffers, {4, 32}, "", nullptr,
            "Images; all but two of them can be in use at once.");
   t.number("shift", &O::shift, {0, 8}, "bits", "by the format",
            "Bits below the eight that are kept, of `Y10` to `Y16`.");
@@ -155,7 +157,7 @@ std::optional<bool> parse_switch(std::string_view text) {
 
 std::string shortest_text(double value) {
   std::array<char, 32> text{};
-  // As digits where the number is whole: 1000000, not 1e+06.
+  // Whole numbers are shown with all digits: 1000000, not 1e+06.
   const bool whole = value == std::floor(value) && std::abs(value) < 1e15;
   const auto end = whole ? std::to_chars(text.begin(), text.end(), value, std::chars_format::fixed)
                          : std::to_chars(text.begin(), text.end(), value);

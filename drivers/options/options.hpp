@@ -12,35 +12,30 @@
 
 namespace vergence {
 
-/// Options of one kind of camera, in that kind's own type; monostate: as it begins.
+/// Options of one kind of camera in its own type; monostate stands for the defaults.
 ///
 ///     CameraConfiguration c;
 ///     c.options = gige::Options{.packet_size = 9000};
-///
-/// Threads  Values. Memory: ordinary. Errors: statuses; the message is made where the text came
-///          from.
 using CameraOptions = std::variant<std::monostate, gige::Options, iidc::Options, v4l2::Options>;
 
-/// The options that cameras of a driver (`gige`, `iidc-usb`, …) begin with. Nothing: its cameras
-/// have none.
+/// Default options of a driver's cameras (`gige`, `iidc-usb`, …); empty if they have no options.
 [[nodiscard]] std::optional<CameraOptions> default_options(std::string_view driver);
 
-/// Sets one from its text. False: there is no option of that name, or it does not take that value
-/// (find_option()); *options is as it was.
+/// Sets an option from its text. Returns false, with *options unchanged, for an unknown name or an
+/// invalid value (find_option()).
 [[nodiscard]] bool set_option(std::string_view name, std::string_view text, CameraOptions* options);
 
-/// Rows of the kind that `options` holds; empty without a kind.
+/// Rows of the kind in `options`; empty without a kind.
 [[nodiscard]] const std::vector<OptionRow>& option_rows(const CameraOptions& options);
-/// The row of a name; null: there is none.
+/// Row of an option; null if there is none.
 [[nodiscard]] const OptionRow* find_option(const CameraOptions& options, std::string_view name);
-/// `NAME=VALUE …` of those that are not as they begin, by name: equal options, equal text.
+/// Options that differ from their defaults as `NAME=VALUE …`, sorted by name; equal options give
+/// equal text.
 [[nodiscard]] std::string options_text(const CameraOptions& options);
 
-/// Reads a driver's own options from a configuration and checks them. Without a kind they are as
-/// they begin.
-///
-/// False: *error says which option cannot be, or that they are of another kind of camera; *options
-/// is as it was. `cameras`: who they should be for, `GigE cameras`.
+/// Extracts a driver's own options from a configuration and validates them; without a kind returns
+/// the defaults. If false, *error names the invalid option or the wrong kind of camera, and
+/// *options is unchanged. `cameras` names the kind in messages, as in `GigE cameras`.
 template <class Options>
 [[nodiscard]] bool parse_options(const CameraOptions& given, const OptionTable<Options>& table,
                                  const char* cameras, Options* options, std::string* error) {

@@ -8,22 +8,28 @@
 
 namespace vergence::v4l2 {
 
-/// Options of V4L2 cameras. Ranges and meaning: option_table().
+/// Options of V4L2 cameras. option_table() has ranges and meaning.
 struct Options {
-  Duration readout =
-      Duration::nanoseconds(-1);  // negative: from the sensor's own figures, else zero
-  int shift = -1;  // bits below the eight that are kept, of 16-bit formats; negative: by the format
-  int thin = 1;    // the camera runs at so many times the rate, one image in each interval is kept
+  /// Negative: derived from the sensor's timing, else zero.
+  Duration readout = Duration::nanoseconds(-1);
+  /// Low bits dropped in 16-bit formats; negative: by the format.
+  int shift = -1;
+  /// Factor by which the camera runs faster than the kept frames.
+  int thin = 1;
   int buffers = 16;
-  std::string subdevice{};  // node with the sensor's controls
-  std::string
-      trigger_control{};  // name; `external`: switched outside (module parameter, device tree)
+  /// Node with the sensor's controls.
+  std::string subdevice{};
+  /// Name of the control; `external` means that the trigger is enabled elsewhere (module parameter,
+  /// device tree).
+  std::string trigger_control{};
   std::string trigger_value{};
-  double gain_step_db = 0;  // of the camera's gain control; 0: not known
-  std::vector<std::pair<std::string, std::string>> controls{};  // of the camera, by their names
+  /// Step of the camera's gain control; 0 if unknown.
+  double gain_step_db = 0;
+  /// Further controls by the camera's own names.
+  std::vector<std::pair<std::string, std::string>> controls{};
 };
 
-/// The table behind drivers/v4l2/README.md.
+/// Options documented in drivers/v4l2/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::v4l2

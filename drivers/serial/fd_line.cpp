@@ -26,13 +26,14 @@ FdLine::FdLine(UniqueFd tty, UniqueFd wake, const LineSettings& settings) noexce
     : tty_(std::move(tty)), wake_(std::move(wake)), settings_(settings) {}
 
 FdLine::~FdLine() {
-  // Else close() waits up to half a minute for a device that takes no bytes.
+  // Otherwise close() waits up to half a minute for a device that accepts no bytes.
   (void)::tcflush(tty_.get(), TCIOFLUSH);
 }
 
 LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
   const HostStamp deadline = monotonic_now() + limit;
-  for (;;) {  // ends: each turn that brings nothing is an interruption, bounded by the deadline
+  // Ends: each round without data is an interruption, limited by the deadline.
+  for (;;) {
     std::array<pollfd, 2> fds{{{tty_.get(), POLLIN, 0}, {wake_.get(), POLLIN, 0}}};
     const timespec left = left_until(deadline);
     const int n = ::ppoll(fds.data(), fds.size(), &left, nullptr);
@@ -45,13 +46,13 @@ LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
     }
     if (n > 0 && fds[0].revents != 0) {
       const ssize_t got = ::read(tty_.get(), out.data(), out.size());
-      // After the read: bytes that came while it was on its way would else have arrived before they
+      // Taken after the read; otherwise bytes received during it would seem to arrive before they
       // were sent.
       const HostStamp arrival = monotonic_now();
       if (got > 0) return {DeviceStatus::ok, static_cast<std::size_t>(got), arrival};
       const bool nothing_yet =
           got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
-      // A wake-up for nothing to read is a hang-up: the converter is unplugged.
+      // Readiness without data is a hang-up: the converter is disconnected.
       if (!nothing_yet || (fds[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0)
         return {DeviceStatus::disconnected, 0, arrival};
     }
@@ -61,7 +62,8 @@ LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
 
 DeviceStatus FdLine::write(std::span<const std::uint8_t> bytes, Duration limit) noexcept {
   const HostStamp deadline = monotonic_now() + limit;
-  while (!bytes.empty()) {  // ends: every turn writes, or is bounded by the deadline
+  // Ends: every round writes, or is limited by the deadline.
+  while (!bytes.empty()) {
     const ssize_t put = ::write(tty_.get(), bytes.data(), bytes.size());
     if (put > 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(put));

@@ -1,5 +1,5 @@
-// Alone in its file: <asm/termbits.h>, which has the speeds outside the table, and <termios.h>
-// exclude each other.
+// A separate file, because <asm/termbits.h>, which has the speeds outside the table, and
+// <termios.h> exclude each other.
 #include <asm/termbits.h>
 #include <sys/ioctl.h>
 
@@ -20,7 +20,7 @@ DeviceStatus set_raw_tty(int fd, const LineSettings& settings) noexcept {
   if (::ioctl(fd, TCSETS2, &t) != 0) return DeviceStatus::unsupported;
   termios2 set{};
   if (::ioctl(fd, TCGETS2, &set) != 0) return DeviceStatus::disconnected;
-  // A converter rounds to what its divisor can do: 3 % is what a byte of ten bits stands.
+  // A converter rounds to its divisor; a byte of ten bits tolerates 3 %.
   const double error = static_cast<double>(set.c_ospeed) / static_cast<double>(settings.baud) - 1;
   return error < 0.03 && error > -0.03 ? DeviceStatus::ok : DeviceStatus::unsupported;
 }

@@ -1,5 +1,4 @@
 #pragma once
-/// Lines that carry bytes to and from a device: one interface, serial ports
-/// behind it.
+/// Interface of byte links to devices, and its implementation by serial ports.
 #include "drivers/serial/serial_link.hpp"
 #include "drivers/serial/serial_port.hpp"

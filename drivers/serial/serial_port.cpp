@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The device file behind links; the name itself when there is none.
+/// Device file behind links; the name itself if there is none.
 fs::path resolved(const std::string& port) {
   std::error_code error;
   fs::path real = fs::canonical(port, error);
@@ -76,8 +76,8 @@ std::optional<SerialPortInfo> read_port_info(const std::string& name) {
   return info;
 }
 
-/// A port with hardware behind it: pseudo-terminals and consoles have none, and of the ports that a
-/// PC may have the missing ones are of type 0 (PORT_UNKNOWN in linux/serial.h).
+/// True for a port with hardware. Pseudo-terminals and consoles have none, and absent ports of a PC
+/// are of type 0 (PORT_UNKNOWN in linux/serial.h).
 bool has_hardware(const fs::path& tty) {
   std::error_code error;
   if (!fs::exists(tty / "device", error)) return false;
@@ -86,7 +86,7 @@ bool has_hardware(const fs::path& tty) {
   return !(file >> type) || type != 0;
 }
 
-/// Device files of the ports that are there, in order.
+/// Device files of the present ports, in order.
 std::vector<std::string> names_of_ttys() {
   std::vector<std::string> names;
   std::error_code error;
@@ -97,15 +97,14 @@ std::vector<std::string> names_of_ttys() {
   return names;
 }
 
-/// The line is ours alone: TIOCEXCL keeps others out, the lock also those with the rights to ignore
-/// that.
+/// Locks the port: TIOCEXCL excludes other programs, the lock also privileged ones.
 DeviceStatus hold(int fd) noexcept {
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0)
     return errno == EWOULDBLOCK ? DeviceStatus::busy : to_status(errno);
   return ::ioctl(fd, TIOCEXCL) == 0 ? DeviceStatus::ok : to_status(errno);
 }
 
-/// Not ok: *tty is as it was.
+/// If not ok, *tty is unchanged.
 DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, UniqueFd* tty) {
   UniqueFd fd(::open(real.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!fd.valid()) return to_status(errno);
@@ -118,9 +117,9 @@ DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, Unique
 
 }  // namespace
 
-// Not sp_list_ports(): where a port vanishes while it is listed, libserialport 0.1.1 hands out a
-// null list or reads one itself (list_ports() in its linux.c does not check list_append()), and it
-// opens the ports of a PC to see whether they are there.
+// Replaces sp_list_ports(). If a port vanishes during listing, libserialport 0.1.1 returns or reads
+// a null list (list_ports() in its linux.c does not check list_append()), and it opens the ports of
+// a PC to detect them.
 std::vector<SerialPortInfo> list_serial_ports() {
   std::vector<SerialPortInfo> ports;
   for (const std::string& name : names_of_ttys())
@@ -142,7 +141,7 @@ bool is_native_usb(const std::string& port) {
 
 namespace {
 
-/// `asked`, or nothing where another device has its name now.
+/// Returns `asked`, or nothing if another device has its name now.
 std::string unless_of_another(const std::vector<SerialPortInfo>& ports,
                               const std::string& usb_serial, const std::string& asked) {
   const std::string real = resolved(asked).string();

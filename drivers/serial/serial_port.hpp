@@ -11,47 +11,51 @@
 
 namespace vergence {
 
-/// A serial port of this machine, for lists and for telling devices apart.
+/// Serial port of this machine with its identification.
 struct SerialPortInfo {
-  std::string port;                               // /dev/ttyUSB0
-  std::string description;                        // as the system tells it
-  std::uint16_t usb_vendor = 0, usb_product = 0;  // 0: not on USB
-  std::string usb_serial;                         // empty: none
-  std::optional<int> latency_timer_ms;            // of FTDI converters
+  /// Path, as in /dev/ttyUSB0.
+  std::string port;
+  /// Description by the system.
+  std::string description;
+  /// 0 if the port is not on USB.
+  std::uint16_t usb_vendor = 0, usb_product = 0;
+  /// Empty if there is none.
+  std::string usb_serial;
+  /// Set for FTDI converters.
+  std::optional<int> latency_timer_ms;
 };
 
-/// Ports that are there now, by name; one that vanishes meanwhile is left out.
+/// Present ports, ordered by name.
 [[nodiscard]] std::vector<SerialPortInfo> list_serial_ports();
 
-/// Latency timer of the FTDI converter behind a port (`/dev/ttyUSB0` or a link to it); nothing: no
-/// such chip.
+/// Latency timer of the FTDI converter behind a port (`/dev/ttyUSB0` or a link to it); empty
+/// without such a chip.
 [[nodiscard]] std::optional<int> read_latency_timer_ms(const std::string& port);
 
-/// The port is the device's own USB: its baud rate is a word without meaning, and bytes take no
-/// time on a line.
+/// True if the port is the device's own USB, so that the baud rate has no effect and bytes have no
+/// wire time.
 [[nodiscard]] bool is_native_usb(const std::string& port);
 
-/// Where the device that was at port `asked` (or a link to it) is now, by its converter's serial
-/// number: at `asked`, if that bears the number; else at the only one of `ports` that does. Where
-/// none or several do, `asked`, or nothing if that bears another number: a port of another device
-/// must not be taken for it.
+/// Finds the port now used by the device that was at `asked` (or a link to it), by its converter's
+/// serial number: `asked` if it has the number, else the only one of `ports` that does. If none or
+/// several do, returns `asked`, or nothing if `asked` has another number and thus is another
+/// device.
 [[nodiscard]] std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
                                            const std::string& usb_serial, const std::string& asked);
 
-/// The serial number of the converter that a port was first opened through, as far as it tells that
-/// converter from others. The ports of one converter share theirs, and some makers give all of
-/// theirs the same: where two were ever seen with it, the other may be the only one the next time.
-/// Threads  opened(): the first one before all else. find(): any.
+/// Serial number of the converter of a port at its first opening, if that identifies it. The ports
+/// of one converter share a number, and some makers use one number for all: a number ever seen on
+/// two ports is not used. opened() must come first; find() is thread-safe.
 class ConverterNumber {
  public:
-  /// `asked` was opened, through a converter of that number. The first opening counts.
+  /// Records the opening of `asked` through a converter with that number. Only the first counts.
   void opened(const std::vector<SerialPortInfo>& ports, const std::string& usb_serial);
-  /// Where the device is now, as port_with_serial().
+  /// Finds the device's present port, as port_with_serial() does.
   [[nodiscard]] std::string find(const std::vector<SerialPortInfo>& ports,
                                  const std::string& asked) const;
-  /// opened() was called.
+  /// True after opened().
   [[nodiscard]] bool decided() const noexcept { return decided_; }
-  /// find() has something to look for.
+  /// True if find() can identify the converter.
   [[nodiscard]] bool known() const noexcept { return !number_.empty(); }
 
  private:
@@ -60,16 +64,13 @@ class ConverterNumber {
   mutable std::atomic<bool> shared_{false};
 };
 
-/// A serial port by its name, a link to it (/dev/serial/by-id/…), or a plain tty (a
-/// pseudo-terminal).
+/// Serial port given by its name, a link to it (/dev/serial/by-id/…) or a plain tty
+/// (pseudo-terminal).
 ///
-/// Real ports are opened and set through libserialport, which refuses links and pseudo-terminals:
-/// links are resolved, the others are opened as ttys. Reading waits in poll(): the library's own
-/// waiting reads spin after an unplug. A port on USB is remembered by the converter's serial number
-/// from its first opening, if no other port bears it: a device that comes back as ttyUSB1 is found.
-/// The port is held exclusively; a second opening is `busy`.
-///
-/// Not thread-safe. Memory: ordinary; the lines as SerialLink says.
+/// libserialport opens real ports but refuses links and pseudo-terminals; links are resolved, and
+/// the others opened as ttys. Reading waits in poll(), because the library's waiting reads spin
+/// after a disconnect. A port on USB is found again by its converter's unique serial number, even
+/// as another ttyUSB. The port is locked; a second opening is `busy`. Not thread-safe.
 class SerialPort final : public SerialLinkFactory {
  public:
   explicit SerialPort(std::string port) : port_(std::move(port)) {}
@@ -82,7 +83,8 @@ class SerialPort final : public SerialLinkFactory {
  private:
   [[nodiscard]] std::string find() const;
 
-  std::string port_;  // as asked for
+  // Name as configured.
+  std::string port_;
   ConverterNumber converter_;
 };
 

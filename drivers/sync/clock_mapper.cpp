@@ -6,13 +6,15 @@
 namespace vergence {
 namespace {
 
-constexpr double kStale = 86'400e9;  // ns: after a day of silence the rate of before says nothing
-constexpr double kTail = 7;          // means: one exponential delay of a thousand is longer
+// In ns: after a day without data the old rate is meaningless.
+constexpr double kStale = 86'400e9;
+// Multiple of the mean; one exponential delay in a thousand is longer.
+constexpr double kTail = 7;
 
 Duration rounded(double ns) noexcept { return Duration::nanoseconds(std::llround(ns)); }
 double in_ns(Duration d) noexcept { return static_cast<double>(d.ns()); }
 
-/// Farther apart than any two stamps of one drive are.
+/// Exceeds the distance of any two stamps of a run.
 template <class Stamp>
 bool absurd(Stamp a, Stamp b) noexcept {
   constexpr std::int64_t kCentury = 3'155'760'000'000'000'000;
@@ -37,10 +39,11 @@ void ClockMapper::begin(DeviceStamp device, HostStamp host) noexcept {
   pairs_ = 0;
 }
 
-/// Doubles hold nanoseconds of a hundred days; the origin follows, by a whole number of bins, so
-/// that no stamp moves.
+/// Moves the origin by a whole number of bins, so that no stamp moves: doubles hold nanoseconds for
+/// a hundred days only.
 void ClockMapper::anchor_near(DeviceStamp device) noexcept {
-  constexpr std::int64_t kFar = 1'000'000;  // bins: twelve days
+  // In bins: twelve days.
+  constexpr std::int64_t kFar = 1'000'000;
   const std::int64_t bins = (device - origin_).ns() / kBin.ns();
   if (bins < kFar && bins > -kFar) return;
   const Duration shift = kBin * bins;
@@ -65,7 +68,7 @@ bool ClockMapper::far_off(DeviceStamp device, HostStamp host) const noexcept {
 bool ClockMapper::take(Points* points, const Point& p, double side) const noexcept {
   const auto bin = static_cast<std::int64_t>(std::floor(p.device / in_ns(kBin)));
   if (points->count > 0 && bin <= points->newest_bin) {
-    // Compared along the line, so that drift inside the bin does not decide.
+    // Delays are compared along the line, so that drift inside the bin has no influence.
     Point& held = points->at[points->count - 1];
     if (side * ((p.delay - slope_ * p.device) - (held.delay - slope_ * held.device)) >= 0)
       return false;
@@ -113,23 +116,23 @@ MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
   const Point p = point(device, host);
   const double newest = upper_.at[upper_.count - 1].device;
   const double above = p.delay - line(p.device);
-  // Possible drift since the newest pair is no jump.
+  // Allows for the possible drift since the newest pair.
   const double silent = std::max(0.0, p.device - newest);
   if (above < -(in_ns(options_.jump) + 2 * options_.drift_bound * silent)) {
     ++resets_;
     return begin_one_way(device, arrival);
   }
   if (above > in_ns(options_.stall) || p.device < newest - 2 * in_ns(kBin)) {
-    // A stall or a clock set back: which, the next ones tell. What was held up arrives at once,
-    // stamps of a clock that was set back arrive as evenly as before.
+    // This is a stall or a clock that was set back. Delayed data arrive together; stamps of a clock
+    // that was set back arrive as evenly as before.
     if (behind_++ == 0) first_behind_ = device, first_behind_host_ = host;
     const bool evenly = 2 * in_ns(host - first_behind_host_) >= in_ns(device - first_behind_);
     if (behind_ >= kBehind && evenly) {
       ++resets_;
       return begin_one_way(device, arrival);
     }
-    // Until then a stamp that runs back has only the arrival as its witness; another was measured
-    // between what the fit says and the arrival.
+    // Until that is known, a stamp that runs back is bounded only by its arrival; any other was
+    // measured between the fit's result and the arrival.
     if (p.device <= newest) return {host, options_.delay_spread + options_.stall};
     const MappedStamp fitted = at(device);
     return {fitted.host, fitted.error + (host - fitted.host)};
@@ -150,7 +153,8 @@ void ClockMapper::fit_one_way() noexcept {
   const std::size_t count = upper_.count;
   double mean = 0;
   for (std::size_t i = 0; i < count; ++i) mean += points[i].device / static_cast<double>(count);
-  // Lower convex hull, left to right (Andrew's monotone chain): the points ascend in device time.
+  // Lower convex hull, left to right (Andrew's monotone chain), because points ascend in device
+  // time.
   std::array<std::size_t, kBins> hull{};
   std::size_t n = 0;
   const auto below = [&](const Point& a, const Point& b, const Point& c) {
@@ -201,8 +205,8 @@ void ClockMapper::ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t
   anchor_near(t2);
   const Point early = point(t2, t1), late = point(t3, t4);
   const double newest = upper_.at[upper_.count - 1].device;
-  // Both bounds are hard, so a clock that was set shows at once, forward and back; what is less,
-  // the room between the bounds tells.
+  // Both bounds are hard, so a clock that was set is detected immediately in either direction;
+  // smaller steps appear in the room between the bounds.
   const double silent = std::max(0.0, late.device - newest);
   const double margin = in_ns(options_.jump) + 2 * options_.drift_bound * silent;
   const bool stepped =
@@ -215,21 +219,22 @@ void ClockMapper::ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t
   const bool raised = take(&lower_, early, -1), lowered = take(&upper_, late, 1);
   if (!raised && !lowered) return;
   fit_two_way();
-  constexpr double kBent =
-      100e3;  // ns, more than a crystal's rate bends the line within the window
+  // In ns; more than a crystal's rate bends the line within the window.
+  constexpr double kBent = 100e3;
   if (room_ < -(kBent + slack)) {
     ++resets_;
     begin_two_way(t1, t2, t3, t4);
   }
 }
 
-/// The slope b with the most room between parallel lines under all upper and above all lower
-/// points. The room, min(U − b·x) − max(L − b·x), is concave in b; its derivative is the place of
-/// the lower line's support less that of the upper line's.
+/// Finds the slope b with the most room between parallel lines under all upper and above all lower
+/// points. The room, min(U − b·x) − max(L − b·x), is concave in b; its derivative is the position
+/// of the lower line's support minus that of the upper line's.
 void ClockMapper::fit_two_way() noexcept {
-  constexpr int kHalvings = 40;  // of the drift bound: 1e-16
-  constexpr double kEnough =
-      2e9;  // ns, a window shorter than that says more of the noise than of the rate
+  // Halvings of the drift bound, down to 1e-16.
+  constexpr int kHalvings = 40;
+  // In ns; a shorter window shows more noise than rate.
+  constexpr double kEnough = 2e9;
   const auto support = [](const Points& points, double slope, double side) {
     std::size_t best = 0;
     for (std::size_t i = 1; i < points.count; ++i) {
@@ -252,13 +257,13 @@ void ClockMapper::fit_two_way() noexcept {
   bound_two_way();
 }
 
-/// The farthest that a line within the bounds may be from the one chosen, at the newest point, and
-/// in slope.
+/// Finds the largest difference between the chosen line and a line within the bounds, at the newest
+/// point and in slope.
 void ClockMapper::bound_two_way() noexcept {
   const double at =
       std::max(upper_.at[upper_.count - 1].device, lower_.at[lower_.count - 1].device);
-  // Bounds of true − chosen: at most `over` at an upper point, at least −over at a lower one; its
-  // slope is what the drift bound leaves.
+  // Bounds of true − chosen: at most `over` at an upper point, at least −over at a lower one; the
+  // slope is limited by the drift bound.
   double rise = options_.drift_bound - slope_, fall = options_.drift_bound + slope_;
   for (std::size_t i = 0; i < lower_.count; ++i) {
     const Point& l = lower_.at[i];
@@ -271,7 +276,7 @@ void ClockMapper::bound_two_way() noexcept {
       if (apart < 0) fall = std::min(fall, turn);
     }
   }
-  // The programme's optimum is reached where the steepest slope leaves the tightest point.
+  // The optimum is where the steepest slope touches the tightest point.
   double highest = 0, lowest = 0;
   for (std::size_t i = 0; i < upper_.count; ++i) {
     const Point& u = upper_.at[i];
@@ -293,14 +298,15 @@ Duration ClockMapper::error_at(double device) const noexcept {
   const Point &first = upper_.at[0], &newest = upper_.at[upper_.count - 1];
   const double span = newest.device - first.device;
   if (two_way_) {
-    constexpr double kBend = 2e-8 * 1e-9;  // 1/ns: a crystal's rate changes by 1 ppm a minute
+    // In 1/ns: a crystal's rate changes by 1 ppm per minute.
+    constexpr double kBend = 2e-8 * 1e-9;
     const double at = std::max(newest.device, lower_.at[lower_.count - 1].device);
     return options_.resolution +
            rounded(farthest_ + turn_ * std::abs(device - at) + kBend * span * span / 8);
   }
   const double spread = in_ns(options_.delay_spread);
-  // The two ends of the hull's edge may each be late by what other bins are above the line, or by
-  // as much as is usual while there are few.
+  // Either end of the hull's edge may be late by the excess of other bins over the line, or by the
+  // usual spread while there are few.
   constexpr std::size_t kEnough = 8;
   const double few = spread * std::max(1.0, kTail / static_cast<double>(pairs_));
   const double late = upper_.count < kEnough ? few : std::min(spread, 2 * worst_);

@@ -18,7 +18,8 @@ DeviceStamp ClockTie::to_edge(DeviceStamp stamp) const noexcept {
 
 Duration ClockTie::gate(DeviceStamp stamp) const noexcept {
   constexpr Duration kMin = Duration::microseconds(50);
-  constexpr double kWander = 30e-6;  // of the rate, where nothing was seen for a while
+  // Change of the rate over a gap without pairs.
+  constexpr double kWander = 30e-6;
   const Duration near = std::min(noise_ * 4 + kMin, interval_ / 5);
   const Duration since = stamp - stamp_;
   return near + scaled(magnitude(since), kWander);

@@ -11,11 +11,11 @@ CounterNumbering::CounterNumbering(Duration interval, bool align_start) noexcept
 
 std::uint64_t CounterNumbering::number_of(std::size_t camera, std::uint64_t counter,
                                           HostStamp middle) noexcept {
-  constexpr std::uint64_t kLeap =
-      100'000;  // pulses: over an hour of silence; a counter that leaps further is broken
+  // In pulses: more than an hour without frames; a counter that leaps further is broken.
+  constexpr std::uint64_t kLeap = 100'000;
   Camera& own = cameras_[camera];
-  const auto counted =
-      static_cast<std::uint64_t>(own.base) + counter;  // wraps where the base is negative
+  // Wraps if the base is negative.
+  const auto counted = static_cast<std::uint64_t>(own.base) + counter;
   if (timed_ && counted > timed_number_ + kLeap) own.align = true;
   if (own.align) {
     own.align = false;
@@ -53,8 +53,8 @@ bool CounterNumbering::count_agreement(bool agree) noexcept {
   }
   if (!align_start_ || ++unproven_run_ < kAmbiguous) return false;
   unproven_run_ = 0;
-  for (std::size_t k = 1; k < cameras_.size(); ++k)
-    cameras_[k].align = true;  // to camera 0, whose numbers go on
+  // Aligns to camera 0, whose numbers continue.
+  for (std::size_t k = 1; k < cameras_.size(); ++k) cameras_[k].align = true;
   return true;
 }
 

@@ -9,50 +9,52 @@
 
 namespace vergence {
 
-/// The numbers of sets from the cameras' counters: each camera's counter and a constant of its own,
-/// for the mode counter.
+/// Numbers sets by the cameras' counters (SyncMode::frame_counter): each camera's counter plus a
+/// constant of that camera.
 ///
-/// Constant  0 until it is told to be found by time: then the camera's next frame gets the number
-///           whose time is nearest, reckoned from the newest number that a time is known of, and
-///           the others follow. So after a restart, after a counter that leaps over an hour of
-///           pulses, and, with `align_start`, at the start and after kAmbiguous sets in a row whose
-///           stamps did not agree.
-/// Not thread-safe. Does not allocate. Constant time per call.
-/// Errors    None.
+/// The constant is 0 until the camera is aligned by time: its next frame then gets the number
+/// nearest in time, computed from the newest number of known time, and the others follow. This
+/// happens after a restart, after a counter leap beyond an hour of pulses and, with `align_start`,
+/// at the start and after kAmbiguous sets in a row whose stamps disagree. Not thread-safe. Does not
+/// allocate. Constant time per call.
 class CounterNumbering {
  public:
-  static constexpr int kAmbiguous = 10;  // in a row: the pulses were not found rightly
+  /// Disagreeing sets in a row that mean a wrong alignment.
+  static constexpr int kAmbiguous = 10;
 
-  /// `interval`: between two pulses, > 0.
+  /// `interval` is that of the pulses, > 0.
   CounterNumbering(Duration interval, bool align_start) noexcept;
 
-  /// The number of this frame's set. `middle`: of its exposure.
+  /// Number of this frame's set. `middle` is that of its exposure.
   [[nodiscard]] std::uint64_t number_of(std::size_t camera, std::uint64_t counter,
                                         HostStamp middle) noexcept;
-  /// The number of an exposure that gave no frame; none where it is not known.
+  /// Number of an exposure without a frame; none if it is unknown.
   [[nodiscard]] std::optional<std::uint64_t> number_of_lost(std::size_t camera,
                                                             std::uint64_t counter) const noexcept;
-  /// This camera's next frame gets its number by time.
+  /// Aligns this camera by time at its next frame.
   void align(std::size_t camera) noexcept { cameras_[camera].align = true; }
   [[nodiscard]] bool aligning(std::size_t camera) const noexcept { return cameras_[camera].align; }
 
-  /// This number was exposed then. `leads`: by the camera that times are reckoned from; another's
-  /// is used while there is none of it.
+  /// Records when this number was exposed. `leads` marks the camera whose times are the reference;
+  /// another's are used while it has none.
   void record(std::uint64_t number, HostStamp middle, bool leads) noexcept;
-  /// A set of several images has gone out, and their stamps agree, or not. True: for the last time
-  /// that was borne, all but camera 0 get their numbers by time again.
+  /// Counts a complete set whose stamps agree or not. Returns true if the limit is reached, so that
+  /// all cameras but 0 are aligned by time again.
   [[nodiscard]] bool count_agreement(bool agree) noexcept;
 
  private:
   struct Camera {
-    bool align = false;     // the next frame's number is found by time
-    std::int64_t base = 0;  // number − counter
+    // True if the next frame's number is found by time.
+    bool align = false;
+    // Number minus counter.
+    std::int64_t base = 0;
   };
 
   Duration interval_;
   bool align_start_;
   std::array<Camera, kMaxCameras> cameras_{};
-  bool timed_ = false;  // a number and its time
+  // True if a number and its time are known.
+  bool timed_ = false;
   std::uint64_t timed_number_ = 0;
   HostStamp timed_middle_{};
   int unproven_run_ = 0;

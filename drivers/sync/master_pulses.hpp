@@ -6,37 +6,44 @@
 
 namespace vergence {
 
-/// The pulses of a camera that triggers the others, from its frames: for the mode master_strobe.
+/// Derives pulses from the frames of a camera that triggers the others (SyncMode::master_strobe).
 ///
-/// Numbers   Advance as its counter does. Over a restart, where the counter is another, they go on
-///           by its clock; a counter that stands or runs back is another boot.
-/// Gap       A pulse that came more than half an interval later than its counter says is the first
-///           after a pause.
+/// Numbers   Advance with its counter. After a restart, which resets the counter, they continue by
+///           its clock. A counter that stands or runs back means another boot.
+/// Gap       A pulse that is later than its counter implies by more than half an interval is the
+///           first after a pause.
+///
 /// Not thread-safe. Does not allocate. Constant time per call.
-/// Errors    None: told in the report.
 class MasterPulses {
  public:
   struct Report {
-    bool again = false;  // the newest frame once more: it makes no pulse, the rest means nothing
-    bool contradicted = false;  // the counter ran back: the pulse is of another boot
-    std::uint64_t lost = 0;     // exposures, and so pulses, without a frame since the last one
-    Pulse pulse{};              // mapped
+    /// True if the newest frame was repeated; it makes no pulse and the other members are invalid.
+    bool again = false;
+    /// True if the counter ran back; the pulse then belongs to another boot.
+    bool contradicted = false;
+    /// Exposures without a frame, and so lost pulses, since the last frame.
+    std::uint64_t lost = 0;
+    /// Pulse with its time on the host's clock.
+    Pulse pulse{};
   };
 
-  /// `interval`: between two pulses, > 0.
+  /// `interval` is that of the pulses, > 0.
   explicit MasterPulses(Duration interval) noexcept : interval_(interval) {}
 
   [[nodiscard]] Report frame(const SyncFrame& frame) noexcept;
-  /// It was started again: its count is another, its clock may go on.
+  /// Called after a restart: the counter changes, the clock may continue.
   void restart() noexcept { align_ = known_; }
 
  private:
   Duration interval_;
-  bool known_ = false;  // a frame has come: what is below means something
+  // True after the first frame, which makes the members below valid.
+  bool known_ = false;
   bool align_ = false;
-  std::uint64_t base_ = 0;  // pulse number − counter, modulo 2^64
+  // Pulse number minus counter, modulo 2^64.
+  std::uint64_t base_ = 0;
   std::uint64_t counter_ = 0;
-  DeviceStamp stamp_{};  // the newest frame's
+  // Stamp of the newest frame.
+  DeviceStamp stamp_{};
   std::uint32_t boot_ = 0;
 };
 

@@ -7,25 +7,33 @@
 
 namespace vergence {
 
-/// Pairing data of an image besides its slot.
+/// Pairing data of an image, without its slot.
 struct SetImage {
   MappedStamp middle{};
-  std::int64_t time = 0;  // ns, of the clock that pairs, where stamps do: middle of the exposure
-  DeviceStamp edge{};     // of the pulse by its source's clock, as this camera's stamp has it
-  Duration gate{};        // |true edge − edge| is below this
+  /// Middle of the exposure in ns on the pairing clock, in modes that pair by stamps.
+  std::int64_t time = 0;
+  /// Edge of the pulse on its source's clock, according to this camera's stamp.
+  DeviceStamp edge{};
+  /// Upper bound of
+  /// true edge − edge
+  /// .
+  Duration gate{};
   Duration exposure{};
-  bool suspect = false;  // perhaps of an earlier pulse
+  /// True if the image may belong to an earlier pulse.
+  bool suspect = false;
 };
 
-/// A set that still waits for images.
+/// Set that waits for images.
 struct OpenSet {
   bool used = false;
-  bool contradicted = false;  // its pulse's report does not agree with an image's stamp
+  /// True if its pulse's report disagrees with an image's stamp.
+  bool contradicted = false;
   SyncedSet set{};
   std::array<SetImage, kMaxCameras> images{};
-  HostStamp first{};  // arrival of its first image
+  /// Arrival of its first image.
+  HostStamp first{};
 
-  /// The first camera that is there. Precondition: one is.
+  /// First camera that is present. Precondition: at least one is.
   [[nodiscard]] std::size_t base() const noexcept {
     std::size_t first_camera = 0;
     while (first_camera + 1 < set.present.size() && !set.present[first_camera]) ++first_camera;
@@ -33,59 +41,55 @@ struct OpenSet {
   }
 };
 
-/// The sets of a rig that wait for images, and which images those had that have gone out.
+/// Sets that wait for images, and a history of the sets that were output.
 ///
-/// Sets go out in the order of their numbers, each once: what is at or below the last number that
-/// went out comes too late.
-///
-/// Ownership  Slots belong to the owner that RigSynchronizer states; here they are numbers.
-/// Not thread-safe. Memory: fixed, kOpen sets and one more. Constant time per call.
-/// Errors     None.
+/// Sets are output in order of their numbers, each once; an image at or below the last number is
+/// too late. Slots are only numbers here; RigSynchronizer defines their owner. Not thread-safe.
+/// Fixed memory. Constant time per call.
 class OpenSets {
  public:
-  static constexpr std::size_t kOpen =
-      4;  // pulses waiting at most: bounds the latency and the slots held
-  static constexpr std::size_t kHistory =
-      64;  // sets remembered, to tell a duplicate from a late frame
-  /// One more than kOpen: the frame that pushes the oldest out.
+  /// Maximum number of waiting sets; it bounds the latency and the slots held.
+  static constexpr std::size_t kOpen = 4;
+  /// Number of sets remembered to distinguish a duplicate from a late frame.
+  static constexpr std::size_t kHistory = 64;
+  /// One more than kOpen for the frame that pushes the oldest out.
   using Slots = std::array<OpenSet, kOpen + 1>;
 
   [[nodiscard]] OpenSet* find(std::uint64_t number) noexcept;
   [[nodiscard]] const OpenSet* find(std::uint64_t number) const noexcept;
-  /// The one with the least number; null: none is open.
+  /// Set with the smallest number; null if none is open.
   [[nodiscard]] OpenSet* oldest() noexcept;
-  /// Those with `used`, in no order.
+  /// All slots in no order; those with `used` are open.
   [[nodiscard]] const Slots& slots() const noexcept { return slots_; }
   [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
-  /// There is one more than may wait: the oldest has to go out.
+  /// True if more sets are open than may wait, so that the oldest must be output.
   [[nodiscard]] bool crowded() const noexcept { return count_ > kOpen; }
 
-  /// A new set. Precondition: find(number) == nullptr, !is_out(number), !crowded().
+  /// Opens a new set. Precondition: find(number) == nullptr, !is_out(number), !crowded().
   OpenSet& open(std::uint64_t number, HostStamp first) noexcept;
-  /// The set goes out. Precondition: it is oldest(), and an image is in it.
+  /// Closes the set that is output. Precondition: it is oldest() and has an image.
   void close(OpenSet* open) noexcept;
 
-  /// A set has gone out.
+  /// True once a set was output.
   [[nodiscard]] bool any_out() const noexcept { return any_out_; }
-  /// The number of the newest that went out, and SetImage::time of its base. Precondition:
-  /// any_out().
+  /// Number of the newest output set, and SetImage::time of its base. Precondition: any_out().
   [[nodiscard]] std::uint64_t last_out() const noexcept { return last_out_; }
   [[nodiscard]] std::int64_t last_time() const noexcept { return last_time_; }
-  /// A set of this number, or one after it, has gone out.
+  /// True if a set of this or a greater number was output.
   [[nodiscard]] bool is_out(std::uint64_t number) const noexcept {
     return any_out_ && number <= last_out_;
   }
-  /// The set of this number went out with this camera's image, no more than kHistory sets ago.
+  /// True if one of the last kHistory output sets has this number and an image of this camera.
   [[nodiscard]] bool went_out_with(std::uint64_t number, std::size_t camera) const noexcept;
 
-  /// The least number above all that are open or have gone out.
+  /// Smallest number above all open and output sets.
   [[nodiscard]] std::uint64_t first_free() const noexcept;
-  /// From now on no set waits that has been open until now.
+  /// Ends the waiting of all sets opened so far.
   void flush() noexcept { flushed_ = first_free(); }
-  /// No set below this one waits for an image.
+  /// Sets below this number do not wait for images.
   [[nodiscard]] std::uint64_t flushed_below() const noexcept { return flushed_; }
 
-  /// Suspect images of this camera stay suspect: their sets are contradicted.
+  /// Marks the sets of this camera's suspect images as contradicted.
   void contradict_suspect(std::size_t camera) noexcept;
 
  private:

@@ -21,7 +21,8 @@ void PulseAcquisition::add(const StampedFrame& frame) noexcept {
     const StampedFrame& last = frames_[count_ - 1];
     if (frame.counter == last.counter && frame.stamp == last.stamp) return;
     if (advance(last.counter, frame.counter) < 1 || frame.stamp <= last.stamp)
-      count_ = tried_ = 0;  // it began to count from zero
+      // The counter restarted.
+      count_ = tried_ = 0;
   }
   if (count_ == kFrames) {
     std::move(frames_.begin() + 1, frames_.end(), frames_.begin());
@@ -56,8 +57,7 @@ std::optional<PulseAcquisition::Trial> PulseAcquisition::attempt(const PulseTrai
   return Trial{verified, found, end};
 }
 
-/// The frame came no later than frames do, every pulse that it might be of instead was tried, and a
-/// pause hides none.
+/// True if the frame was not late, every other possible pulse was tried and no pause hides one.
 bool PulseAcquisition::believable(const PulseTrain& train, std::size_t place,
                                   std::size_t end) const noexcept {
   if (frames_[end - 1].arrival - train[place].host > latest_) return false;
@@ -71,8 +71,7 @@ bool PulseAcquisition::believable(const PulseTrain& train, std::size_t place,
   return true;
 }
 
-/// Checks that the run that ends before frame `end` fits with its last frame on the train's
-/// `place`.
+/// Checks whether the run before frame `end` fits with its last frame at `place` of the train.
 PulseAcquisition::Fit PulseAcquisition::fit(const PulseTrain& train, std::size_t place,
                                             std::size_t end) const noexcept {
   const std::size_t begin = end - kRun;
@@ -103,7 +102,8 @@ PulseAcquisition::Fit PulseAcquisition::fit(const PulseTrain& train, std::size_t
       number = pulse.number;
       skipped = pulse.skipped;
     } else if (pulse.edge > target) {
-      return pulse.resumed ? Fit::none : Fit::beyond;  // before the oldest that is held
+      // The target is before the oldest pulse held.
+      return pulse.resumed ? Fit::none : Fit::beyond;
     } else {
       const auto unreported = train.place(target, Duration{});
       if (!unreported || unreported->number >= number) return Fit::none;
@@ -191,8 +191,8 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
       return number;
     }
     if (numbered) made = frame;
-    if (frame.number > pulse.number)
-      pending_[kept++] = frame;  // reports come in order: one of an older will never come
+    // Reports are in order, so an older pulse will never be reported.
+    if (frame.number > pulse.number) pending_[kept++] = frame;
   }
   pendings_ = kept;
   if (made) {
@@ -221,7 +221,7 @@ void PulseMatcher::adopt(const PulseTrain& train, const PulseAcquisition::Trial&
   worst_acquisition_ = std::max(worst_acquisition_, now - acquisition_.began());
   tie_.clear();
   recents_ = pendings_ = 0;
-  // The run again, forwards: its offset is known, every frame has its pulse.
+  // Goes through the run forwards again; with the offset known every frame has its pulse.
   const auto frames = acquisition_.frames();
   const auto run = frames.subspan(trial.end - kRun, kRun);
   std::size_t at = trial.place;
@@ -244,7 +244,7 @@ void PulseMatcher::adopt(const PulseTrain& train, const PulseAcquisition::Trial&
     last_skipped_ = pulse.skipped;
     recent_[recents_++ % kRecent] = frame;
   }
-  // Those that came since; a contradiction among them undoes the proof.
+  // Matches the frames since; a contradiction among them revokes the verification.
   std::array<StampedFrame, PulseAcquisition::kFrames> later{};
   const std::size_t waiting = frames.size() - trial.end;
   std::copy_n(frames.begin() + static_cast<std::ptrdiff_t>(trial.end), waiting, later.begin());
@@ -272,7 +272,7 @@ PulseMatcher::Match PulseMatcher::repeated(const StampedFrame& frame) const noex
   return m;
 }
 
-/// A frame of this reported pulse fits it within the gate.
+/// Handles a frame that fits this reported pulse within the gate.
 void PulseMatcher::settle(const PulseTrain& train, std::uint64_t number) noexcept {
   if (!missed_trigger_.any()) return;
   ++failures_;
@@ -289,9 +289,8 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
   Match m;
   m.edge = tie_.to_edge(frame.stamp);
   m.gate = tie_.gate(frame.stamp);
-  if (m.gate * 3 > interval_)
-    return contradict(
-        frame);  // nothing was seen for so long that the stamp no longer tells the pulse
+  // After a long gap the stamp no longer identifies the pulse.
+  if (m.gate * 3 > interval_) return contradict(frame);
   const auto place = train.place(m.edge, m.gate);
   if (!place || place->paused || place->number <= last_.number) return contradict(frame);
   const std::uint64_t most = place->number - last_.number;
@@ -301,8 +300,8 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
   if (exposures > most) return contradict(frame);
   m.missed = least > exposures ? least - exposures : 0;
   m.lost = exposures - 1;
-  // A clock that was set may point at another pulse; then the frame seems quicker than ever, or is
-  // here before its pulse.
+  // A clock that was set may point to another pulse; the frame then seems faster than any before,
+  // or precedes its pulse.
   const MappedStamp host = train.to_host(m.edge);
   const Duration delay = frame.arrival - host.host;
   if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < min_delay_))
@@ -316,7 +315,8 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
   last_skipped_ = place->skipped_with;
   recent_[recents_++ % kRecent] = last_;
   if (place->entry != nullptr) {
-    pendings_ = 0;  // reports come in order: older ones never will
+    // Reports are in order, so older pulses will never be reported.
+    pendings_ = 0;
     tie_.add(frame.stamp, place->entry->edge);
     settle(train, m.number);
   } else if (train.newest().number < m.number) {

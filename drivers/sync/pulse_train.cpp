@@ -19,7 +19,8 @@ PulseTrain::Step PulseTrain::add(const Pulse& pulse, std::uint64_t first_free) n
     } else {
       steps = number - last.number;
       const Duration passed = pulse.edge - last.edge;
-      // Varied intervals are within a fourth; four times as long is a clock that was set.
+      // Dithered intervals differ by at most a quarter; four times the interval means a clock that
+      // was set.
       goes_on = steps <= kLeap && passed > Duration{} &&
                 (pulse.resumed || passed <= nominal_ * static_cast<std::int64_t>(4 * steps + 4));
     }
@@ -47,7 +48,7 @@ PulseTrain::Step PulseTrain::add(const Pulse& pulse, std::uint64_t first_free) n
 }
 
 const PulseTrain::Entry* PulseTrain::find(std::uint64_t number) const noexcept {
-  // Mostly one of the last.
+  // Searches backwards, because it is mostly one of the last.
   for (std::size_t i = count_; i-- > 0;) {
     const Entry& e = (*this)[i];
     if (e.number == number) return &e;
@@ -73,7 +74,7 @@ Duration PulseTrain::interval() const noexcept {
   constexpr std::size_t kEnough = 16;
   if (count_ < kEnough) return nominal_;
   const Entry &a = (*this)[0], &b = newest();
-  // A start after a stop is no interval: number and time then have nothing to do with each other.
+  // A gap from stop to start is no interval: number and time are then unrelated.
   for (std::size_t i = 1; i < count_; ++i)
     if ((*this)[i].resumed) return nominal_;
   return (b.edge - a.edge) / static_cast<std::int64_t>(b.number - a.number);
@@ -83,8 +84,8 @@ std::optional<PulseTrain::Place> PulseTrain::unreported(const Entry& before, con
                                                         DeviceStamp edge) const noexcept {
   const std::uint64_t room = after == nullptr ? kAhead : after->number - before.number - 1;
   if (room == 0) return std::nullopt;
-  const bool spread =
-      after != nullptr && !after->resumed;  // its pulses fill the time between evenly
+  // Pulses before a regular one fill the time evenly.
+  const bool spread = after != nullptr && !after->resumed;
   const Duration step =
       spread ? (after->edge - before.edge) / static_cast<std::int64_t>(room + 1) : interval();
   const Duration passed = edge - before.edge;
@@ -110,7 +111,8 @@ std::optional<PulseTrain::Place> PulseTrain::place(DeviceStamp edge, Duration ga
 }
 
 MappedStamp PulseTrain::to_host(DeviceStamp edge) const noexcept {
-  constexpr std::int64_t kDrift = 5'000;  // 1 / 200 ppm
+  // Equals 1 / 200 ppm.
+  constexpr std::int64_t kDrift = 5'000;
   const Entry* nearest = &newest();
   for (std::size_t i = count_; i-- > 0;) {
     const Entry& e = (*this)[i];

@@ -2,7 +2,7 @@
 
 #include "drivers/sync/rig_synchronizer.hpp"
 
-/// Which set a frame belongs to, by the pulse that made it where there are pulses.
+/// Determines the set of a frame, in modes with pulses by its pulse.
 namespace vergence {
 
 RigSynchronizer::Step RigSynchronizer::number_of(const SyncFrame& frame, std::uint64_t* number,
@@ -22,7 +22,8 @@ RigSynchronizer::Step RigSynchronizer::number_of(const SyncFrame& frame, std::ui
 }
 
 Duration RigSynchronizer::noise_of(std::size_t camera) const noexcept {
-  constexpr Duration kTick = Duration::microseconds(1);  // of a board's or an INS's edge
+  // Resolution of the edges of a trigger board or INS.
+  constexpr Duration kTick = Duration::microseconds(1);
   const SyncCameraOptions &own = options_.camera[camera], &master = options_.camera[0];
   const bool by_master = options_.mode == SyncMode::master_strobe;
   return own.resolution + own.jitter + (by_master ? master.resolution + master.jitter : kTick);
@@ -67,9 +68,10 @@ void RigSynchronizer::add_pulse(const Pulse& pulse) noexcept {
 }
 
 std::uint32_t RigSynchronizer::wants_pause() noexcept {
-  constexpr int kInVain = 8;  // trials of a camera
-  constexpr std::uint64_t kPatience =
-      3 * PulseMatcher::kRun;  // pulses, until a pause has been seen or has not helped
+  // Unsuccessful trials of a camera.
+  constexpr int kInVain = 8;
+  // Number of pulses until a pause was seen or has had no effect.
+  constexpr std::uint64_t kPatience = 3 * PulseMatcher::kRun;
   if (!proves_numbers(options_.mode) || (asked_ && pulses_ < asked_at_ + kPatience)) return 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const bool settled = verified(static_cast<int>(k)) && !matchers_[k].suspect();
@@ -120,7 +122,7 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame,
   return Step::numbered;
 }
 
-/// Camera 0 makes the pulses: its frame is the report of one.
+/// Camera 0 makes the pulses: each of its frames reports one.
 RigSynchronizer::Step RigSynchronizer::number_by_master(const SyncFrame& frame,
                                                         std::uint64_t* number,
                                                         SetImage* image) noexcept {

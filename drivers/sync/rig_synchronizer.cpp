@@ -52,7 +52,7 @@ SyncResult RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   return SyncResult::taken;
 }
 
-/// A frame whose set has gone out: with its image, without it, or before it was verified at all.
+/// Result for a frame whose set was output with its image, without it, or before it was verified.
 SyncResult RigSynchronizer::verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
                                             const SetImage& image) noexcept {
   if (number < sources_[camera].from) {
@@ -93,7 +93,7 @@ bool RigSynchronizer::next(SyncedSet* set) noexcept {
   return true;
 }
 
-/// Camera 0's middle, or that of the first camera that is there.
+/// Middle of camera 0, or of the first present camera.
 void RigSynchronizer::stamp(const OpenSet& open, SyncedSet* set) const noexcept {
   const std::size_t base = open.base();
   set->stamp = open.images[base].middle.host;
@@ -103,8 +103,8 @@ void RigSynchronizer::stamp(const OpenSet& open, SyncedSet* set) const noexcept 
       set->spread = std::max(set->spread, magnitude(open.images[k].middle.host - set->stamp));
 }
 
-/// The pulse's edge on the host's clock, and from it to the middles of the exposures, as they were
-/// fed back or as they were asked for.
+/// Maps the pulse's edge to the host's clock and adds the middles of the exposures, as measured by
+/// feedback or as configured.
 void RigSynchronizer::stamp_by_pulse(const OpenSet& open, SyncedSet* set) const noexcept {
   const PulseTrain::Entry* pulse = train_.find(set->number);
   const std::size_t base = open.base();
@@ -130,7 +130,7 @@ void RigSynchronizer::stamp_by_pulse(const OpenSet& open, SyncedSet* set) const 
 void RigSynchronizer::emit(OpenSet* open, SyncedSet* set) noexcept {
   *set = open->set;
   const bool numbered = proves_numbers(options_.mode);
-  // Pulses of a train that has ended are no longer known: their cameras' own stamps are.
+  // Pulses of an ended train are unknown; their cameras' own stamps are used.
   const bool of_train = numbered && train_.size() > 0 && set->number >= sets_.flushed_below();
   if (of_train) {
     stamp_by_pulse(*open, set);
@@ -173,8 +173,8 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
       return;
     case SyncMode::ieee1394_cycle_time:
     case SyncMode::ptp:
-      // A clock that is common no more (no master, two of them) pairs one exposure with the next
-      // once it has drifted apart by an interval; the host's stamps know better.
+      // If the clock is no longer common (no PTP master, or two), it pairs one exposure with the
+      // next after drifting by an interval; the host's stamps reveal this.
       set->proof = SyncProof::common_clock;
       if (!host_stamps_agree(*set) || a_clock_is_apart()) mark_ambiguous(set);
       return;
@@ -197,7 +197,7 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
   if (by_counter_.count_agreement(agree)) ++counters_.realigned;
 }
 
-/// True also of a single image, whose spread is none.
+/// True also for a single image, which has no spread.
 bool RigSynchronizer::host_stamps_agree(const SyncedSet& set) const noexcept {
   return set.spread * 2 <= options_.interval;
 }
@@ -225,7 +225,8 @@ SyncCounters RigSynchronizer::counters() const noexcept {
 void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
   const auto k = static_cast<std::size_t>(camera);
   Source& source = sources_[k];
-  std::uint64_t next = 0;  // the first that is still waited for
+  // First number that is still waited for.
+  std::uint64_t next = 0;
   if (options_.mode == SyncMode::frame_counter) {
     const auto number = by_counter_.number_of_lost(k, counter);
     if (!number) return;

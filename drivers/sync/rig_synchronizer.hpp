@@ -14,73 +14,70 @@
 
 namespace vergence {
 
-/// Pairs the frames of a rig: by the pulses that made them, by their counters, or by their stamps
-/// (SyncMode).
+/// Pairs the frames of a rig by their pulses, counters or stamps (SyncMode).
 ///
-/// A set goes out as soon as every camera that is there has given its image, or has given a later
-/// one (its image is lost), and its pulse's report is here where there are pulses; or `hold` after
-/// the set's first image, by the arrivals of others. Sets go out in order of their numbers, each
-/// once. Deterministic: the result depends on the input and its order only; no clock is read.
+/// A set is output as soon as every connected camera has given its image or a later one (its image
+/// is lost) and, with pulses, their report has arrived; at the latest `hold` after the set's first
+/// image, by the arrivals of other frames. Sets are output in order of their numbers, each once.
+/// The result depends only on the input and its order; no clock is read.
 ///
 ///     RigSynchronizer synchronizer({.cameras = 2, .interval = Duration::milliseconds(50)});
 ///     if (synchronizer.offer(frame) != SyncResult::taken) camera.release(frame.slot);
 ///     for (SyncedSet set; synchronizer.next(&set);)
-///       if (set.complete) use(set.slots, set.stamp);  // its slots are ours again
+///       if (set.complete) use(set.slots, set.stamp);  // its slots are the caller's again
 ///
-/// Pulses     A camera is `acquiring` until its own intervals fit the pulses' at exactly one place;
-///            arrival never decides. Its frames are given back and counted meanwhile, those of the
-///            others go out without them. From then on every frame's pulse follows from its stamp
-///            (the camera's clock tied to the board's), and its counter must agree: more pulses
-///            than counts are missed triggers, counts without images are lost frames, anything else
-///            is a contradiction and it acquires again. After a missed trigger sets wait up to
-///            `hold` for the intervals to show that it was none of the clock's, else they are
-///            `ambiguous`. A pulse that runs back in number or has another `boot` makes all acquire
-///            again. A frame that comes before its pulse's report is given the pulse's number all
-///            the same; the report then confirms it, or the set is `ambiguous`.
-/// One clock  Of a set paired by stamps of one bus or PTP clock the host's stamps must agree within
-///            half an interval, else it is `ambiguous`; so is every set while a camera that is
-///            there has a clock far from the others'.
-/// Limits     A camera that hands out the image of one exposure under the stamp of the next is not
+/// Pulses     A camera is `acquiring` until its intervals fit the pulses' at exactly one place;
+///            arrival never decides. Meanwhile its frames are returned and counted, and sets are
+///            output without them. Then a frame's pulse follows from its stamp (the camera's clock
+///            tied to the trigger board's), and the counter must agree: extra pulses are missed
+///            triggers, extra counts are lost frames, anything else is a contradiction and a new
+///            acquisition. After a missed trigger sets wait up to `hold` for the intervals to
+///            exclude a step of the clock, else they are `ambiguous`. A number that runs back or
+///            another `boot` makes all cameras acquire again. A frame before its pulse's report
+///            gets the number too; the report then verifies it, or the set is `ambiguous`.
+/// One clock  A set paired by stamps of one bus or PTP clock is `ambiguous` if the host's stamps
+///            disagree by more than half an interval, or while a connected camera's clock is far
+///            from the others'.
+/// Limits     A camera that delivers the image of one exposure with the stamp of the next is not
 ///            detected here.
-/// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the
-///            caller's again.
-/// Not thread-safe. Memory: fixed, kOpen pulses. Constant time per call.
-/// Errors     Nothing throws. Frames that cannot be paired are reported by SyncResult and counted.
+/// Ownership  A slot that is `taken` is returned by next() in exactly one set and then belongs to
+///            the caller.
+/// Cost       Not thread-safe. Fixed memory, kOpen pulses. Constant time per call.
+/// Errors     No call throws. Frames that cannot be paired are reported by SyncResult and counted.
 class RigSynchronizer {
  public:
   static constexpr std::size_t kOpen = OpenSets::kOpen;
   static constexpr int kAmbiguous = CounterNumbering::kAmbiguous;
-  static constexpr std::uint32_t kPause =
-      4;  // pulses left out: more than what a camera misses by itself
+  /// Pulses omitted by a pause: more than a camera misses on its own.
+  static constexpr std::uint32_t kPause = 4;
 
   /// Precondition: options.validate() == nullptr.
   explicit RigSynchronizer(const SyncOptions& options) noexcept;
 
-  /// Precondition: next() was called until false since the last offer().
+  /// Offers a frame. Precondition: next() was called until false since the last offer().
   [[nodiscard]] SyncResult offer(const SyncFrame& frame) noexcept;
-  /// The next set that is ready. Call until false.
+  /// Returns the next set. Call until false.
   [[nodiscard]] bool next(SyncedSet* set) noexcept;
 
-  /// A pulse's report, in the order of arrival; in the modes board and ins_syncout (elsewhere it
-  /// does nothing). next() as after offer().
-  /// Precondition: pulse.mapped.
+  /// Adds a pulse's report, in order of arrival. Does nothing in modes other than board and
+  /// ins_syncout. Call next() as after offer(). Precondition: pulse.mapped.
   void pulse(const Pulse& pulse) noexcept;
-  /// Number of pulses to leave out because the intervals do not identify them; mostly 0. Returned
-  /// once, and again if the pause did not help. board: TriggerDevice::pause() with just that
-  /// number, another could hide a report that was lost. ins_syncout, master_strobe: stop the source
+  /// Number of pulses to omit because the intervals do not identify them; mostly 0. Returned once,
+  /// and again if the pause had no effect. board: call TriggerDevice::pause() with exactly that
+  /// number, because another could hide a lost report. ins_syncout, master_strobe: stop the source
   /// and start it again.
   [[nodiscard]] std::uint32_t wants_pause() noexcept;
   /// Returns true if that camera's pairing is verified; always true in modes that cannot verify it.
   [[nodiscard]] bool verified(int camera) const noexcept;
 
-  /// Call for an exposure without a usable image: its set does not wait for it. Preconditions as
-  /// offer(). Not in modes that pair by stamps.
+  /// Call for an exposure without a usable image, so that its set does not wait. Same preconditions
+  /// as offer(). Not in modes that pair by stamps.
   void lost(int camera, std::uint64_t counter) noexcept;
-  /// Call when a camera was disconnected: sets no longer wait for it.
+  /// Call when a camera was disconnected, so that sets do not wait for it.
   void absent(int camera) noexcept;
-  /// Call when it has come back and counts from zero. By counter: its first frame joins the pulse
-  /// nearest in time, the others follow. With pulses: it acquires, the others go on; a master's
-  /// count goes on by its clock.
+  /// Call when a camera has reconnected and counts from zero. By counter its first frame joins the
+  /// pulse nearest in time. With pulses it acquires while the others continue; a master's count
+  /// continues by its clock.
   void restarted(int camera) noexcept;
   /// Call after the last frame: next() then returns all open sets.
   void finish() noexcept { finishing_ = true; }
@@ -91,12 +88,14 @@ class RigSynchronizer {
   struct Source {
     bool here = true;
     bool any = false;
-    std::uint64_t newest = 0;  // number
-    std::uint64_t from = 0;    // number; sets below did not wait for it, as it was acquiring
+    // Newest number.
+    std::uint64_t newest = 0;
+    // Sets below this number did not wait for the camera, because it was acquiring.
+    std::uint64_t from = 0;
   };
   enum class Step : std::uint8_t { numbered, again, acquiring, late };
 
-  // By counter, by time, by pulses: the number of a frame's set.
+  // Each returns the number of a frame's set: by counter or time, by pulses, by the master.
   [[nodiscard]] Step number_of(const SyncFrame& frame, std::uint64_t* number,
                                SetImage* image) noexcept;
   [[nodiscard]] Step number_by_pulse(const SyncFrame& frame, std::uint64_t* number,
@@ -127,11 +126,14 @@ class RigSynchronizer {
   TimeNumbering by_time_;
   PulseTrain train_;
   std::array<PulseMatcher, kMaxCameras> matchers_{};
-  MasterPulses master_;            // camera 0 where its exposures are the pulses
-  std::uint64_t steady_from_ = 0;  // number from which on every pulse without image is a missed one
+  // Pulses in the mode in which camera 0 makes them.
+  MasterPulses master_;
+  // From this number on, every pulse without an image is a missed one.
+  std::uint64_t steady_from_ = 0;
   std::uint64_t pulses_ = 0, asked_at_ = 0;
   bool asked_ = false;
-  HostStamp now_{};  // newest arrival
+  // Newest arrival.
+  HostStamp now_{};
   bool finishing_ = false;
   SyncCounters counters_{};
 };

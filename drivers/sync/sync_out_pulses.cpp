@@ -3,12 +3,12 @@
 namespace vergence {
 namespace {
 
-/// It makes them at 400 Hz / n. The rate it was asked for is a decimal
-/// number, 26.6667 say: edges reckoned from that would run away from the pulses by milliseconds an
-/// hour.
+/// Interval that the INS applies, n / 400 Hz. A requested rate is decimal (26.6667), and edges
+/// computed from it would drift by milliseconds per hour.
 Duration as_marked(Duration asked) noexcept {
   constexpr Duration kStep = Duration::nanoseconds(2'500'000);
-  constexpr std::int64_t kAccepted = 1000;  // it may be off by one part in so many
+  // Accepted deviation is one part in this number.
+  constexpr std::int64_t kAccepted = 1000;
   const Duration made = kStep * ((asked + kStep / 2).ns() / kStep.ns());
   const Duration off = made < asked ? asked - made : made - asked;
   return off * kAccepted <= asked ? made : asked;

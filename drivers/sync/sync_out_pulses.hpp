@@ -8,31 +8,34 @@
 
 namespace vergence {
 
-/// The pulses of an INS's SyncOut, from its readings: for the mode ins_syncout.
+/// Derives the pulses of an INS's SyncOut from its samples (SyncMode::ins_syncout).
 ///
-/// Numbers  Intervals of the INS's own clock, which makes the pulses too; a reading that was lost
-///          loses no number. A gap made on purpose must be told by restart(): numbers go on after
-///          it, for it is the gap between pulses of one boot that proves. So the clock must go on
-///          over the gap, and every pulse on either side of it have its reading.
-/// Marks    InsQuality::sync_out, on the sample after the pulse: edges are multiples of the
+/// Numbers  Count intervals of the INS's own clock, which makes the pulses too, so a lost sample
+///          loses no number. Call restart() at an intended gap: numbers continue across it, because
+///          the gap between pulses of one boot verifies the pairing. The clock must therefore
+///          continue across the gap, and every pulse next to it needs its sample.
+/// Marks    InsQuality::sync_out is set on the sample after the pulse: edges are multiples of the
 ///          interval, 400 Hz / n, from the earliest mark.
-/// Not thread-safe. Does not allocate. Errors: none; a clock that runs back is another boot.
+///
+/// Not thread-safe. Does not allocate. A clock that runs back means another boot.
 class SyncOutPulses {
  public:
-  /// `interval`: between two pulses, as good as a decimal rate says it.
+  /// `interval` is that of the pulses, as exact as its decimal rate.
   explicit SyncOutPulses(Duration interval) noexcept;
 
-  /// The pulse that left with this reading, if one did. `at`: the reading's stamp on the host's
-  /// clock.
+  /// Returns the pulse that was sent with this sample, if any. `at` is the sample's stamp on the
+  /// host's clock.
   [[nodiscard]] std::optional<Pulse> reading(const InsReading& reading, MappedStamp at) noexcept;
-  /// The device was told to stop measuring and to go on: a gap.
+  /// Called after the device was stopped and started again: a gap.
   void restart() noexcept { fresh_ = true; }
 
  private:
   Duration interval_;
   bool any_ = false, fresh_ = true;
-  DeviceStamp first_{};  // pulse that the next are reckoned from, numbered base_
-  DeviceStamp last_{};   // reading that was looked at
+  // Pulse from which the next are computed; its number is base_.
+  DeviceStamp first_{};
+  // Newest sample.
+  DeviceStamp last_{};
   std::uint64_t base_ = 0, number_ = 0;
   std::uint32_t boot_ = 0;
 };

@@ -33,19 +33,19 @@ enum class SyncMode : std::uint8_t {
   side_by_side,
 };
 [[nodiscard]] const char* to_string(SyncMode) noexcept;
-/// Frames are tied to pulses that are offered by RigSynchronizer::pulse().
+/// True if frames are associated with pulses given to RigSynchronizer::pulse().
 [[nodiscard]] constexpr bool wants_pulses(SyncMode m) noexcept {
   return m == SyncMode::board || m == SyncMode::ins_syncout;
 }
-/// Frames are tied to numbered pulses, by proof.
+/// True if frames are associated with numbered pulses and this is verified.
 [[nodiscard]] constexpr bool proves_numbers(SyncMode m) noexcept {
   return wants_pulses(m) || m == SyncMode::master_strobe;
 }
-/// Something proves that the images of a set were exposed together.
+/// True if the mode verifies that the images of a set were exposed together.
 [[nodiscard]] constexpr bool verifies_pairing(SyncMode m) noexcept {
   return m != SyncMode::frame_counter && m != SyncMode::approximate_time;
 }
-/// Frames are paired by their stamps.
+/// True if frames are paired by their stamps.
 [[nodiscard]] constexpr bool pairs_by_time(SyncMode m) noexcept {
   return m == SyncMode::approximate_time || m == SyncMode::ieee1394_cycle_time ||
          m == SyncMode::ptp || m == SyncMode::side_by_side;
@@ -57,9 +57,9 @@ struct SyncCameraOptions {
   Duration delay{};
   /// Resolution of the camera's stamps, as DeviceTiming::resolution.
   Duration resolution = Duration::microseconds(1);
-  /// By how much a stamp may be off the edge plus a constant: tens of µs where the camera stamps,
-  /// milliseconds (DeviceTiming::delay_spread) where its stamps are the host's. With more than half
-  /// of what the intervals vary by only a pause proves.
+  /// Bound on the deviation of a stamp from the edge plus a constant: tens of µs for stamps of the
+  /// camera, milliseconds (DeviceTiming::delay_spread) for those of the host. If it exceeds half
+  /// the dither of the intervals, only a pause verifies.
   Duration jitter = Duration::microseconds(20);
   /// Upper bound of the time from a pulse to the arrival of its frame. Choose it conservatively:
   /// frames that arrive later are not used to verify the pairing.
@@ -71,13 +71,13 @@ struct SyncOptions {
   int cameras = 2;
   /// Interval between two pulses, > 0; the mean interval if it is dithered.
   Duration interval{};
-  Duration hold = Duration::milliseconds(
-      100);  // a set waits so long, by the arrivals of others, for images and the pulse's report
+  /// Maximum wait of a set for images and the pulse's report, by the arrivals of other frames.
+  Duration hold = Duration::milliseconds(100);
   SyncMode mode = SyncMode::frame_counter;
-  Duration tolerance = Duration::milliseconds(
-      2);  // modes that pair by time: between the middles of a set's exposures
-  /// frame_counter: the pulses may have begun before the cameras, so each camera's first exposure
-  /// is given its pulse by its stamp; and again after kAmbiguous ambiguous sets in a row.
+  /// Maximum difference between the middles of a set's exposures, in modes that pair by time.
+  Duration tolerance = Duration::milliseconds(2);
+  /// frame_counter: aligns each camera's first exposure to its pulse by its stamp, because the
+  /// pulses may start before the cameras; again after kAmbiguous ambiguous sets in a row.
   bool align_start = false;
   /// Used by board, ins_syncout and master_strobe.
   std::array<SyncCameraOptions, kMaxCameras> camera{};
@@ -85,7 +85,7 @@ struct SyncOptions {
   [[nodiscard]] const char* validate() const noexcept;
 };
 
-/// One camera's frame on its way into a set.
+/// Frame offered to the synchroniser.
 struct SyncFrame {
   int camera = 0;
   FrameSlot slot = 0;
@@ -96,7 +96,7 @@ struct SyncFrame {
   HostStamp arrival{};
   /// Frame::exposure_start, by the camera's clock. Ignored with frame_counter and approximate_time.
   DeviceStamp exposure_start{};
-  /// Frame::exposure. Ignored as above.
+  /// Frame::exposure. Ignored in the same modes.
   Duration exposure{};
 };
 
@@ -118,14 +118,15 @@ enum class SyncProof : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(SyncProof) noexcept;
 
-/// The images of one pulse.
+/// Images of one pulse.
 ///
-/// stamp   Mid-exposure, one for all images. With pulses: their edge on the host's clock + delay +
-///         exposure / 2 of camera 0, or the middle that the feedback line told; without camera 0 of
-///         the first that is there. Else that camera's own.
-/// spread  The largest distance of another image's middle to it: unequal exposures.
+/// stamp   Mid-exposure, common to all images. With pulses it is the edge on the host's clock +
+///         delay + exposure / 2, or the middle measured on the feedback input; otherwise the middle
+///         of the exposure by the camera's stamp. The reference is camera 0, or the first present
+///         one.
+/// spread  Largest distance of another image's middle from it, due to unequal exposures.
 struct SyncedSet {
-  /// Number of the pulse. It increases, also over a restart of the board, unlike the board's own.
+  /// Number of the pulse. Unlike the trigger board's number, it keeps increasing across a restart.
   std::uint64_t number = 0;
   HostStamp stamp{};
   /// Upper bound of |true − stamp|.
@@ -175,7 +176,8 @@ struct SyncCounters {
   std::uint64_t ambiguous = 0;
   /// Times that the pulses of all cameras were found by their stamps again.
   std::uint64_t realigned = 0;
-  // With numbered pulses:
+  // The following apply to numbered pulses.
+
   /// Pulses that this camera did not expose.
   std::array<std::uint64_t, kMaxCameras> missed_trigger{};
   /// Frames returned while their pulse was not verified.

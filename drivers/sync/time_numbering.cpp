@@ -7,10 +7,11 @@
 namespace vergence {
 namespace {
 
-constexpr std::int64_t kBusWrap = 128'000'000'000;  // ns, of the IEEE 1394 cycle timer
+// Period of the IEEE 1394 cycle timer, in ns.
+constexpr std::int64_t kBusWrap = 128'000'000'000;
 
-/// The sets whose times are of the clock that counts now: those that are open, and the last that
-/// went out, unless a flush has ended their count.
+/// Sets whose times are on the current clock: those that are open, and the last output one unless a
+/// flush has ended its count.
 class Counted {
  public:
   explicit Counted(const OpenSets& sets) noexcept
@@ -22,15 +23,17 @@ class Counted {
   }
 
   [[nodiscard]] bool any() const noexcept { return any_; }
-  /// The last that went out is one of them.
+  /// True if the last output set is one of them.
   [[nodiscard]] bool out() const noexcept { return out_; }
   // Precondition: any().
   [[nodiscard]] std::uint64_t newest() const noexcept { return newest_; }
   [[nodiscard]] std::int64_t newest_time() const noexcept { return newest_time_; }
 
   [[nodiscard]] bool astray(std::int64_t time, Duration interval) const noexcept {
-    constexpr double kFarBack = 2e9;   // ns: no frame is late by that
-    constexpr double kLeap = 100'000;  // intervals: over an hour of silence, or the clock was set
+    // In ns; no frame is that late.
+    constexpr double kFarBack = 2e9;
+    // In intervals: more than an hour without frames, or the clock was set.
+    constexpr double kLeap = 100'000;
     // Stamps of two clocks may be too far apart for integers.
     const auto from = [time](std::int64_t reference) {
       return static_cast<double>(time) - static_cast<double>(reference);

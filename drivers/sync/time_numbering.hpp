@@ -9,51 +9,54 @@
 
 namespace vergence {
 
-/// The numbers of sets from stamps of one clock: for the modes software, bus, ptp and side_by_side.
+/// Numbers sets by stamps of one clock, in the modes that pair by time.
 ///
-/// An image within the tolerance of an open set belongs to it; anything else begins one,
-/// so many intervals after the newest or before it. What would be before the first set, or between
-/// two that are open, is of none.
+/// An image within the tolerance of an open set belongs to it. Any other begins a set, numbered by
+/// the intervals from the newest set. An image before the first set or between two open ones
+/// belongs to none.
 ///
-/// Astray   A frame that is farther back than any can be late, or over an hour of intervals ahead,
-///          has another clock than the others. Several in a row, of whatever camera, and the common
-///          clock was set: a new count begins, at the next number, and open sets do not wait
-///          for it. Where other cameras' frames fit meanwhile, that camera's clock is apart.
+/// Astray   A frame further back than any delay, or more than an hour of intervals ahead, has
+///          another clock. If several in a row are astray, of any cameras, the common clock was
+///          set: a new count begins at the next number, and open sets do not wait for it. If other
+///          cameras' frames fit meanwhile, this camera's clock is apart.
+/// Units    Times are ns of the pairing clock: the host's, the bus's or PTP's.
 ///
 /// Not thread-safe. Does not allocate. Constant time per call.
-/// Units    Times are ns of the clock that pairs: the host's, the bus's, PTP's.
-/// Errors   None; a clock that was set, or is apart, is told.
 class TimeNumbering {
  public:
   struct Number {
-    std::optional<std::uint64_t> number;  // none, or one that has gone out: too late
+    /// None, or one that was already output, if the image is too late.
+    std::optional<std::uint64_t> number;
     bool clock_set = false;
   };
 
   explicit TimeNumbering(const SyncOptions& options) noexcept
       : mode_(options.mode), interval_(options.interval), tolerance_(options.tolerance) {}
 
-  /// Middle of the exposure on the clock that pairs. The bus's wraps: of the two unwrapped by their
-  /// cameras' drivers that nearest to the newest set's is meant.
+  /// Middle of the exposure on the pairing clock. The bus clock wraps; of the possible values the
+  /// one nearest to the newest set is taken.
   [[nodiscard]] std::int64_t time_of(const SyncFrame& frame, const OpenSets& sets) const noexcept;
-  /// The number of the open set that it fits into, or a new one in the order of time. Flushes the
-  /// sets where the clock was set.
+  /// Number of the open set that fits, or of a new one in order of time. Flushes the sets if the
+  /// clock was set.
   [[nodiscard]] Number number_of(std::size_t camera, std::int64_t time, OpenSets* sets) noexcept;
-  /// This camera's newest frames are all astray, while others' fit.
+  /// True if this camera's newest frames are all astray while others' fit.
   [[nodiscard]] bool apart(std::size_t camera) const noexcept {
     return astray_[camera] >= kBelieved;
   }
 
  private:
-  static constexpr int kBelieved = 3;  // frames in a row: more than a stamp that is broken
+  // Frames in a row, to exclude single corrupt stamps.
+  static constexpr int kBelieved = 3;
 
   [[nodiscard]] std::optional<std::uint64_t> place(std::int64_t time,
                                                    const OpenSets& sets) const noexcept;
 
   SyncMode mode_;
   Duration interval_, tolerance_;
-  std::array<int, kMaxCameras> astray_{};  // newest frames of each that are
-  int astray_in_a_row_ = 0;                // of all cameras
+  // Number of newest frames that are astray, by camera.
+  std::array<int, kMaxCameras> astray_{};
+  // Number of astray frames in a row, of all cameras.
+  int astray_in_a_row_ = 0;
 };
 
 }  // namespace vergence

@@ -17,11 +17,11 @@ void BoardLine::attach(SerialLink* line) noexcept {
 }
 
 void BoardLine::record_byte(std::uint8_t byte) noexcept {
-  // The 00 belongs to the frame that it ends; one that stands alone to none.
+  // The 00 belongs to the frame that it ends; a separate one belongs to none.
   if (byte != 0 || into_frame_ > 0) ++into_frame_;
 }
 
-/// Up to here the frame had been sent when this read was on its way.
+/// Bounds the departure: the bytes so far were sent before this read arrived.
 void BoardLine::record_end_of_read() noexcept {
   if (into_frame_ == 0) return;
   const HostStamp bound = arrival_ - byte_time_ * into_frame_;
@@ -33,7 +33,7 @@ DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> pa
                              std::uint8_t* sequence) noexcept {
   constexpr Duration kWrite = Duration::milliseconds(50);
   if (sequence != nullptr) *sequence = sequence_;
-  // The 00 before it ends whatever an earlier program left half sent.
+  // The first 00 ends a frame that an earlier program left incomplete.
   std::array<std::uint8_t, trigger_max_frame + 1> frame{};
   const std::size_t size =
       trigger_write_frame(type, sequence_, payload.data(), payload.size(), frame.data() + 1);
@@ -42,13 +42,14 @@ DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> pa
 }
 
 DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, Times* times) noexcept {
-  for (bool last = false;;) {  // ends at the deadline, a read later at most
+  // Ends at the deadline, or one read later.
+  for (bool last = false;;) {
     while (used_ < size_) {
       const std::uint8_t byte = buffer_[used_++];
       const bool ready = trigger_decode(&decoder_, byte, frame) == trigger_frame_ready;
       record_byte(byte);
-      if (used_ == size_ || ready)
-        record_end_of_read();  // its end bounds a whole frame, wherever in the read it is
+      // The end of the frame is a bound, wherever it is in the read.
+      if (used_ == size_ || ready) record_end_of_read();
       const HostStamp departure = departure_;
       if (byte == 0) {
         into_frame_ = 0;

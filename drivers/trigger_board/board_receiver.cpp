@@ -10,8 +10,8 @@ namespace vergence::trigger_board {
 
 namespace {
 
-constexpr std::int64_t kPingBytes =
-    trigger_ping_payload_size + trigger_overhead + 3;  // COBS byte, and a 00 at either end
+// Adds the COBS byte, and a 00 at either end.
+constexpr std::int64_t kPingBytes = trigger_ping_payload_size + trigger_overhead + 3;
 constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhead + 2;
 
 }  // namespace
@@ -19,7 +19,8 @@ constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhe
 void BoardClock::restart(Duration spread, bool pps) noexcept {
   ClockMapperOptions o;
   o.delay_spread = spread;
-  o.resolution = Duration::microseconds(1);  // a tick
+  // Resolution of a tick.
+  o.resolution = Duration::microseconds(1);
   mappers_.fill(ClockMapper(o));
   turns_ = moving_ = pps;
   locked_ = false;
@@ -37,7 +38,7 @@ void BoardClock::reset() noexcept {
 void BoardClock::report_lock(bool locked, HostStamp now) noexcept {
   if (locked && !locked_) lock_began_ = now;
   locked_ = locked;
-  // Pulses mapped while the clock moved stay in the older fit for this long.
+  // Pulses mapped while the clock changed stay in the older fit for this duration.
   moving_ = turns_ && !(locked && now - lock_began_ > kTurn * 2);
 }
 
@@ -80,7 +81,7 @@ PongStatus BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
   const Duration inside =
       Duration::microseconds(static_cast<std::int64_t>(pong.sent - pong.received));
   const Duration rtt = (t4 - sent) - inside;
-  // A tick at either end, and the board's clock may be slow.
+  // Allows for a tick at either end, and a slow clock of the trigger board.
   const Duration tolerance = Duration::microseconds(2) + inside / 1000;
   if (rtt < -tolerance) return refuse(PongStatus::invalid);
   if (pong.received < newest_tick_) {
@@ -92,8 +93,8 @@ PongStatus BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
     return refuse(PongStatus::backward);
   }
   backward_ = 0;
-  newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer
-                                 // waited for the line
+  // Not `sent`: the next ping may have come while this answer waited for the link.
+  newest_tick_ = pong.received;
   alternate_mappers(t4);
   for (ClockMapper& m : mappers_)
     m.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent),
@@ -116,9 +117,11 @@ void BoardReceiver::begin_boot(std::uint32_t boot, std::uint32_t next, const Tri
     known_boot_ = true;
     account_.begin(boot, next);
     clock_.restart(delay_spread, config.pps_edge != trigger_edge_none);
-    pause_.restart();  // what was requested of the other start is past
+    // Requests to the previous start are obsolete.
+    pause_.restart();
   } else if (account_.refused_in_row() >= kMaxRefused) {
-    account_.begin(boot, next);  // what it held against the board was wrong itself
+    // The expected number itself was wrong.
+    account_.begin(boot, next);
   } else {
     account_.end(next, 0);
   }
@@ -138,7 +141,7 @@ void BoardReceiver::clear_halt() noexcept {
   if (finding_ == Finding::halted) finding_ = Finding::none;
 }
 
-/// False: the board has begun again since it was set up.
+/// Returns false if the trigger board has restarted since it was configured.
 bool BoardReceiver::same_boot(std::uint32_t boot) noexcept {
   if (!streaming_ || boot == account_.boot()) return true;
   finding_ = Finding::reboot;
@@ -166,9 +169,8 @@ void BoardReceiver::accept(const TriggerFrame& frame, const BoardLine::Times& ti
     (void)same_boot(edge.boot_id);
   } else if (frame.type == trigger_error && trigger_get_error(frame.payload, size, &error)) {
     handle_error(error);
-  } else if (frame.type != trigger_info ||
-             !trigger_get_info(frame.payload, size,
-                               &info)) {  // an INFO answers a question given up
+    // An INFO answers a request that was given up.
+  } else if (frame.type != trigger_info || !trigger_get_info(frame.payload, size, &info)) {
     ++unknown_frames_;
   }
 }

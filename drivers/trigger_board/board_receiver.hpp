@@ -17,64 +17,66 @@ namespace vergence::trigger_board {
 /// Result of a PONG.
 enum class PongStatus : std::uint8_t {
   taken,
-  unasked,   // no such question is open
-  invalid,   // it cannot be: sent before received, or longer in the board than under way
-  backward,  // earlier than the one before
+  /// No such ping is open.
+  unasked,
+  /// Impossible: sent before received, or longer on the trigger board than the round trip.
+  invalid,
+  /// Earlier than the previous one.
+  backward,
 };
 
-/// The board's clock on the host's, from pings.
+/// Maps the trigger board's clock to the host's by pings.
 ///
-/// Method   Every PING and its PONG give four stamps: t1 when it was handed to the line, t2 and t3
-///          the board's ticks, t4 when its answer left the board at the latest (BoardLine). The
-///          ClockMapper makes of them a line and a bound that no asymmetry can break: rtt / 2 at
-///          worst. What bytes take on the wire at the baud rate is known, and not the same both
-///          ways: it is taken out of t1 here, of t4 there. PPS moves the rate of the board's ticks,
-///          as no crystal does: then two mappers take turns, each used when it is kTurn to 2 kTurn
-///          old, and until the rate is there the bound has room for what it moves in that time
-///          (kMoving).
+/// Method   A PING and its PONG give four stamps: t1 when it was passed to the link, t2 and t3 the
+///          board's ticks, t4 the latest departure of the answer (BoardLine). The ClockMapper turns
+///          them into a line and a bound that holds for any asymmetry: rtt / 2 at worst. The known
+///          wire time at the baud rate differs between the directions, so it is subtracted from t1
+///          here and from t4 there. With PPS the rate of the ticks changes faster than a crystal's.
+///          Then two mappers alternate, each used at an age of kTurn to 2 kTurn, and the bound
+///          includes kMoving until the rate is stable.
+/// Errors   PongStatus. kBackward answers in a row with earlier times mean a clock that was set,
+///          which starts a new fit.
+///
 /// Not thread-safe. Fixed memory.
-/// Errors   PongStatus. kBackward answers in a row from an earlier time than before are a clock
-///          that was set: the fit begins again.
 class BoardClock {
  public:
-  static constexpr std::size_t kOpen =
-      64;  // questions that may be under way: more than half a second of them
+  /// Maximum number of open pings: more than half a second of them.
+  static constexpr std::size_t kOpen = 64;
   static constexpr int kBackward = 3;
-  static constexpr Duration kUnseen = Duration::milliseconds(1);  // a USB frame
+  /// Duration of a USB frame.
+  static constexpr Duration kUnseen = Duration::milliseconds(1);
   static constexpr Duration kTurn = Duration::seconds(6);
-  static constexpr Duration kMoving = Duration::microseconds(
-      150);  // 8 ppm a second over 2 kTurn: an eighth of it times their square
+  /// Effect of 8 ppm per second over 2 kTurn: an eighth of it times their square.
+  static constexpr Duration kMoving = Duration::microseconds(150);
 
   BoardClock() noexcept
       : mappers_{ClockMapper(ClockMapperOptions{}), ClockMapper(ClockMapperOptions{})} {}
 
-  /// Another start of the board. `spread`: by how much the report of a stamp is late at worst, for
-  /// stamps before the first answer.
-  /// `pps`: something disciplines its ticks.
+  /// Handles a start of the trigger board. `spread` is the maximum delay of a stamp's report, for
+  /// stamps before the first answer. `pps` means that a signal disciplines the ticks.
   void restart(Duration spread, bool pps) noexcept;
-  /// PPS status of the board, about every second.
+  /// Handles the PPS status, received about every second.
   void report_lock(bool locked, HostStamp now) noexcept;
-  /// The line was opened again: what was under way is not answered any more. The fit stays. `wire`:
-  /// a byte's time on it, 0 where it has none.
+  /// Handles a reopened link: open pings will not be answered, the fit stays. `wire` is the time of
+  /// a byte on the wire; 0 if it has none.
   void reopen(Duration wire) noexcept;
 
-  /// A PING is being sent now: its token.
+  /// Returns the token for a PING that is being sent.
   [[nodiscard]] std::uint32_t ask(HostStamp t1) noexcept;
-  /// `t4`: BoardLine's departure.
+  /// Handles a PONG; `t4` is BoardLine's departure.
   [[nodiscard]] PongStatus answer(const TriggerPong& pong, HostStamp t4) noexcept;
 
-  /// A ping has been answered since restart().
+  /// True once a ping was answered since restart().
   [[nodiscard]] bool known() const noexcept { return known_; }
-  /// Answers since restart() or reopen().
+  /// Number of answers since restart() or reopen().
   [[nodiscard]] std::uint64_t answers() const noexcept { return answers_; }
-  /// The host's time of an event, whose report was here at `arrival`. Before the first answer: from
-  /// arrivals alone, which cannot tell the least time that the way takes; kUnseen is allowed for
-  /// it.
+  /// Maps an event, whose report came at `arrival`, to the host's clock. Before the first answer it
+  /// uses arrivals only, which cannot reveal the minimum delay; the error then includes kUnseen.
   [[nodiscard]] MappedStamp map(DeviceStamp stamp, HostStamp arrival) noexcept;
 
-  /// Times that answers showed a clock that was set back.
+  /// Number of times that the clock was set back.
   [[nodiscard]] std::uint64_t resets() const noexcept { return resets_; }
-  /// Answers that made no sense.
+  /// Number of invalid answers.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
@@ -90,8 +92,10 @@ class BoardClock {
 
   std::array<ClockMapper, 2> mappers_;
   std::size_t used_ = 0;
-  bool turns_ = false;   // they take turns
-  bool moving_ = false;  // the rate of the ticks may be on its way
+  // True if the mappers alternate.
+  bool turns_ = false;
+  // True while the rate of the ticks may be changing.
+  bool moving_ = false;
   HostStamp turn_began_{}, lock_began_{};
   bool locked_ = false;
   Duration wire_{};
@@ -104,42 +108,47 @@ class BoardClock {
   std::uint64_t resets_ = 0, refused_ = 0;
 };
 
-/// Sorts the frames that a board sends: events become numbered pulses with the host's time, PONGs
-/// the fit of its clock, STATUS what state it is in.
+/// Dispatches the frames of a trigger board: events become numbered pulses in host time, PONGs
+/// update its clock, STATUS its state.
 ///
-/// States   Between hold() and stream() what comes is accounted for, but no pulse is handed out and
-///          a change of the board is none: it is being set up.
-/// Not thread-safe. Does not allocate. Time: no call waits.
-/// Errors   finding(): why the board must be set up anew.
+/// Between hold() and stream() frames are counted but no pulse is handed out, and a changed state
+/// is no finding, because the board is being configured. finding() has the reason to configure it
+/// again. Not thread-safe. Does not allocate. No call waits.
 class BoardReceiver final : public FrameSink {
  public:
-  static constexpr int kMaxRefused = 8;  // events in a row that cannot be
-  /// Why reading ends and the board is set up anew.
+  /// Maximum number of impossible events in a row.
+  static constexpr int kMaxRefused = 8;
+  /// Reason to stop reading and to configure the trigger board again.
   enum class Finding : std::uint8_t {
     none,
-    reboot,   // another boot_id: it began again
-    halted,   // it makes no pulses, or has another configuration
-    invalid,  // numbers or ticks that cannot be, kMaxRefused in a row
+    /// Another boot_id: the trigger board has restarted.
+    reboot,
+    /// It makes no pulses, or has another configuration.
+    halted,
+    /// Impossible numbers or ticks, kMaxRefused in a row.
+    invalid,
   };
 
-  /// Pulses go to `hand_out`, requests of `pause` are answered; both outlive the receiver.
+  /// Passes pulses to `hand_out` and answers to `pause`; both must outlive the receiver.
   BoardReceiver(PauseRequest& pause, std::function<void(const Pulse&)> hand_out)
       : pause_(pause), hand_out_(std::move(hand_out)) {}
 
   void accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept override;
 
-  // ---- setting up
-  /// A start of the board that has this configuration from now on: `next` is the number of its next
-  /// pulse, `delay_spread` DeviceTiming's. The same boot as before goes on: what is missing since
-  /// was lost.
+  // Calls for configuring.
+  //
+  // Handles a start of the trigger board with this configuration. `next` is the number of its next
+  // pulse, `delay_spread` as in DeviceTiming. If the boot is the same, the pulses missing since
+  // were lost.
   void begin_boot(std::uint32_t boot, std::uint32_t next, const TriggerConfig& config,
                   Duration delay_spread) noexcept;
-  /// STATUS must have this mark of the configuration, else the board is halted.
+  /// Sets the mark of the configuration that STATUS must have; otherwise the board counts as
+  /// halted.
   void expect_configuration(std::uint32_t mark) noexcept { mark_ = mark; }
-  /// Pulses are handed out from here on.
+  /// Hands out pulses from now on.
   void stream(HostStamp now) noexcept;
   void hold() noexcept { streaming_ = false; }
-  /// Pulses are over, as the board says in `status`, but for the reports `to_come`.
+  /// Handles the end of the pulses according to `status`, with `to_come` reports outstanding.
   void end(const TriggerStatus& status, std::uint32_t to_come) noexcept;
 
   [[nodiscard]] std::uint32_t boot() const noexcept { return account_.boot(); }
@@ -147,12 +156,12 @@ class BoardReceiver final : public FrameSink {
   void clear_finding() noexcept { finding_ = Finding::none; }
   /// Clears a halt that was reported during the start.
   void clear_halt() noexcept;
-  /// Time of the newest frame, or of stream().
+  /// Arrival of the newest frame, or time of stream().
   [[nodiscard]] HostStamp last_frame() const noexcept { return last_frame_; }
 
   [[nodiscard]] BoardClock& clock() noexcept { return clock_; }
   [[nodiscard]] PulseCounter& account() noexcept { return account_; }
-  /// Right frames of a type or size that this protocol does not have.
+  /// Number of valid frames with a type or size that this protocol does not have.
   [[nodiscard]] std::uint64_t unknown_frames() const noexcept { return unknown_frames_; }
   [[nodiscard]] std::uint64_t reboots() const noexcept { return reboots_; }
 
@@ -168,9 +177,11 @@ class BoardReceiver final : public FrameSink {
   PulseCounter account_;
   BoardClock clock_;
   std::uint64_t unknown_frames_ = 0, reboots_ = 0;
-  std::uint32_t mark_ = 0;  // of the configuration, in STATUS
+  // Mark of the configuration in STATUS.
+  std::uint32_t mark_ = 0;
   Finding finding_ = Finding::none;
-  bool known_boot_ = false;  // account_.boot() is one
+  // True if account_.boot() is known.
+  bool known_boot_ = false;
   bool streaming_ = false;
   HostStamp last_frame_{};
 };

@@ -10,7 +10,7 @@
 namespace vergence::trigger_board {
 namespace {
 
-/// These requests are not cancellable: they are short.
+/// These requests are short and not cancellable.
 const std::atomic<bool> kNever{false};
 
 DeviceTiming make_timing(const TriggerConfig& config, Duration byte_time,
@@ -18,7 +18,7 @@ DeviceTiming make_timing(const TriggerConfig& config, Duration byte_time,
   constexpr std::int64_t kReportBytes = trigger_event_payload_size + trigger_overhead + 2;
   DeviceTiming t;
   t.min_delay = byte_time * kReportBytes;
-  // A report waits for the end of the exposures, at the latest for the next pulse.
+  // A report is sent after the exposures have ended, at the latest with the next pulse.
   const Duration period =
       Duration::nanoseconds(1'000'000'000'000 / std::max<std::int64_t>(1, config.rate_millihertz));
   t.delay_spread = Duration::milliseconds(4) + latency_timer +
@@ -59,7 +59,7 @@ DeviceStatus Device::open() {
   return status;
 }
 
-/// Opens the line and asks who is there.
+/// Opens the link and identifies the trigger board.
 DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   DeviceStatus status = open();
   if (status != DeviceStatus::ok)
@@ -71,7 +71,7 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   if (status != DeviceStatus::ok)
     return last_error_.refuse(status, place().name() + ": " + setup.last_error());
   const std::string serial = to_hex(who.serial);
-  // Another board would have other lines: that is for a person to decide.
+  // Another trigger board may be wired differently, which the user has to check.
   if (connected_ && serial != info_.serial)
     return last_error_.refuse(DeviceStatus::not_found,
                               place().name() + ": another trigger board is there now (" + serial +
@@ -115,8 +115,8 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
     config_ = config;
     mark_ = configuration_mark(config);
     DeviceStatus status = set_up();
-    if (status ==
-        DeviceStatus::disconnected) {  // it was unplugged since: once more, from the port on
+    // It was disconnected meanwhile; tries once more, beginning with the port.
+    if (status == DeviceStatus::disconnected) {
       status = connect();
       if (status == DeviceStatus::ok) status = set_up();
     }
@@ -126,7 +126,8 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
     remark_ = remark_about(requested, config_);
     if (actual != nullptr) *actual = to_configuration(config_);
     return DeviceStatus::ok;
-  } catch (const std::exception&) {  // out of memory
+    // Out of memory.
+  } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
 }
@@ -156,7 +157,8 @@ DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept { return take(l
 DeviceStatus Device::pause(std::uint32_t pulses) noexcept {
   if (!streaming()) return DeviceStatus::stopped;
   if (away()) return DeviceStatus::disconnected;
-  pause_.add(pulses);  // the thread looks at least every ping_interval
+  // The thread checks for it at least every ping_interval.
+  pause_.add(pulses);
   return DeviceStatus::ok;
 }
 

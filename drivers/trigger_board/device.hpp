@@ -14,19 +14,18 @@
 
 namespace vergence::trigger_board {
 
-/// A trigger board on a serial line.
+/// Trigger board on a serial link, with the contract of TriggerDevice.
 ///
-/// As TriggerDevice says. connect() and configure() talk to the board and may take a second, at
-/// most seven where none answers. start() never waits: a thread of the device's own asks for the
-/// board's time, starts it, reads, and after `disconnected` opens and sets it again until it is
-/// back. A board that says nothing for kSilent is gone. One that begins again (another boot_id) is
-/// configured and started by itself, the pulses of another `boot` follow. A board that kept its
-/// pulses going while the line was away goes on with them.
-/// Time     Pulses are mapped: by pings, kFirstPings of them before the board starts, then every
-///          Options::ping_interval. Where it answers none, they come unmapped.
-/// Memory   The thread allocates only while the board is gone or begins again.
-class Device final : public TriggerDevice,
-                     private SerialDevice<Pulse, 256> {  // pulses: eight seconds at 30 Hz
+/// connect() and configure() access the trigger board and usually take up to a second, at most
+/// seven without an answer. start() returns immediately: a thread synchronises clocks, starts the
+/// board, reads, and after `disconnected` reopens and configures it again. A board that sends
+/// nothing for kSilent counts as disconnected. One that restarts (another boot_id) is configured
+/// and started again; pulses of another `boot` follow. Pulses that continued while the link was
+/// down are resumed.
+/// Time     Pulses are mapped by pings: kFirstPings before the start, then one every
+///          Options::ping_interval. Without answers they are unmapped.
+/// Memory   The thread allocates only while the board is disconnected or being configured.
+class Device final : public TriggerDevice, private SerialDevice<Pulse, 256> {
  public:
   static constexpr Duration kSilent = Duration::seconds(1);
   static constexpr int kFirstPings = 8;
@@ -34,7 +33,7 @@ class Device final : public TriggerDevice,
   Device(std::unique_ptr<SerialLinkFactory> place, const Options& options);
   ~Device() override;
 
-  /// Opens the line and identifies the device. → ok, not_found (another make, or no answer),
+  /// Opens the link and identifies the device. → ok, not_found (another make, or no answer),
   /// no_permission, busy, unsupported (another protocol version), disconnected, failed
   [[nodiscard]] DeviceStatus connect();
 
@@ -50,7 +49,7 @@ class Device final : public TriggerDevice,
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] TriggerStatistics statistics() const noexcept override;
 
-  /// Identity reported by the board. Precondition: connected.
+  /// Identity reported by the trigger board. Precondition: connected.
   [[nodiscard]] const TriggerInfo& identity() const noexcept { return identity_; }
 
  private:
@@ -78,21 +77,25 @@ class Device final : public TriggerDevice,
   DeviceInfo info_;
   TriggerInfo identity_{};
   TriggerConfig config_{};
-  std::uint32_t mark_ = 0;  // of config_, in STATUS
-  std::uint32_t baud_ = 0;  // at which the board last answered; 0: not yet
+  // Mark of config_ in STATUS.
+  std::uint32_t mark_ = 0;
+  // Baud rate of the last answer; 0 if unknown.
+  std::uint32_t baud_ = 0;
   bool connected_ = false, configured_ = false;
   DeviceTiming timing_{};
   std::string remark_;
   LastError last_error_;
   PauseRequest pause_;
 
-  // From here on: of the thread while it runs, else the owner's.
+  // The following members belong to the thread while it runs, else to the owner.
   BoardLine frames_;
   BoardReceiver receiver_;
   Random dither_{1, 63};
-  bool running_ = false;  // it was started and makes pulses, as far as we know
+  // True if it was started and, as far as known, makes pulses.
+  bool running_ = false;
 
-  Published<TriggerStatistics> statistics_;  // of the thread, without what SerialDevice counts
+  // Written by the thread, without the counters of SerialDevice.
+  Published<TriggerStatistics> statistics_;
 };
 
 }  // namespace vergence::trigger_board

@@ -5,18 +5,22 @@
 
 namespace vergence::trigger_board {
 
-/// Which edge of an input counts.
+/// Edge of an input that is used.
 enum class Edge : std::uint8_t { none, rising, falling };
 
 /// Connection of a trigger board and use of its additional inputs.
 struct Options {
-  std::uint32_t baud = 0;  // 0: found by asking at kBauds
-  bool native_usb =
-      false;  // bytes never are on a wire at the baud rate: the board's own USB, a pseudo-terminal
-  Edge pps = Edge::none;  // GNSS pulse per second, which disciplines the board's ticks
-  Edge ins = Edge::none;  // the INS' SyncOut
-  /// Between two questions for the board's time; each is up to a fifth sooner or later, so that no
-  /// period of the line hides its floor.
+  /// 0 probes the rates in kBauds.
+  std::uint32_t baud = 0;
+  /// True if bytes have no wire time at the baud rate: the trigger board's own USB, or a
+  /// pseudo-terminal.
+  bool native_usb = false;
+  /// Edge of the GNSS pulse per second, which disciplines the ticks.
+  Edge pps = Edge::none;
+  /// Edge of the INS's SyncOut.
+  Edge ins = Edge::none;
+  /// Interval of the pings; each is dithered by up to a fifth, so that no periodic load on the link
+  /// hides its minimum delay.
   Duration ping_interval = Duration::milliseconds(10);
 };
 

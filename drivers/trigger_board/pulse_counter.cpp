@@ -7,7 +7,7 @@ namespace {
 
 static_assert(trigger_max_lines == kMaxCameras, "line k is camera k");
 
-/// The number that is meant by its low 32 bits, near `expected`.
+/// Unwraps the low 32 bits of a number to the value nearest to `expected`.
 std::int64_t steps_from(std::uint64_t expected, std::uint32_t low) noexcept {
   const std::uint32_t d = low - static_cast<std::uint32_t>(expected);
   return d < 0x80000000U ? static_cast<std::int64_t>(d)
@@ -17,7 +17,8 @@ std::int64_t steps_from(std::uint64_t expected, std::uint32_t low) noexcept {
 enum class ExposureStatus : std::uint8_t { none, good, invalid };
 
 ExposureStatus to_exposure(const TriggerExposure& reported, PulseExposure* exposure) noexcept {
-  constexpr std::int32_t kLongest = 10'000'000;  // µs
+  // In µs.
+  constexpr std::int32_t kLongest = 10'000'000;
   if (reported.start_us == TRIGGER_NOT_SEEN || reported.end_us == TRIGGER_NOT_SEEN)
     return ExposureStatus::none;
   if (reported.start_us < 0 || reported.end_us < reported.start_us || reported.end_us > kLongest)
@@ -40,7 +41,7 @@ void PulseCounter::begin(std::uint32_t boot, std::uint32_t next) noexcept {
 
 void PulseCounter::set_intervals(std::uint32_t rate_millihertz, std::uint32_t dither_us) noexcept {
   const std::uint64_t period_us = 1'000'000'000U / std::max(1U, rate_millihertz);
-  // A tenth less: the board's timer rounds, and PPS disciplines its ticks.
+  // Allows 10 % less, because the timer rounds and PPS disciplines its ticks.
   shortest_us_ = std::max<std::uint64_t>(
       1, (period_us - std::min<std::uint64_t>(period_us, dither_us)) * 9 / 10);
 }
@@ -65,18 +66,19 @@ bool PulseCounter::take(const TriggerEvent& event, Pulse* pulse) noexcept {
   const std::int64_t missing = steps_from(next_, event.pulse);
   if (missing < 0) return refuse();
   if (event.tick > kMaxTicks || (any_ && event.tick <= tick_)) return refuse();
-  // Before the first, the ticks since the board's start bound the count.
+  // Before the first event, the ticks since the start limit the count.
   if (static_cast<std::uint64_t>(missing) > (event.tick - tick_) / shortest_us_ + 1)
     return refuse();
 
   const auto gap = static_cast<std::uint64_t>(missing);
   const bool flagged = (event.flags & 1U) != 0;
-  // A pause is seen by its flag or, where the event that carried it is lost, by a gap that holds
-  // all of it and that event.
+  // A pause is identified by its flag or, if that event is lost, by a gap that contains the pause
+  // and the event.
   const bool over = asked_ > 0 && gap > 0 && (flagged || gap > asked_);
   const std::uint64_t left_out = over ? std::min(asked_, gap) : 0;
   if (over) asked_ = 0;
-  const bool skipped = (event.flags & 2U) != 0;  // the board was too late for them
+  // The trigger board was too late for these pulses.
+  const bool skipped = (event.flags & 2U) != 0;
   if (!skipped) counters_.lost += gap - left_out;
   ++counters_.pulses;
   in_row_ = 0;

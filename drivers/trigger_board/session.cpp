@@ -10,10 +10,10 @@
 namespace vergence::trigger_board {
 namespace {
 
-constexpr Duration kFirstPong =
-    Duration::milliseconds(50);  // the first pings wait for their answers
+// Time for the answers to the first pings.
+constexpr Duration kFirstPong = Duration::milliseconds(50);
 
-/// The last request is not cancellable: it is short.
+/// The last request is short and not cancellable.
 const std::atomic<bool> kNever{false};
 
 }  // namespace
@@ -34,8 +34,7 @@ DeviceStatus Device::begin() noexcept {
     const DeviceStatus status = begin_on(&setup);
     if (status != DeviceStatus::ok && status != DeviceStatus::stopped)
       last_error_.set(place().name() + ": " + setup.last_error());
-    // A refusal would be repeated; but boards are replaced, and
-    // programs wait.
+    // A refusal would be repeated, but the trigger board may be replaced meanwhile.
     return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
                    status == DeviceStatus::ended
                ? status
@@ -45,7 +44,7 @@ DeviceStatus Device::begin() noexcept {
   }
 }
 
-/// Identify, configure, synchronise and start.
+/// Identifies, configures, synchronises and starts the trigger board.
 DeviceStatus Device::begin_on(Setup* setup) {
   receiver_.clear_finding();
   TriggerInfo who;
@@ -56,8 +55,8 @@ DeviceStatus Device::begin_on(Setup* setup) {
   receiver_.expect_configuration(mark_);
   TriggerStatus board{};
   if (running_ && who.boot_id == receiver_.boot()) {
-    // Its pulses may have gone on while the line was away, or it has stopped by itself: it goes on,
-    // and what was missed counts.
+    // Pulses may have continued while the link was down, or stopped; reading resumes and the missed
+    // ones are counted.
     go_streaming(line()->now());
     status = setup->start(&board);
     if (status == DeviceStatus::ok && board.configuration == mark_) {
@@ -80,13 +79,13 @@ DeviceStatus Device::begin_on(Setup* setup) {
   return status;
 }
 
-/// Before the first event is handed out.
+/// Called before the first event is handed out.
 void Device::go_streaming(HostStamp now) noexcept {
   report_streaming(now);
   receiver_.stream(now);
 }
 
-/// Pings before the first pulse, so that it comes with its time.
+/// Sends pings before the first pulse, so that it can be mapped.
 DeviceStatus Device::tie_clocks() noexcept {
   for (int i = 0; i < kFirstPings; ++i) {
     const std::uint64_t before = receiver_.clock().answers();
@@ -104,7 +103,7 @@ DeviceStatus Device::tie_clocks() noexcept {
   return DeviceStatus::ok;
 }
 
-/// → ok (it must be set up anew), stopped, ended, gone, failed
+/// → ok (configure it again), stopped, ended, disconnected, failed
 DeviceStatus Device::read_on() noexcept {
   HostStamp next_ping = line()->now();
   while (receiver_.finding() == BoardReceiver::Finding::none) {
@@ -130,7 +129,8 @@ DeviceStatus Device::read_on() noexcept {
     last_error_.set(
         place().name() +
         ": the trigger board's numbers or ticks run backwards; check its supply and firmware");
-  } catch (const std::exception&) {  // out of memory: the counters say it
+    // Out of memory; the counters still show it.
+  } catch (const std::exception&) {
   }
   return DeviceStatus::failed;
 }
@@ -148,11 +148,11 @@ DeviceStatus Device::reopen() {
   return meet(&who);
 }
 
-/// With exposure feedback the last pulse's report comes after the answer to STOP, when its
-/// exposures are over; no thread waits for it.
+/// With exposure feedback the last pulse's report follows the answer to STOP, once its exposures
+/// have ended. No thread waits for it.
 std::uint32_t Device::open_reports() const noexcept { return config_.feedback_inputs != 0 ? 1 : 0; }
 
-/// No pulse after it, and the last ones are counted.
+/// Stops the pulses and counts the last ones.
 void Device::halt_board() noexcept {
   try {
     Setup setup(*line(), frames_, kNever, &receiver_);
@@ -170,13 +170,14 @@ void Device::halt_board() noexcept {
   receiver_.hold();
 }
 
-/// `now` is the look at the clock that made it due: a record keeps one for a write, and from that a
-/// replay does the same.
+/// `now` is the clock reading that made the ping due: a recording stores one reading per write, and
+/// its replay behaves alike.
 void Device::ping(HostStamp now) noexcept {
   std::array<std::uint8_t, trigger_ping_payload_size> payload{};
   const TriggerPing message{receiver_.clock().ask(now)};
   trigger_put_ping(&message, payload.data());
-  (void)frames_.send(trigger_ping, payload, nullptr);  // without an answer the next one is asked
+  // A failure has no effect: the next ping follows.
+  (void)frames_.send(trigger_ping, payload, nullptr);
 }
 
 void Device::send_pause(HostStamp now) noexcept {
@@ -199,7 +200,7 @@ void Device::publish(bool last) noexcept {
   s.reboots = receiver_.reboots();
   s.malformed = pulses.refused + pulses.exposures_refused + frames_.refused() +
                 receiver_.unknown_frames() + receiver_.clock().refused();
-  // A reader holds the lock while it copies; the next round will do as well.
+  // A reader holds the lock while it copies; the next round publishes instead.
   if (last)
     statistics_.set(s);
   else

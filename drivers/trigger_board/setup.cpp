@@ -10,8 +10,10 @@ namespace vergence::trigger_board {
 
 namespace {
 
-constexpr double kFastest = 2000;  // Hz: two events a millisecond are more than a line carries
-constexpr std::int64_t kWidest = 1'000'000;  // µs, of a pulse: the board's own limit
+// In Hz; more than two events per millisecond exceed the link.
+constexpr double kFastest = 2000;
+// Maximum pulse width of the trigger board, in µs.
+constexpr std::int64_t kWidest = 1'000'000;
 
 std::uint8_t edge_kind(Edge edge) noexcept {
   return static_cast<std::uint8_t>(edge == Edge::none     ? trigger_edge_none
@@ -19,7 +21,7 @@ std::uint8_t edge_kind(Edge edge) noexcept {
                                                           : trigger_edge_falling);
 }
 
-/// Lines that a mask names beyond those that are there.
+/// Outputs or inputs in a mask that do not exist.
 bool beyond(std::uint8_t mask, std::uint8_t lines) noexcept {
   return lines < 8 && (mask >> lines) != 0;
 }
@@ -113,9 +115,10 @@ constexpr std::array<std::uint32_t, 3> kBauds{921600, 115200, 460800};
 constexpr Duration kHello = Duration::milliseconds(500);
 constexpr Duration kAnswer = Duration::seconds(1);
 constexpr Duration kAskAgain = Duration::milliseconds(150);
-constexpr int kTurns = 3;  // of a question whose answer is not yet what was asked for
+// Attempts of a request whose answer does not show the requested state yet.
+constexpr int kTurns = 3;
 
-/// From one sequence number of ours to another, forwards.
+/// Forward distance between two own sequence numbers.
 int steps(std::uint8_t from, std::uint8_t to) noexcept {
   return (to + trigger_unasked - from) % trigger_unasked;
 }
@@ -175,13 +178,15 @@ std::uint32_t configuration_mark(const TriggerConfig& config) noexcept {
 
 Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t last,
                             std::uint8_t requested, HostStamp until) {
-  for (;;) {  // ends at `until`
+  // Ends at `until`.
+  for (;;) {
     if (stop_.load(std::memory_order_acquire)) return Answer::stopped;
     TriggerFrame frame;
     BoardLine::Times times;
     const DeviceStatus status = frames_.next(until, &frame, &times);
     if (status == DeviceStatus::timeout) return Answer::silent;
-    if (status == DeviceStatus::stopped) continue;  // woken: perhaps to be told to stop
+    // Woken, perhaps to stop.
+    if (status == DeviceStatus::stopped) continue;
     if (status != DeviceStatus::ok) return Answer::gone;
     const bool mine =
         frame.sequence < trigger_unasked && steps(first, frame.sequence) <= steps(first, last);
@@ -203,7 +208,8 @@ Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payloa
                          std::uint8_t requested, Duration limit) {
   const HostStamp end = frames_.now() + limit;
   std::uint8_t first = 0, last = 0;
-  for (bool again = false;; again = true) {  // each turn listens for kAskAgain of the limit
+  // Each round listens for kAskAgain within the limit.
+  for (bool again = false;; again = true) {
     const DeviceStatus sent = frames_.send(type, payload, &last);
     if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) return Answer::gone;
     if (!again) first = last;
@@ -240,7 +246,7 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
   const Answer answer = ask(trigger_hello, version, trigger_info, limit);
   if (answer == Answer::silent) return DeviceStatus::timeout;
   if (answer != Answer::ok) return verdict(answer, trigger_hello);
-  // The version is the first byte in every version; what comes after it, only in this one.
+  // The version is the first byte in every version; the rest is valid only in this one.
   const unsigned theirs = frame_.size > 0 ? frame_.payload[0] : 0U;
   if (theirs != trigger_protocol_version) return other_version(theirs);
   if (trigger_get_info(frame_.payload, frame_.size, info)) return DeviceStatus::ok;
@@ -261,7 +267,7 @@ DeviceStatus Setup::other_version(unsigned theirs) {
 
 DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
   std::string received;
-  // Twice round: boards that begin anew when their port is opened sleep through the first.
+  // Two rounds, because boards that restart when their port is opened miss the first.
   for (int round = 0; round < 2; ++round) {
     for (const std::uint32_t candidate : kBauds) {
       const std::uint32_t rate = baud != 0 ? baud : candidate;
@@ -292,8 +298,7 @@ DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> 
   for (int turn = 0; turn < kTurns; ++turn) {
     const DeviceStatus answered = verdict(ask(type, payload, trigger_status, kAnswer), type);
     if (answered != DeviceStatus::ok) return answered;
-    // The answer to a question before this one, given up, may have come late: it tells the state
-    // before.
+    // The late answer to an earlier, abandoned request shows the state before.
     TriggerStatus s;
     if (!trigger_get_status(frame_.payload, frame_.size, &s) || !fits(s)) continue;
     *status = s;

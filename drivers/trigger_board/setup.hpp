@@ -11,15 +11,15 @@
 
 namespace vergence::trigger_board {
 
-// Requested configuration of a board in wire format.
+// Configuration of a trigger board in wire format.
 
-/// → ok; bad_configuration, unsupported: *message says what is wrong and what to do, *config is as
-///   it was.
+/// Converts a request. On bad_configuration or unsupported, *message has the problem and its fix,
+/// and *config is unchanged.
 [[nodiscard]] DeviceStatus wire_configuration(const TriggerConfiguration& requested,
                                               const Options& options, const TriggerInfo& board,
                                               TriggerConfig* config, std::string* message);
 [[nodiscard]] TriggerConfiguration to_configuration(const TriggerConfig& config) noexcept;
-/// Deviations from the requested configuration; empty if none.
+/// Deviations from the requested configuration; empty if there are none.
 [[nodiscard]] std::string remark_about(const TriggerConfiguration& requested,
                                        const TriggerConfig& config);
 
@@ -30,13 +30,11 @@ class FrameSink {
   virtual void accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept = 0;
 };
 
-/// Questions to a board, each with its answer: who it is, halt, configuration, start.
+/// Requests to a trigger board, each with its answer: identification, halt, configuration, start.
 ///
-/// Not thread-safe. Memory: none, but for the message of a refusal. Time: no call outlasts a
-///          second, find() two a baud rate.
-/// Errors   Statuses: gone (silent, or the line is), stopped (`stop` is set), unsupported (another
-///          protocol version, or refused by the board), failed. last_error() says what and what to
-///          do.
+/// Not thread-safe. Allocates only messages. No call takes more than a second, find() two per baud
+/// rate. Statuses: disconnected (silent, or the link is), stopped (`stop` is set), unsupported
+/// (another protocol version, or refused), failed; last_error() has the problem and its fix.
 class Setup {
  public:
   /// `others` may be null.
@@ -44,7 +42,7 @@ class Setup {
         FrameSink* others) noexcept
       : line_(line), frames_(frames), stop_(stop), others_(others) {}
 
-  /// Asks who is there, at the baud rates that `baud` (0: all that boards use) allows.
+  /// Identifies the trigger board at the given baud rate (0: at all rates in use).
   [[nodiscard]] DeviceStatus find(std::uint32_t baud, TriggerInfo* info);
   [[nodiscard]] DeviceStatus halt(TriggerStatus* status);
   /// Precondition: halted.
@@ -70,12 +68,13 @@ class Setup {
   BoardLine& frames_;
   const std::atomic<bool>& stop_;
   FrameSink* others_;
-  TriggerFrame frame_{};  // the answer
+  // Frame of the answer.
+  TriggerFrame frame_{};
   std::uint8_t error_ = 0;
   std::string last_error_;
 };
 
-/// CONFIG as it goes over the wire has this mark in STATUS once it is in effect.
+/// Mark that STATUS contains once this CONFIG is in effect.
 [[nodiscard]] std::uint32_t configuration_mark(const TriggerConfig& config) noexcept;
 
 }  // namespace vergence::trigger_board

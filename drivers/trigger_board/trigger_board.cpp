@@ -5,7 +5,7 @@
 namespace vergence::trigger_board {
 namespace {
 
-/// Converters that XSens builds into its own cables: an INS is behind them.
+/// XSens' own converters, which connect an INS.
 bool of_xsens(const SerialPortInfo& port) noexcept {
   constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
   return port.usb_vendor == kXsens ||
@@ -52,7 +52,7 @@ std::unique_ptr<Device> Driver::find_board(std::string_view serial, DeviceStatus
   for (const std::string& port : candidates()) {
     std::unique_ptr<Device> board = open_port(port, status);
     if (board == nullptr) {
-      // A board that cannot be used is worth more words than a port without one.
+      // A trigger board that cannot be used matters more than a port without one.
       if (*status != DeviceStatus::not_found && *status != DeviceStatus::disconnected)
         worst_status = *status, others = last_error_;
       continue;

@@ -13,14 +13,13 @@
 
 namespace vergence::trigger_board {
 
-/// Trigger boards on serial lines: the row `board` of the table of trigger drivers.
+/// Trigger boards on serial links: the row `board` of the table of trigger drivers.
 ///
-/// A board is known by what it answers to HELLO. Asked are the ports of USB converters and boards,
-/// but those of XSens' own converters.
-/// Not thread-safe. Errors: TriggerDriver's.
+/// A trigger board is identified by its answer to HELLO. Ports of USB converters and boards are
+/// queried, except those of XSens' own converters. Not thread-safe.
 class Driver final : public TriggerDriver {
  public:
-  /// Ports of the machine; tests bring their own.
+  /// Access to the machine's ports; replaced in tests.
   struct Ports {
     std::function<std::vector<SerialPortInfo>()> list;
     std::function<std::unique_ptr<SerialLinkFactory>(const std::string& port)> at;
@@ -29,13 +28,12 @@ class Driver final : public TriggerDriver {
   explicit Driver(const Options& options = {});
   Driver(const Options& options, Ports ports) : options_(options), ports_(std::move(ports)) {}
 
-  /// Boards that answer now; a port that is in use is skipped. Takes up to three seconds
-  /// for a port where none answers.
+  /// Trigger boards that answer; ports in use are skipped. Takes up to three seconds for a port
+  /// without an answer.
   [[nodiscard]] std::vector<DeviceInfo> enumerate() override;
-  /// `where`: a port (`/dev/ttyACM0`, a link to one), a board's serial number as enumerate() tells
-  /// it, or empty: the only board there is.
-  /// → ok, not_found, no_permission, busy, unsupported, bad_configuration (more than one may be
-  /// meant), disconnected, failed
+  /// Opens a trigger board. `where` is a port (`/dev/ttyACM0` or a link to one), a serial number of
+  /// enumerate(), or empty for the only one. → ok, not_found, no_permission, busy, unsupported,
+  /// bad_configuration (ambiguous), disconnected, failed
   [[nodiscard]] std::unique_ptr<TriggerDevice> open(std::string_view where,
                                                     DeviceStatus* status) override;
   /// Opens a trigger board with its additional interface.

@@ -19,10 +19,10 @@ namespace vergence::v4l2 {
 
 namespace {
 
-constexpr int kPollLimit =
-    500;  // ms: the longest look of the capture thread; nothing depends on it
-constexpr int kPollErrors =
-    20;  // looks in a row that end in an error without a frame: nothing comes any more
+// Longest poll of the capture thread, in milliseconds.
+constexpr int kPollLimit = 500;
+// Consecutive polls with an error and no frame after which the camera counts as disconnected.
+constexpr int kPollErrors = 20;
 
 }  // namespace
 
@@ -72,7 +72,7 @@ void CaptureThread::capture() noexcept {
   for (;;) {
     if (exchange_.standing() != DeviceStatus::ok) return;
     enqueue_returned();
-    // Without a buffer of ours the kernel answers at once that there is nothing to wait for.
+    // Without a queued buffer the kernel returns immediately.
     pollfd fds[2] = {{with_kernel_ > 0 ? fd_ : -1, POLLIN, 0}, {wake_.get(), POLLIN, 0}};
     (void)::poll(fds, 2, kPollLimit);
     std::uint64_t woken = 0;
@@ -95,11 +95,11 @@ void CaptureThread::enqueue_returned() noexcept {
 }
 
 void CaptureThread::give_back(std::uint32_t buffer) noexcept {
-  if (queue_->enqueue(buffer) == 0)
-    ++with_kernel_;  // else the camera is gone, which the next look finds
+  // An error means that the camera is disconnected; the next poll detects it.
+  if (queue_->enqueue(buffer) == 0) ++with_kernel_;
 }
 
-/// False: the camera is gone.
+/// Returns false if the camera is disconnected.
 bool CaptureThread::dequeue_filled() noexcept {
   Filled filled;
   switch (queue_->dequeue(&filled)) {
@@ -120,7 +120,8 @@ bool CaptureThread::dequeue_filled() noexcept {
 
 void CaptureThread::handle(Filled filled) noexcept {
   const Settings& s = *settings_;
-  if (filled.index >= exchange_.slots().buffers()) return;  // a driver that invents buffers
+  // Ignores invalid indices from a faulty driver.
+  if (filled.index >= exchange_.slots().buffers()) return;
   Frame frame;
   frame.arrival = monotonic_now();
   const ExposureSetting& had = exposures_.at(frame.arrival - s.readout - last_exposure_);
@@ -130,10 +131,9 @@ void CaptureThread::handle(Filled filled) noexcept {
   const StampKind kind = stamp_kind(filled.flags, filled.stamp_ns);
   frame.exposure_start =
       exposure_start(kind, filled.stamp_ns, frame.arrival, frame.exposure, s.readout);
+  // Does not underflow: configure() checked that buffers hold `needed` bytes.
   const std::size_t needed = min_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);
-  const bool inside =
-      filled.offset <= exchange_.slots().buffer(filled.index).size() -
-                           needed;  // buffers hold what is needed: configure() has looked
+  const bool inside = filled.offset <= exchange_.slots().buffer(filled.index).size() - needed;
   const bool whole = inside && filled.bytes >= needed;
   if (!inside) filled.offset = 0;
   if ((filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || !whole) frame.status = FrameStatus::incomplete;
@@ -148,7 +148,7 @@ void CaptureThread::handle(Filled filled) noexcept {
   if (!hand_over(filled, frame)) give_back(filled.index);
 }
 
-/// False: no slot was free.
+/// Returns false if no slot was free.
 bool CaptureThread::hand_over(const Filled& filled, Frame frame) noexcept {
   enqueue_returned();
   const Slots& slots = exchange_.slots();
@@ -169,8 +169,8 @@ bool CaptureThread::hand_over(const Filled& filled, Frame frame) noexcept {
 
 namespace {
 
-constexpr Duration kUnstamped =
-    Duration::milliseconds(10);  // spread of arrivals where they have to serve as stamps
+// Spread of arrival times, used if they have to serve as stamps.
+constexpr Duration kUnstamped = Duration::milliseconds(10);
 
 }  // namespace
 
@@ -201,8 +201,8 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
       if (actual != nullptr) *actual = settings_->actual;
     } else if (requested_) {
       const std::string why = last_error_;
-      if (bring_to(*requested_, false) != DeviceStatus::ok)
-        lost_node_ = true;  // start() tries once more, from the beginning
+      // start() tries once more, from the beginning.
+      if (bring_to(*requested_, false) != DeviceStatus::ok) lost_node_ = true;
       last_error_ = why;
     }
     return status;
@@ -213,8 +213,8 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
   }
 }
 
-/// `keep_slots`: of a camera that came back, whose images may be held; their size is the same,
-/// their layout must be.
+/// `keep_slots` is set for a reconnected camera whose images may be held; layout and size must then
+/// be the same.
 DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool keep_slots) {
   Options options;
   if (!parse_options(requested.options, option_table(), "V4L2 cameras", &options, &last_error_))
@@ -232,7 +232,8 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool kee
   controls.add(fd_.get());
   controls_ = std::move(controls);
 
-  if (queue_) {  // formats can be changed only while there are no buffers
+  // Formats can be changed only while there are no buffers.
+  if (queue_) {
     exchange_.install({});
     queue_->free();
     queue_.reset();
@@ -312,7 +313,7 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
     end_thread();
     if (lost_node_) {
       if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
-      // Whatever keeps a camera that is back from its configuration may pass; it is asked again.
+      // The failure of a reconnected camera may be temporary; it is retried.
       if (bring_to(*requested_, true) != DeviceStatus::ok) {
         lost_node_ = true;
         return DeviceStatus::disconnected;
@@ -347,14 +348,14 @@ DeviceStatus V4l2Camera::start_streaming() {
     return refuse(DeviceStatus::no_bandwidth,
                   "its bus has no room for another stream: a lower rate, a smaller size, or a port "
                   "of another USB controller");
-  // EPIPE, ENOLINK: the links or formats of the sensor's media controller do not fit together.
+  // EPIPE and ENOLINK mean that links or formats of the sensor's media controller do not match.
   const bool pipeline = error == EPIPE || error == ENOLINK;
   return refuse(DeviceStatus::failed,
                 std::string("it does not begin to stream: ") + std::strerror(error) +
                     (pipeline ? "; look at the chain behind it with media-ctl -p" : ""));
 }
 
-/// After it the owner alone has the camera.
+/// Ends the thread; afterwards only the owner accesses the camera.
 void V4l2Camera::end_thread() noexcept {
   if (!capture_.stop()) return;
   if (queue_) (void)queue_->stop();
@@ -378,7 +379,8 @@ DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& requested,
   if (const DeviceStatus status = change_exposure(controls_, *settings_, requested, &taken);
       status != DeviceStatus::ok)
     return status;
-  requested_->exposure = taken.exposure;  // also after it was unplugged
+  // The setting also applies after a reconnect.
+  requested_->exposure = taken.exposure;
   requested_->gain_db = taken.gain_db;
   settings_->actual.exposure = taken.exposure;
   settings_->actual.gain_db = taken.gain_db;

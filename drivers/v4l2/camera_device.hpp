@@ -17,29 +17,30 @@
 
 namespace vergence::v4l2 {
 
-/// The thread that waits for filled buffers, makes frames of them (number, time, exposure, state)
-/// and gives buffers that come back to the kernel again.
+/// Thread that waits for filled buffers, turns them into frames (number, time, exposure, status)
+/// and returns released buffers to the kernel.
 ///
-/// Threads  start(), stop(), enqueue_free(): the owner. wake(), change_exposure(): any one.
-/// Memory   None while it runs.
-/// Errors   A camera that is disconnected, or whose driver returns only errors, ends the thread;
+/// Threads  The owner calls start(), stop() and enqueue_free(). wake() and change_exposure() are
+///          thread-safe.
+/// Memory   Does not allocate while it runs.
+/// Errors   The thread ends if the camera is disconnected or its driver returns only errors;
 ///          FrameExchange has the status.
 class CaptureThread {
  public:
-  /// Outlives it.
+  /// The exchange must outlive this object.
   explicit CaptureThread(FrameExchange& exchange);
   ~CaptureThread() { stop(); }
 
-  /// Gives the kernel every buffer that it may have. Precondition: stopped.
+  /// Queues every buffer that the kernel may have. Precondition: stopped.
   void enqueue_free(CaptureQueue& queue) noexcept;
-  /// The queue streams. All three outlive stop(); of the settings nothing but exposure and gain
-  /// changes. Throws where there is no thread.
+  /// Starts the thread on a streaming queue. All arguments must stay valid until stop(); only
+  /// exposure and gain of the settings may change. Throws if no thread can be created.
   void start(CaptureQueue& queue, const Settings& settings, int fd);
-  /// Precondition: the exchange has ended, or was lost. False: it did not run.
+  /// Returns false if the thread did not run. Precondition: the exchange has ended or was lost.
   bool stop() noexcept;
-  /// Something came back, or it shall end.
+  /// Wakes the thread because a buffer was released or the thread is to end.
   void wake() const noexcept;
-  /// The camera's registers hold this from now on.
+  /// Reports that the camera's registers now hold this setting.
   void change_exposure(const ExposureSetting& setting) noexcept;
 
  private:
@@ -58,19 +59,21 @@ class CaptureThread {
   std::optional<SequenceCounter> counter_;
   std::optional<Raster> raster_;
   exposure::AppliedExposure exposures_;
-  Duration last_exposure_{};     // of the last frame
-  std::size_t with_kernel_ = 0;  // buffers
+  // Exposure time of the last frame.
+  Duration last_exposure_{};
+  // Number of buffers queued in the kernel.
+  std::size_t with_kernel_ = 0;
   int poll_errors_ = 0;
   std::thread thread_;
 };
 
-/// A camera behind a video node: drivers/camera.hpp and v4l2.hpp have the contract.
+/// Camera behind a video node; the contract is in drivers/camera.hpp and v4l2.hpp.
 ///
-/// The CaptureThread alone calls the kernel while streaming; the owner does in between. What
-/// passes between them, the consumer and the releaser goes through the FrameExchange.
+/// While streaming, only the CaptureThread calls the kernel; otherwise only the owner does. The
+/// FrameExchange passes frames and buffers between them, the consumer and the releaser.
 class V4l2Camera final : public CameraDevice {
  public:
-  /// An open node; `node.found_by` is what it is found by after an unplug.
+  /// Takes an open node; `node.found_by` identifies it after a disconnect.
   V4l2Camera(UniqueFd fd, Node node);
   ~V4l2Camera() override;
 
@@ -101,15 +104,18 @@ class V4l2Camera final : public CameraDevice {
 
   DeviceInfo info_;
   Node node_;
-  std::mutex controlling_;  // of node, controls_ and settings_, between start() and set_exposure()
+  // Guards the node, controls_ and settings_ between start() and set_exposure().
+  std::mutex controlling_;
   UniqueFd fd_, subdevice_;
   Controls controls_;
   std::optional<CameraConfiguration> requested_;
   std::optional<Settings> settings_;
   std::optional<CaptureQueue> queue_;
-  StampKind stamps_ = StampKind::none;  // as the buffers' description says before the first comes
+  // Kind of stamps according to the buffers' description, known before the first frame.
+  StampKind stamps_ = StampKind::none;
   std::string last_error_;
-  bool lost_node_ = false;  // the descriptor is of a camera that is gone
+  // True if the descriptor belongs to a disconnected camera.
+  bool lost_node_ = false;
 
   FrameExchange exchange_;
   CaptureThread capture_{exchange_};

@@ -5,7 +5,7 @@
 
 namespace vergence::v4l2 {
 
-/// A piece of a driver's buffer memory in our address space.
+/// Buffer memory of a driver, mapped into this process.
 class Mapping {
  public:
   Mapping() noexcept = default;
@@ -28,31 +28,32 @@ struct Filled {
   std::uint32_t sequence = 0;
   std::uint32_t flags = 0;
   std::int64_t stamp_ns = 0;
-  std::size_t bytes = 0;  // that came
-  std::size_t offset =
-      0;  // of the first pixel in the buffer: some drivers put a header before the image
+  /// Number of bytes received.
+  std::size_t bytes = 0;
+  /// Offset of the first pixel, because some drivers put a header before the image.
+  std::size_t offset = 0;
 };
 
-/// The kernel's queue of capture buffers of one open node, single plane or a multi-plane queue of
-/// one plane.
+/// The kernel's queue of capture buffers of one open node: single-plane, or multi-plane with one
+/// plane.
 ///
-/// Ownership  The descriptor stays the caller's and open longer than this.
-/// Errors     Every call → 0 or the errno.
+/// Does not own the descriptor, which must stay open longer. Every call returns 0 or the errno.
 class CaptureQueue {
  public:
   CaptureQueue(int fd, std::uint32_t type) noexcept : fd_(fd), type_(type) {}
 
-  /// About `requested` buffers, which the kernel may change, each mapped: (*mappings)[index].
+  /// Requests this number of buffers, which the kernel may change. Buffer i is mapped as
+  /// (*mappings)[i].
   [[nodiscard]] int request(std::uint32_t requested, std::vector<Mapping>* mappings);
-  /// Flags of the buffers as they lie there: the kind of their stamps.
+  /// Flags of the buffers before use; they tell the kind of stamps.
   [[nodiscard]] std::uint32_t description_flags() const noexcept { return flags_; }
-  /// Gives all buffers back; mappings still held stay valid.
+  /// Frees all buffers; mappings still held stay valid.
   void free() noexcept;
   [[nodiscard]] int enqueue(std::uint32_t index) noexcept;
-  /// EAGAIN: none is filled.
+  /// Returns EAGAIN if no buffer is filled.
   [[nodiscard]] int dequeue(Filled* filled) noexcept;
   [[nodiscard]] int start() noexcept;
-  /// All buffers are ours again.
+  /// Stops the stream and takes all buffers back from the kernel.
   int stop() noexcept;
 
  private:

@@ -11,7 +11,8 @@
 namespace vergence::v4l2 {
 namespace {
 
-constexpr int kMaxControls = 512;  // more than any sensor has: a driver that never ends its list
+// Exceeds any sensor's number of controls; stops at a driver whose list does not end.
+constexpr int kMaxControls = 512;
 constexpr std::int64_t kMaxItems = 64;
 
 bool is_number_like(std::uint32_t type) noexcept {
@@ -32,7 +33,8 @@ void read_menu(Control* control) {
     v4l2_querymenu item{};
     item.id = control->id;
     item.index = static_cast<__u32>(i);
-    if (v4l2::control(control->fd, VIDIOC_QUERYMENU, &item) != 0) continue;  // menus have holes
+    // Menus may have gaps.
+    if (v4l2::control(control->fd, VIDIOC_QUERYMENU, &item) != 0) continue;
     control->menu.emplace_back(i, control->type == V4L2_CTRL_TYPE_MENU
                                       ? key_of(text(item.name))
                                       : std::to_string(item.value));

@@ -148,10 +148,11 @@ bool FrameExchange::drain() noexcept {
 
 bool FrameExchange::release(FrameSlot slot) noexcept {
   const std::lock_guard lock(mutex_);
-  (void)queue_.release(slot);  // before it is free to be offered again
+  // The queue releases the slot before it is free to be offered again.
+  (void)queue_.release(slot);
   const std::optional<std::uint32_t> buffer = slots_.release(slot);
-  if (buffer)
-    returned_.index[returned_.count++] = *buffer;  // while stopped start() finds it by itself
+  // While stopped, the list is ignored: start() finds free buffers itself.
+  if (buffer) returned_.index[returned_.count++] = *buffer;
   return buffer.has_value();
 }
 
@@ -185,7 +186,8 @@ std::optional<FrameSlot> FrameExchange::hold_pooled() noexcept {
 void FrameExchange::offer(const Frame& frame) noexcept {
   if (queue_.offer(frame)) return;
   const std::lock_guard lock(mutex_);
-  (void)slots_.release(frame.slot);  // its buffer: start() finds it by itself
+  // While stopped, start() finds the freed buffer itself.
+  (void)slots_.release(frame.slot);
 }
 
 void FrameExchange::record_dead_node() noexcept {

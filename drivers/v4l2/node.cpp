@@ -16,10 +16,10 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kDevices = "/dev";
-constexpr int kParents =
-    4;  // from the video device up: USB interface, USB device; a bridge, its bus
+// Levels searched above the video device: USB interface and device, or a bridge and its bus.
+constexpr int kParents = 4;
 
-/// Text of a fixed field that need not end in a zero.
+/// Text of a fixed field that may lack a terminating zero.
 template <std::size_t N>
 std::string text(const __u8 (&field)[N]) {
   const char* first = reinterpret_cast<const char*>(field);
@@ -37,7 +37,7 @@ std::string usb_serial(const std::string& name) {
   return {};
 }
 
-/// Numbers of the /dev/videoN there are.
+/// Numbers of the existing /dev/videoN.
 std::vector<int> node_numbers() {
   std::vector<int> numbers;
   std::error_code error;
@@ -131,7 +131,8 @@ DeviceStatus find_node(std::string_view serial, UniqueFd* fd, Node* node) {
   if (serial.starts_with(std::string(kDevices) + "/")) {
     const DeviceStatus status = open_node(std::string(serial), fd, node);
     if (status != DeviceStatus::ok) return status;
-    for (const Node& n : list_nodes().nodes)  // the one there, of several of one serial, too
+    // Takes the listed serial number, which differs if several cameras share one.
+    for (const Node& n : list_nodes().nodes)
       if (same_file(n.path, node->path)) node->serial = n.serial;
     node->found_by = serial;
     return status;

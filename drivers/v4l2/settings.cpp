@@ -18,9 +18,10 @@ namespace {
 
 std::string number_text(double value) { return format_text("%.6g", value); }
 
-constexpr double kRateTolerance =
-    0.02;  // between what was asked and what the camera chose, before it is worth a remark
-constexpr std::uint32_t kMaxListed = 24;  // sizes and formats named in a message
+// Relative difference of requested and chosen rate above which a remark is made.
+constexpr double kRateTolerance = 0.02;
+// Maximum number of sizes and formats named in a message.
+constexpr std::uint32_t kMaxListed = 24;
 
 std::string size_text(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
@@ -37,7 +38,7 @@ DeviceStatus to_status(int error) noexcept {
   }
 }
 
-/// The steps of apply(), which share what they read and leave behind.
+/// Steps of apply(), which share intermediate results.
 class Applier {
  public:
   Applier(int fd, std::uint32_t type, const Controls& controls,
@@ -182,7 +183,7 @@ class Applier {
     }
     if (const int error = control(fd_, VIDIOC_S_FMT, &f); error != 0)
       system(error, "setting " + name_of(chosen->fourcc) + " " + size_text(width, height));
-    // The kernel changes what it cannot do without a word.
+    // The kernel silently adjusts values that it does not support.
     const __u32 got_width = planes ? f.fmt.pix_mp.width : f.fmt.pix.width,
                 got_height = planes ? f.fmt.pix_mp.height : f.fmt.pix.height;
     const __u32 got_format = planes ? f.fmt.pix_mp.pixelformat : f.fmt.pix.pixelformat,
@@ -230,7 +231,8 @@ class Applier {
     if (error == 0 && t.numerator > 0 && t.denominator > 0)
       out_.camera_rate_hz = static_cast<double>(t.denominator) / t.numerator;
     if (error != 0) out_.camera_rate_hz = sensor_rate();
-    if (requested_.trigger == CameraTrigger::hardware) return;  // the pulses are the rate
+    // The pulses determine the rate.
+    if (requested_.trigger == CameraTrigger::hardware) return;
     const double camera = out_.camera_rate_hz;
     if (!(camera > 0)) {
       remark("the camera does not say its rate");
@@ -272,7 +274,7 @@ class Applier {
         "the camera has no exposure that can be set in microseconds; exposure_us is taken for what "
         "it does");
   }
-  /// `unit`: seconds a step of the control is.
+  /// `unit` is the number of seconds per step of the control.
   void set_exposure(const Control& c, double unit) {
     const std::int64_t steps = std::llround(requested_.exposure.to_seconds() / unit);
     const std::int64_t value = clamped(c, steps);
@@ -299,7 +301,8 @@ class Applier {
              "the camera has no gain control: set gain_db to 0; it has " + controls_.keys());
     }
     for (const auto& [key, text] : options_.controls)
-      if (key == c->key) return;  // given by number
+      // The gain is set by number.
+      if (key == c->key) return;
     if (requested_.gain_db != 0 && options_.gain_step_db <= 0)
       refuse(DeviceStatus::unsupported,
              "how many dB a step of " + c->key + " (" + format_range(*c) +

@@ -14,29 +14,28 @@ struct Settings {
   CameraConfiguration actual{};
   Options options{};
   PixelFormat format{};
-  std::size_t stride = 0;      // bytes from a row to the next
-  std::size_t image_size = 0;  // bytes of a buffer
+  /// Distance between two rows, in bytes.
+  std::size_t stride = 0;
+  /// Size of a buffer, in bytes.
+  std::size_t image_size = 0;
   Duration readout{};
-  std::uint32_t exposure_id = 0,
-                gain_id = 0;  // controls; 0: the camera has none that could be set in units
+  /// Ids of the controls; 0 if the camera has none whose unit is known.
+  std::uint32_t exposure_id = 0, gain_id = 0;
   double exposure_unit_s = 0, gain_unit_db = 0;
-  double camera_rate_hz =
-      0;  // of the exposures; with `thin` more than actual.rate_hz. 0: not known
+  /// Exposure rate, in Hz; with `thin` higher than actual.rate_hz. 0 if unknown.
+  double camera_rate_hz = 0;
   std::string remark;
 };
 
-/// Brings an open camera to a configuration: format, region, rate, exposure, gain, trigger, other
-/// controls.
-///
-/// → ok, unsupported, busy, disconnected, failed; not `ok`: *error, and the camera may be somewhere
-/// in
-///   between.
+/// Configures an open camera: format, region, rate, exposure, gain, trigger and other controls. If
+/// not `ok`, *error has the reason and the camera may be partly configured. → ok, unsupported,
+/// busy, disconnected, failed
 [[nodiscard]] DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
                                  const CameraConfiguration& requested, const Options& options,
                                  Settings* settings, std::string* error);
 
-/// The nearest exposure and gain that the camera has, also while it streams. *actual: what it took.
-/// → ok, unsupported, disconnected, failed
+/// Applies the nearest supported exposure and gain, also while streaming. *actual receives the
+/// applied values. → ok, unsupported, disconnected, failed
 [[nodiscard]] DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
                                            const ExposureSetting& requested,
                                            ExposureSetting* actual) noexcept;

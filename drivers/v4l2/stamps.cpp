@@ -30,7 +30,8 @@ DeviceStamp exposure_start(StampKind kind, std::int64_t stamp_ns, HostStamp arri
 SequenceCounter::Step SequenceCounter::next(std::uint32_t sequence, DeviceStamp stamp) noexcept {
   std::uint64_t steps = 0;
   if (any_) {
-    const auto ahead = static_cast<std::int32_t>(sequence - last_);  // across the wrap
+    // The signed difference is correct across the wrap.
+    const auto ahead = static_cast<std::int32_t>(sequence - last_);
     steps = static_cast<std::uint64_t>(std::max(ahead, 1));
     if (ahead == 0 && period_ > Duration{}) {
       const std::int64_t periods = ((stamp - last_stamp_).ns() + period_.ns() / 2) / period_.ns();

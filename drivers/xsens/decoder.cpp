@@ -16,9 +16,10 @@ namespace {
 
 ClockMapperOptions mapper_options() noexcept {
   ClockMapperOptions o;
-  o.delay_spread =
-      Duration::milliseconds(5);  // of a read behind its last byte: a USB frame and the scheduler
-  o.resolution = Duration::microseconds(100);  // SampleTimeFine's tick
+  // Delay of a read after its last byte: a USB frame and the scheduler.
+  o.delay_spread = Duration::milliseconds(5);
+  // Tick of SampleTimeFine.
+  o.resolution = Duration::microseconds(100);
   o.jump = Duration::milliseconds(20);
   o.stall = Duration::seconds(1);
   return o;
@@ -86,8 +87,8 @@ MappedStamp ArrivalTiming::at(DeviceStamp measured) const noexcept {
 
 std::int64_t SampleTime::difference(std::uint32_t ticks) const noexcept {
   const std::int64_t plain = static_cast<std::int64_t>(ticks) - static_cast<std::int64_t>(last_);
-  // The nearest of the three: no wrap, a day's, the full width's. A counter that has been past a
-  // day's end has the full width.
+  // Takes the nearest of three: no wrap, a day's, or the full width's. A counter beyond a day's end
+  // has the full width.
   std::int64_t best = plain;
   for (const std::int64_t modulus : {kDay, kFull}) {
     if (modulus == kDay && (last_ >= kDay || ticks >= kDay)) continue;
@@ -106,7 +107,7 @@ ClockStep SampleTime::next(std::uint32_t ticks, Duration elapsed) noexcept {
   }
   const std::int64_t d = difference(ticks);
   if (d > kFarthest || d < -kFarthest) {
-    // Something that only grows goes on for those who look at differences.
+    // Keeps increasing, for users of differences.
     ticks_ += std::max<std::int64_t>(1, elapsed.ns() / kTick);
     last_ = ticks;
     return ClockStep::restart;
@@ -133,7 +134,7 @@ ClockStep SampleCounter::next(std::uint16_t counter, std::int64_t expected_steps
   }
   const auto d = static_cast<std::uint16_t>(counter - last_);
   last_ = counter;
-  // The step that is nearest to what the time between says, of those that the sixteen bits allow.
+  // Of the steps that the 16 bits allow, takes the one nearest to the elapsed time.
   constexpr std::int64_t kWrap = 65536, kTolerance = 2048;
   const std::int64_t wraps = (expected_steps - d + kWrap / 2) / kWrap;
   const std::int64_t steps = d + std::max<std::int64_t>(0, wraps) * kWrap;
@@ -231,7 +232,8 @@ std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& w
                                                   LocalFrame frame) noexcept {
   const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
   const double n = q.norm();
-  constexpr double kMin = 0.9, kMax = 1.1;  // what 12.20 rounds is far inside
+  // Wide enough for rounding in format 12.20.
+  constexpr double kMin = 0.9, kMax = 1.1;
   if (!(n > kMin && n < kMax)) return std::nullopt;
   const Eigen::Quaterniond enu = enu_from(frame) * Eigen::Quaterniond(q.coeffs() / n);
   return std::array{enu.x(), enu.y(), enu.z(), enu.w()};
@@ -259,7 +261,7 @@ Receiver to_receiver(const GnssPvt& p, HostStamp received) noexcept {
   r.fix = (p.flags & 1U) != 0 ? p.fix : std::uint8_t{0};
   r.satellites = p.satellites;
   if (p.position_dop_1e2 != kNoDop) r.position_dop = 0.01F * static_cast<float>(p.position_dop_1e2);
-  // The receiver's horizontal accuracy is of the plane, both axes together.
+  // The receiver's horizontal accuracy combines both axes.
   r.position_sigma = metres(p.horizontal_accuracy_mm) / std::numbers::sqrt2;
   r.height_sigma = metres(p.vertical_accuracy_mm);
   r.velocity_sigma = metres(p.speed_accuracy_mm_s);
@@ -294,7 +296,7 @@ void fill(const Mtdata& d, const Receiver& receiver, HostStamp now, InsReading* 
   r->quality.status = status;
   fill_motion(d, d.frame, d.frame, &r->sample);
   const bool fix = (status & kStatusGnssFix) != 0;
-  // Without a fix a valid filter goes on by inertia.
+  // Without a fix a valid filter continues by inertia.
   fill_fix((status & kStatusFilterValid) != 0, fix, !fix, receiver, now, r);
   place(d.latitude_longitude_deg, d.altitude_m, &r->sample);
   fill_utc(d.utc, kUtcValid, &r->quality);
@@ -304,8 +306,8 @@ namespace {
 
 using namespace xbus;
 
-constexpr Duration kWithoutPlace =
-    Duration::milliseconds(200);  // so long a position may be missing while there is a fix
+// Maximum age of a position while there is a fix.
+constexpr Duration kWithoutPlace = Duration::milliseconds(200);
 
 bool answers(const Message& m, MessageId request) noexcept {
   return m.id == static_cast<std::uint8_t>(static_cast<unsigned>(request) + 1U);
@@ -334,7 +336,8 @@ void Decoder::accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noe
   arrival_ = arrival;
   received_ += bytes.size();
   timing_.read(received_, arrival);
-  (void)stream_.accept(bytes);  // kMaxBytes fit beside any frame that waits
+  // kMaxBytes fit in addition to any incomplete frame.
+  (void)stream_.accept(bytes);
 }
 
 bool Decoder::woke() noexcept { return std::exchange(replies_.woke, false); }
@@ -372,7 +375,8 @@ void Decoder::read_other(const Message& m) noexcept {
 void Decoder::count_messages(std::uint16_t counter) noexcept {
   if (counted_) {
     const auto ahead = static_cast<std::uint16_t>(counter - last_message_);
-    constexpr std::uint16_t kBelievable = 4096;  // beyond: the device restarted
+    // Larger steps mean a restart of the device.
+    constexpr std::uint16_t kBelievable = 4096;
     if (ahead > 1 && ahead < kBelievable) counters_.lost += ahead - 1U;
   }
   counted_ = true;
@@ -431,7 +435,7 @@ bool Decoder::read_mtdata(const Message& m, std::uint64_t begin, std::uint64_t e
     counters_.lost +=
         static_cast<std::uint64_t>(std::max<std::int64_t>(0, sample_counter_.count() - before - 1));
   if (d.fix) {
-    // The block is repeated in every sample; its age drops when a new one has come.
+    // The block is repeated in every sample; its age decreases when it is new.
     if (d.fix->age <= last_fix_age_ || !receiver_.known)
       receiver_ = to_receiver(*d.fix, d.status.value_or(0), arrival_);
     last_fix_age_ = d.fix->age;
@@ -442,8 +446,8 @@ bool Decoder::read_mtdata(const Message& m, std::uint64_t begin, std::uint64_t e
   return hand_out(r, reading);
 }
 
-/// Just after a start the map still improves: a reading that falls before one that went out already
-/// would turn time back.
+/// Just after a start the mapping still improves; a sample before the last output one would reverse
+/// time.
 bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
   if (counters_.readings > 0 && r.host <= last_host_) return false;
   last_host_ = r.host;
@@ -453,7 +457,7 @@ bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
   return true;
 }
 
-/// False: the clocks are not tied yet.
+/// Returns false while the clocks are not mapped yet.
 bool Decoder::finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t end,
                      InsReading* r) noexcept {
   timing_.message(begin, end, measured);
@@ -463,7 +467,8 @@ bool Decoder::finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t en
     const double periods = static_cast<double>((measured - last_).ns()) * 1e-9 * set_.rate_hz();
     number_ += static_cast<std::uint64_t>(std::max(1LL, std::llround(periods)));
   } else if (counters_.readings > 0) {
-    ++number_;  // after a new begin: the number of missing ones is unknown
+    // After a new start the number of missing samples is unknown.
+    ++number_;
   }
   any_ = true;
   last_ = measured;

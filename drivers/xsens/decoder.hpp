@@ -13,36 +13,37 @@
 
 namespace vergence::xsens {
 
-/// When the device measured, from when its bytes arrived.
+/// Derives the time of a sample from the arrival of its bytes.
 ///
-/// Method   A USB converter hands bytes over in bursts, so a message's end says little about when
-///          it was sent. But the last byte of a read was on the wire just before the burst left: it
-///          is given the device's time at which it was sent (sample + processing, or the end of the
-///          message before where that is later, + its place in the message at the baud rate), and
-///          this pair goes into the ClockMapper. A read whose last byte is in a message that is not
-///          whole yet waits for it. All pairs are late, never early, as the mapper requires.
-/// Not thread-safe. Memory: fixed; of reads that wait the oldest go when there are more than
-///          kMarks.
-/// Errors   None. What is constant and unseen, the least time from the converter to the program,
-///          stays in the stamps (docs/ins.md).
+/// Method   A USB converter delivers bytes in bursts, so the end of a message does not show when it
+///          was sent. But the last byte of a read was on the wire just before the burst. The device
+///          time when it was sent (sample + processing, or the end of the previous message if
+///          later, + its position in the message at the baud rate) and the arrival are a pair for
+///          the ClockMapper. A read that ends in an incomplete message waits for it. Pairs are
+///          late, never early, as the mapper requires.
+/// Memory   Fixed; beyond kMarks waiting reads the oldest is dropped.
+/// Errors   The constant, unobservable minimum delay from the converter to the program remains in
+///          the stamps (docs/ins.md).
+///
+/// Not thread-safe.
 class ArrivalTiming {
  public:
   explicit ArrivalTiming(std::uint32_t baud = 115200, Duration processing = {}) noexcept;
 
-  /// Everything anew: the line was opened again, or the device's clock was set. The stream's count
-  /// goes on.
+  /// Starts a new fit, because the link was reopened or the device's clock was set. The byte count
+  /// continues.
   void restart() noexcept;
-  /// A read brought the stream up to this count of bytes.
+  /// Records a read that ends at this byte count.
   void read(std::uint64_t end, HostStamp arrival) noexcept;
-  /// A message of the stream's bytes [begin, end), of this sample. `measured` ascends.
+  /// Records a message of the bytes [begin, end) with this sample. `measured` increases.
   void message(std::uint64_t begin, std::uint64_t end, DeviceStamp measured) noexcept;
-  /// Bytes up to `end` say nothing about when they were sent, but that the line was taken: garbage,
-  /// or another message.
+  /// Records that bytes up to `end` occupied the link but have no known time: garbage, or another
+  /// message.
   void other(std::uint64_t end) noexcept;
-  /// A read has ended inside a message since the start: at() has something to say. Takes a burst,
-  /// 61 ms at 115200 baud.
+  /// True once a read has ended inside a message, so that at() is available. Takes one burst, 61 ms
+  /// at 115200 baud.
   [[nodiscard]] bool known() const noexcept { return known_; }
-  /// The host's time of a sample. Precondition: known.
+  /// Maps a sample's time to the host's clock. Precondition: known.
   [[nodiscard]] MappedStamp at(DeviceStamp measured) const noexcept;
 
   [[nodiscard]] double drift() const noexcept { return mapper_.drift(); }
@@ -55,55 +56,67 @@ class ArrivalTiming {
     std::uint64_t end = 0;
     HostStamp arrival{};
   };
-  static constexpr std::size_t kMarks = 64;  // a 231-byte message in reads of 11 bytes has 21
+  // Sufficient: a 231-byte message in reads of 11 bytes needs 21.
+  static constexpr std::size_t kMarks = 64;
 
   ClockMapper mapper_;
   Duration processing_;
   double byte_ns_;
-  std::array<Mark, kMarks> marks_{};  // oldest first
+  // Oldest first.
+  std::array<Mark, kMarks> marks_{};
   std::size_t count_ = 0;
-  std::uint64_t end_ = 0;    // of the bytes seen so far
-  DeviceStamp line_free_{};  // when the last of them had been sent, at the earliest
+  // Byte count so far.
+  std::uint64_t end_ = 0;
+  // Earliest time when all of these bytes had been sent.
+  DeviceStamp line_free_{};
   bool known_ = false, line_known_ = false;
-  DeviceStamp witness_{};  // the newest pair given to the mapper …
-  MappedStamp mapped_{};   // … and what it said
+  // Newest pair given to the mapper, and the result.
+  DeviceStamp witness_{};
+  MappedStamp mapped_{};
 };
 
 /// Relation of a new stamp to the last one.
 enum class ClockStep : std::uint8_t {
   first,
   forward,
-  backward,  // not after the last one: not a new sample
-  restart,   // the clock was set, or the device restarted
+  /// Not later than the last one, so no new sample.
+  backward,
+  /// The clock was set, or the device restarted.
+  restart,
 };
 
-/// Unwraps SampleTimeFine: 0.1 ms, wrapping at one day on MTi 10/100 series and the 700/710, at 2³²
-/// on others.
+/// Unwraps SampleTimeFine, in units of 0.1 ms. It wraps at one day on MTi 10/100 series and the
+/// 700/710, at 2³² on others.
 ///
-/// Not thread-safe. Time: the device's, from the first stamp on; goes on over a restart by what
-///          `elapsed` says has passed.
+/// The result is the device's time since the first stamp; it continues across a restart by
+/// `elapsed`. Not thread-safe.
 class SampleTime {
  public:
-  /// `elapsed`: of the host's clock since the last stamp, roughly.
+  /// `elapsed` is the approximate host time since the last stamp.
   [[nodiscard]] ClockStep next(std::uint32_t ticks, Duration elapsed) noexcept;
   [[nodiscard]] DeviceStamp stamp() const noexcept { return DeviceStamp(ticks_ * kTick); }
-  /// The unwrapped time of a stamp near the last one, older or newer, without taking it.
+  /// Unwraps a stamp near the last one, older or newer, without recording it.
   [[nodiscard]] std::optional<DeviceStamp> near(std::uint32_t ticks) const noexcept;
 
  private:
-  static constexpr std::int64_t kTick = 100'000;        // ns
-  static constexpr std::int64_t kDay = 864'000'000;     // ticks
-  static constexpr std::int64_t kFull = 4'294'967'296;  // ticks
-  static constexpr std::int64_t kFarthest =
-      100'000;  // ticks, 10 s: a gap, beyond it a clock that was set
+  // In ns.
+  static constexpr std::int64_t kTick = 100'000;
+  // In ticks.
+  static constexpr std::int64_t kDay = 864'000'000;
+  // In ticks.
+  static constexpr std::int64_t kFull = 4'294'967'296;
+  // In ticks (10 s): larger steps mean a clock that was set.
+  static constexpr std::int64_t kFarthest = 100'000;
   [[nodiscard]] std::int64_t difference(std::uint32_t ticks) const noexcept;
 
   bool known_ = false;
-  std::uint32_t last_ = 0;  // as sent
-  std::int64_t ticks_ = 0;  // unwrapped
+  // Last raw value.
+  std::uint32_t last_ = 0;
+  // Unwrapped ticks.
+  std::int64_t ticks_ = 0;
 };
 
-/// Unwraps the MTi-G's sample counter, 16 bits.
+/// Unwraps the MTi-G's 16-bit sample counter.
 class SampleCounter {
  public:
   [[nodiscard]] ClockStep next(std::uint16_t counter, std::int64_t expected_steps) noexcept;
@@ -115,18 +128,17 @@ class SampleCounter {
   std::int64_t count_ = 0;
 };
 
-/// Quaternion x y z w, sensor → ENU, of one w x y z, sensor → `frame`; normalised. Nothing: it is
-/// none.
+/// Attitude sensor → ENU as quaternion x y z w, from sensor → `frame` as w x y z; normalised.
+/// Returns nothing for an invalid quaternion.
 ///   NWU: q_enu = (√½, 0, 0, √½) ⊗ q      x north becomes y
-///   NED: q_enu = (0, √½, √½, 0) ⊗ q      x and y change places, z turns over
-/// The sensor's own axes are those printed on its housing in every frame; how it is mounted is the
-/// boresight's affair.
+///   NED: q_enu = (0, √½, √½, 0) ⊗ q      x and y are swapped, z is reversed
+/// The sensor's axes are those on its housing in every frame; the boresight describes its mounting.
 [[nodiscard]] std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& wxyz,
                                                                 xbus::LocalFrame frame) noexcept;
 [[nodiscard]] std::array<double, 3> enu_vector(const xbus::Three& v,
                                                xbus::LocalFrame frame) noexcept;
 
-/// The receiver's newest word about its fix.
+/// Newest status of the receiver's fix.
 struct Receiver {
   bool known = false;
   HostStamp received{};
@@ -134,15 +146,15 @@ struct Receiver {
   std::uint8_t fix = 0;
   std::uint8_t satellites = 0;
   float position_dop = 0;
-  double position_sigma = 0, height_sigma = 0,
-         velocity_sigma = 0;  // m, m, m/s, each axis; 0: not told
+  /// Standard deviations per axis in m, m and m/s; 0 if unknown.
+  double position_sigma = 0, height_sigma = 0, velocity_sigma = 0;
 };
 [[nodiscard]] Receiver to_receiver(const xbus::GnssPvt& pvt, HostStamp received) noexcept;
 [[nodiscard]] Receiver to_receiver(const xbus::LegacyFix& fix, std::uint8_t status,
                                    HostStamp received) noexcept;
 
-/// Fills attitude, velocity, position, fix, sigmas and quality; number and times are the caller's.
-/// Absent fields stay invalid. A receiver's word older than kReceiverStale is not used.
+/// Fills attitude, velocity, position, fix, sigmas and quality; the caller sets number and times.
+/// Absent fields stay invalid. A receiver status older than kReceiverStale is ignored.
 inline constexpr Duration kReceiverStale = Duration::seconds(3);
 void fill(const xbus::Mtdata2& data, const Receiver& receiver, HostStamp now,
           InsReading* reading) noexcept;
@@ -160,39 +172,40 @@ struct DecoderCounters {
   std::uint64_t restarts = 0;
 };
 
-/// Bytes of a measuring device into readings with times.
+/// Decodes the bytes of a measuring device into samples with times.
 ///
 ///     decoder.begin(settings, 115200, Duration::milliseconds(2));
 ///     decoder.accept(bytes, arrival);  // of each read
 ///     for (InsReading reading; decoder.next(&reading);) use(reading.sample, reading.host);
 ///
-/// Time     A reading's time is that of its sample by the device's clock, mapped to the host's by
-///          ArrivalTiming. The receiver's messages are older than the inertial ones before them and
-///          not in step: they say how good the fix is, and are no readings.
-/// Order    Of measurement; a sample that is not newer than the last is dropped.
+/// Time     The sample's time on the device's clock is mapped to the host's by ArrivalTiming. The
+///          receiver's messages are older than the inertial ones and not synchronous: they give the
+///          quality of the fix, not samples.
+/// Order    By measurement; a sample that is not newer than the last is dropped.
+/// Errors   Counted; the stream always continues.
+///
 /// Not thread-safe. Does not allocate.
-/// Errors   Counted; nothing stops the stream.
 class Decoder {
  public:
   Decoder() = default;
   /// Starts decoding of a device with these settings and baud rate. Clears everything but the
   /// counters and the numbers.
   void begin(const StreamSettings& stream, std::uint32_t baud, Duration processing) noexcept;
-  /// Adds the bytes of a read. Precondition: next() has said false since the last; at most
-  /// kMaxBytes.
+  /// Adds the bytes of a read, at most kMaxBytes. Precondition: next() has returned false since the
+  /// last call.
   void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
   static constexpr std::size_t kMaxBytes = 4096;
-  /// The next reading. False: none, *reading untouched.
+  /// Returns the next sample. If false, *reading is unchanged.
   [[nodiscard]] bool next(InsReading* reading) noexcept;
-  /// Nothing came for longer than a frame takes: what looked like the beginning of one was none.
+  /// Called after a silence longer than a frame: an incomplete frame is discarded.
   void quiet() noexcept { stream_.abandon(); }
-  /// The device has told that it restarts, since the last call.
+  /// True if the device has reported a restart since the last call.
   [[nodiscard]] bool woke() noexcept;
-  /// It has answered that it stopped measuring, or goes on: which of the two `request` is. Since
-  /// the last call for that. The first reading after it goes on is `resumed`.
+  /// True if the device has confirmed `request` (stop or resume measuring) since the last such
+  /// call. The first sample after resuming is `resumed`.
   [[nodiscard]] bool answered(xbus::MessageId request) noexcept;
 
-  /// When the newest sample arrived; zero: none since begin().
+  /// Arrival of the newest sample; zero if none since begin().
   [[nodiscard]] HostStamp last_sample() const noexcept { return last_sample_; }
   [[nodiscard]] const DecoderCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] const xbus::StreamCounters& line_counters() const noexcept {
@@ -201,7 +214,7 @@ class Decoder {
   [[nodiscard]] const ArrivalTiming& timing() const noexcept { return timing_; }
 
  private:
-  /// Status of the device that was not read yet, and of the next sample.
+  /// Replies of the device that were not queried yet, and a flag of the next sample.
   struct Replies {
     bool woke = false, stopped = false, going_on = false;
     bool resumed = false;
@@ -224,11 +237,16 @@ class Decoder {
   SampleCounter sample_counter_;
   Receiver receiver_{};
   DecoderCounters counters_{};
-  HostStamp arrival_{};      // of the newest read
-  HostStamp last_sample_{};  // arrival of the newest sample
-  HostStamp last_place_{};   // arrival of the newest sample with a position
-  DeviceStamp last_{};       // the newest sample
-  HostStamp last_host_{};    // of the newest reading
+  // Arrival of the newest read.
+  HostStamp arrival_{};
+  // Arrival of the newest sample.
+  HostStamp last_sample_{};
+  // Arrival of the newest sample with a position.
+  HostStamp last_place_{};
+  // Time of the newest sample.
+  DeviceStamp last_{};
+  // Host time of the newest sample.
+  HostStamp last_host_{};
   std::uint64_t received_ = 0, base_ = 0;
   std::uint64_t number_ = 0;
   bool any_ = false, counted_ = false;

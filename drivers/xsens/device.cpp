@@ -64,7 +64,8 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
       if (const DeviceStatus s = connect(); s != DeviceStatus::ok) return s;
     }
     Setup setup(*line(), options_, stopping());
-    DeviceStatus status = setup.find();  // back into its configuration state, if it was measuring
+    // Returns to the configuration state if it was measuring.
+    DeviceStatus status = setup.find();
     StreamSettings set;
     if (status == DeviceStatus::ok) status = setup.set(identity_, rate_hz, &set);
     if (status != DeviceStatus::ok) {
@@ -78,7 +79,8 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
     remark_ = remark_about(rate_hz);
     if (actual_hz != nullptr) *actual_hz = set_.rate_hz();
     return DeviceStatus::ok;
-  } catch (const std::exception&) {  // out of memory
+    // Out of memory.
+  } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
 }
@@ -102,8 +104,8 @@ DeviceTiming Device::timing() const noexcept {
                                 : 100;
   t.min_delay = options_.processing +
                 Duration::nanoseconds(xbus::wire_time_ns(bytes, baud_ == 0 ? 115200 : baud_));
-  t.delay_spread =
-      place().latency_timer() + Duration::milliseconds(60);  // a burst of 496 bytes at 115200 baud
+  // A burst of 496 bytes at 115200 baud.
+  t.delay_spread = place().latency_timer() + Duration::milliseconds(60);
   t.resolution = Duration::microseconds(100);
   return t;
 }
@@ -125,7 +127,8 @@ DeviceStatus Device::begin() noexcept {
 
 DeviceStatus Device::read_on() noexcept {
   last_sample_ = line()->now();
-  gap_ns_.store(0, std::memory_order_relaxed);  // what was wanted before is past
+  // Earlier requests are obsolete.
+  gap_ns_.store(0, std::memory_order_relaxed);
   for (;;) {
     if (stop_requested()) return DeviceStatus::stopped;
     DeviceStatus status = read_once(kRead);
@@ -133,18 +136,19 @@ DeviceStatus Device::read_on() noexcept {
         gap > 0 && status != DeviceStatus::disconnected)
       status = make_gap(Duration::nanoseconds(gap));
     if (status != DeviceStatus::ok && status != DeviceStatus::timeout) return status;
-    // Opened again it is set again: a restart may have cost it its settings.
+    // Reopening configures it again, because a restart may have lost its settings.
     if (decoder_.woke()) return DeviceStatus::disconnected;
     if (line()->now() - last_sample_ > silent_after()) return DeviceStatus::disconnected;
   }
 }
 
 Duration Device::silent_after() const noexcept {
-  constexpr double kIntervals = 4;  // at 1 Hz a single lost message is no silence
+  // At 1 Hz a single lost message is not a silence.
+  constexpr double kIntervals = 4;
   return std::max(kSilent, Duration::seconds(kIntervals / set_.rate_hz()));
 }
 
-/// Hands out what a read brings. → ok, timeout (also where it was woken), ended, gone, failed
+/// Hands out the samples of a read. → ok, timeout (also if woken), ended, disconnected, failed
 DeviceStatus Device::read_once(Duration limit) noexcept {
   std::array<std::uint8_t, Decoder::kMaxBytes> bytes{};
   const LineRead r = line()->read(bytes, limit);
@@ -165,8 +169,8 @@ DeviceStatus Device::pause(Duration gap) noexcept {
   return DeviceStatus::ok;
 }
 
-/// A pulse leaves with every so many samples: all up to the device's answer are handed out, and all
-/// from its next one on.
+/// SyncOut pulses accompany every n-th sample, so all samples up to the device's response and from
+/// its next one on are handed out.
 DeviceStatus Device::make_gap(Duration gap) noexcept {
   if (const DeviceStatus s = announce(xbus::MessageId::go_to_config); s != DeviceStatus::ok)
     return s;
@@ -176,11 +180,12 @@ DeviceStatus Device::make_gap(Duration gap) noexcept {
     const DeviceStatus s = read_once(std::min(kRead, end - line()->now()));
     if (s != DeviceStatus::ok && s != DeviceStatus::timeout) return s;
   }
-  last_sample_ = line()->now();  // it was silent because it was told to be
+  // It was silent by request.
+  last_sample_ = line()->now();
   return announce(xbus::MessageId::go_to_measurement);
 }
 
-/// → ok: it has answered; stopped, gone, failed
+/// → ok (it responded), stopped, disconnected, failed
 DeviceStatus Device::announce(xbus::MessageId request) noexcept {
   constexpr int kTimes = 4;
   constexpr Duration kAnswer = Duration::milliseconds(150), kWrite = Duration::milliseconds(100);
@@ -198,10 +203,11 @@ DeviceStatus Device::announce(xbus::MessageId request) noexcept {
       if (decoder_.answered(request)) return DeviceStatus::ok;
     }
   }
-  return DeviceStatus::disconnected;  // opened again it is set anew
+  // Reopening configures it again.
+  return DeviceStatus::disconnected;
 }
 
-/// Cameras that its SyncOut triggers expose no more after a stop.
+/// Resumes SyncOut; cameras that it triggers would not expose after a stop.
 void Device::finished() noexcept {
   if (line() == nullptr || options_.sync_out_hz <= 0) return;
   constexpr Duration kShort = Duration::milliseconds(300);
@@ -219,7 +225,7 @@ DeviceStatus Device::reopen() {
   DeviceStatus status = setup.find();
   if (status == DeviceStatus::ok) status = setup.identify(&who);
   if (status == DeviceStatus::ok) status = setup.set(who, rate_hz_, &set);
-  // Another one would have another mount: that is for a person to decide.
+  // Another device would be mounted differently, which the user has to check.
   if (status == DeviceStatus::ok && who.device_id != identity_.device_id)
     status = DeviceStatus::not_found;
   if (status != DeviceStatus::ok) return status;

@@ -10,28 +10,28 @@
 
 namespace vergence::xsens {
 
-/// An XSens MTi-G or MTi-G-700/710 on a serial line.
+/// XSens MTi-G or MTi-G-700/710 on a serial link, with the contract of InsDevice.
 ///
-/// As InsDevice says. configure() finds the device (baud scan), sets what differs, and may take
-/// seconds; so the owner calls it before the drive. start() never waits: a thread of the device's
-/// own puts it into measurement, reads, and after `disconnected` opens and sets it again until it
-/// is back. A device that sends no sample for kSilent, or four of its intervals, is one that is
-/// gone, also where it sends something else: it may have lost its settings. So is one that tells of
-/// a restart. Time  Readings are mapped: `host` and `host_error` are set (decoder.hpp).
-class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 Hz
+/// configure() finds the device (baud scan) and changes differing settings, which may take seconds.
+/// start() returns immediately: a thread starts measurement, reads, and after `disconnected`
+/// reopens and configures the device again. A device without a sample for kSilent or four intervals
+/// counts as disconnected even if it sends other data, because it may have lost its settings; so
+/// does one that reports a restart. Samples are mapped: `host` and `host_error` are set
+/// (decoder.hpp).
+class Device final : public SerialInsDevice<1024> {
  public:
   static constexpr Duration kSilent = Duration::seconds(2);
 
   Device(std::unique_ptr<SerialLinkFactory> place, const Options& options);
   ~Device() override;
 
-  /// Opens the line, finds the device and asks who it is; leaves it in its configuration state. →
-  /// ok, not_found, no_permission, busy, unsupported (another make), disconnected, failed
+  /// Opens the link and identifies the device; leaves it in its configuration state. → ok,
+  /// not_found, no_permission, busy, unsupported (another make), disconnected, failed
   [[nodiscard]] DeviceStatus connect();
 
   [[nodiscard]] DeviceStatus configure(double rate_hz, double* actual_hz) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
-  /// Supported by MTi-G-700/710, whose clock continues; others: `unsupported`.
+  /// Supported by MTi-G-700/710, whose clock continues; others return `unsupported`.
   [[nodiscard]] DeviceStatus pause(Duration gap) noexcept override;
 
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
@@ -53,9 +53,12 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
   const Options options_;
   Identity identity_{};
   StreamSettings set_{};
-  Decoder decoder_;                      // of the thread while it runs, else the owner's
-  HostStamp last_sample_{};              // the thread's: its arrival, or when it was waited for
-  std::atomic<std::int64_t> gap_ns_{0};  // that is to be made; 0: none
+  // Belongs to the thread while it runs, else to the owner.
+  Decoder decoder_;
+  // Arrival of the last sample, or start of waiting for one. Used by the thread.
+  HostStamp last_sample_{};
+  // Duration of a requested gap; 0 if none.
+  std::atomic<std::int64_t> gap_ns_{0};
 };
 
 }  // namespace vergence::xsens

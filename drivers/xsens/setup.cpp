@@ -27,7 +27,8 @@ void RequestReply::ask(xbus::MessageId id, std::span<const std::uint8_t> payload
       xbus::write_frame({xbus::kBusMaster, static_cast<std::uint8_t>(id), payload}, frame);
   const HostStamp end = line_.now() + limit;
   reply->answer = Answer::silent;
-  do {  // ends: each turn listens for kAskAgain of the limit
+  // Ends: each round listens for kAskAgain within the limit.
+  do {
     const DeviceStatus sent = line_.write(std::span(frame).first(w.size), kWrite);
     if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) {
       reply->answer = Answer::gone;
@@ -40,7 +41,8 @@ void RequestReply::ask(xbus::MessageId id, std::span<const std::uint8_t> payload
 
 Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* reply) {
   std::array<std::uint8_t, 512> bytes{};
-  for (;;) {  // ends at `until`: reading lets time pass
+  // Ends at `until`: reading lets time pass.
+  for (;;) {
     for (xbus::Message m; stream_.next(&m);) {
       ++messages_;
       if (m.id != requested && !m.is(xbus::MessageId::error)) continue;
@@ -48,7 +50,7 @@ Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* repl
       std::copy(m.payload.begin(), m.payload.end(), reply->payload.begin());
       if (m.id == requested) return Answer::ok;
       reply->error = m.payload.empty() ? std::uint8_t{0} : m.payload[0];
-      // A dip of the supply is told unasked: it answers nothing.
+      // A supply dip is reported without a request; it is no response.
       if (reply->error != xbus::kErrorPowerDip) return Answer::refused;
     }
     if (stop_.load(std::memory_order_acquire)) return Answer::stopped;
@@ -61,7 +63,8 @@ Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* repl
     if (r.status != DeviceStatus::ok) continue;
     const std::span<const std::uint8_t> got(bytes.data(), r.size);
     remember(got);
-    (void)stream_.accept(got);  // 512 bytes fit beside any frame that waits
+    // 512 bytes fit in addition to any incomplete frame.
+    (void)stream_.accept(got);
   }
 }
 
@@ -98,8 +101,8 @@ namespace {
 
 using namespace xbus;
 
-constexpr Duration kProbe = Duration::milliseconds(
-    500);  // a device that measures speaks within this, one that listens answers
+// A measuring device sends and a waiting one responds within this time.
+constexpr Duration kProbe = Duration::milliseconds(500);
 constexpr Duration kAfterReset = Duration::milliseconds(2500);
 
 DeviceStatus to_status(Answer answer) noexcept {
@@ -145,7 +148,7 @@ DeviceStatus Setup::find() {
       return status;
     }
     const std::string received = dialogue_.received_instead();
-    // At the wrong rate any device is noise: what is recognised outranks what is not.
+    // At a wrong rate any device looks like noise, so a recognised protocol takes precedence.
     if (!received.empty() && (instead.empty() || instead == "its bytes are no Xbus"))
       instead = received;
     if (dialogue_.messages_received() > 0)
@@ -200,7 +203,7 @@ Identity Setup::identified() {
   dialogue_.ask(MessageId::firmware_request, &reply_);
   if (reply_.answer == Answer::ok && reply_.size >= 3)
     std::copy_n(reply_.payload.begin(), 3, std::begin(found.firmware));
-  // The decision uses its capabilities: only the newer ones know an output configuration.
+  // Decides by capability: only newer devices support an output configuration.
   dialogue_.ask(MessageId::output_configuration, &reply_);
   if (reply_.answer == Answer::ok) {
     found.generation = Generation::mark4;
@@ -246,8 +249,7 @@ void Setup::set_baud(const Identity& identity) {
                        options_.baud));
   const std::array<std::uint8_t, 1> payload{*code};
   write(MessageId::baudrate, payload, "the baud rate");
-  // It holds from the next reset on; whether the answer to the reset still comes through does not
-  // matter.
+  // Takes effect at the next reset; whether that is still acknowledged is irrelevant.
   dialogue_.ask(MessageId::reset, {}, &reply_, Duration::milliseconds(100));
   const DeviceStatus status = probe(options_.baud, kAfterReset);
   if (status == DeviceStatus::timeout)
@@ -274,8 +276,8 @@ namespace {
 
 using namespace xbus;
 
-// Output configuration of an MTi-G: fixed point 16.32, so that a position keeps its digits; X
-// north, Y west, Z up as it comes.
+// Output configuration of an MTi-G: fixed point 16.32 for the precision of positions; X north, Y
+// west, Z up.
 constexpr std::uint16_t kLegacyMode =
     kModeOrientation | kModePosition | kModeVelocity | kModeStatus;
 constexpr std::uint32_t kLegacySettings =
@@ -291,7 +293,7 @@ void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
                                                   "its receiver cannot correct; "
                                                   "set ins.rate to 100 or 120",
                                                   rate_hz));
-  // With the receiver's own fix where the line has room for it.
+  // Includes the receiver's own fix if the link has room for it.
   MtdataLayout layout{static_cast<std::uint16_t>(kLegacyMode | kModeGnss), kLegacySettings};
   if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.mode = kLegacyMode;
   if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.settings &= ~kSettingsUtc;
@@ -381,7 +383,7 @@ OutputConfiguration requested_outputs(std::uint16_t rate_hz, bool utc) noexcept 
   return o;
 }
 
-/// The rate of an MTi-G-700/710 next to the one asked for.
+/// Nearest supported rate of an MTi-G-700/710.
 std::uint16_t nearest_rate(double rate_hz) noexcept {
   constexpr std::array<std::uint16_t, 15> kRates{1,  2,  4,  5,  8,   10,  16, 20,
                                                  25, 40, 50, 80, 100, 200, 400};
@@ -399,7 +401,7 @@ void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
   if (!line_budget(requested, baud_to_be()).fits()) requested = requested_outputs(rate, false);
   check_load(line_budget(requested, baud_to_be()), rate);
 
-  // Text output, while set, overrides everything else.
+  // Text output, if set, overrides everything else.
   dialogue_.ask(MessageId::string_output, &reply_);
   if (reply_.answer == Answer::ok && reply_.size == 2 && read_u16(reply_.bytes()) != 0) {
     constexpr std::array<std::uint8_t, 2> kOff{0, 0};
@@ -413,7 +415,7 @@ void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
     write(MessageId::output_configuration, std::span(bytes).first(n), "the outputs asked for");
     if (!read_output_configuration(reply_.bytes(), &has)) has = {};
   }
-  // It answers with what it took.
+  // The response contains the applied values.
   std::uint16_t taken = 0;
   for (const OutputEntry& e : has.items())
     if (e.id == wire_id(PacketId::quaternion)) taken = e.rate_hz;
@@ -439,7 +441,7 @@ void Setup::set_mark4_lines(StreamSettings* stream) {
   if (!read_sync_settings(reply_.bytes(), &has))
     refuse(DeviceStatus::unsupported,
            "its synchronisation settings cannot be read: this firmware is not known");
-  // The list replaces the old one: other entries, the receiver's clock among them, stay.
+  // The list replaces only its own entries; others, such as the receiver's clock, remain.
   SyncSettings requested;
   for (const SyncEntry& e : has.items())
     if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut)

@@ -14,45 +14,48 @@ namespace vergence::xsens {
 /// Result of a request.
 enum class Answer : std::uint8_t {
   ok,
-  refused,  // the device answered with an error: Reply::error
-  silent,   // nothing came in time
-  gone,     // the line is
-  stopped,  // we were told to
+  /// The device responded with an error: Reply::error.
+  refused,
+  /// No response in time.
+  silent,
+  /// The link is disconnected.
+  gone,
+  /// Stopped by `stop`.
+  stopped,
 };
 
 struct Reply {
   Answer answer = Answer::silent;
-  std::uint8_t error = 0;  // refused: the code
-  std::size_t size = 0;    // of the payload
+  /// Code of the error if refused.
+  std::uint8_t error = 0;
+  /// Size of the payload.
+  std::size_t size = 0;
   std::array<std::uint8_t, xbus::kMaxPayload> payload{};
   [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
     return {payload.data(), size};
   }
 };
 
-/// Questions and answers over an Xbus line, also while data keep streaming: what is no answer is
-/// passed over.
-///
-/// Not thread-safe. Does not allocate. Time: no call outlasts its limit (of the line's clock) by
-///          more than a read of 50 ms.
+/// Requests over an Xbus link, also while data are streaming: other messages are ignored. Not
+/// thread-safe. Does not allocate. No call exceeds its limit on the link's clock by more than a
+/// read of 50 ms.
 class RequestReply {
  public:
-  /// `stop`: while true, every question is `stopped`.
+  /// While `stop` is true, every request returns `stopped`.
   RequestReply(SerialLink& line, const std::atomic<bool>& stop) noexcept
       : line_(line), stop_(stop) {}
 
   static constexpr Duration kAnswerTime = Duration::milliseconds(500);
 
-  /// Asks, waits for the answer to this message, asks again every 150 ms until the limit.
+  /// Sends a request and waits for its response, repeating it every 150 ms until the limit.
   void ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply,
            Duration limit = kAnswerTime);
   void ask(xbus::MessageId id, Reply* reply) { ask(id, {}, reply); }
 
-  /// Describes received bytes that are no Xbus, for a message. Empty:
-  /// nothing was received.
+  /// Describes received bytes that are not Xbus, for a message; empty if nothing was received.
   [[nodiscard]] std::string received_instead() const;
   [[nodiscard]] std::uint64_t messages_received() const noexcept { return messages_; }
-  /// Forgets what was received: after a change of the baud rate.
+  /// Forgets the received bytes, after a change of the baud rate.
   void reset() noexcept;
 
  private:
@@ -63,28 +66,28 @@ class RequestReply {
   const std::atomic<bool>& stop_;
   xbus::FrameStream stream_;
   std::uint64_t messages_ = 0;
-  std::array<std::uint8_t, 512> received_{};  // the first bytes
+  // The first bytes received.
+  std::array<std::uint8_t, 512> received_{};
   std::size_t received_size_ = 0;
 };
 
-/// Finds a device on an open line, brings it into its configuration state and sets it, changing
-/// only what differs.
+/// Finds a device on an open link, brings it into its configuration state and changes only
+/// differing settings.
 ///
-/// Not thread-safe. Allocates. Time: find() up to a second for each baud rate, the rest
-///          at most a few seconds in all.
-/// Errors   Status and last_error(); a device that was found stays in its configuration state.
+/// find() takes up to a second per baud rate, the rest a few seconds in total. A device that was
+/// found stays in its configuration state on errors. Not thread-safe. Allocates.
 class Setup {
  public:
   Setup(SerialLink& line, const Options& options, const std::atomic<bool>& stop)
       : line_(line), options_(options), dialogue_(line, stop) {}
 
-  /// Tries the rate asked for, then the usual ones. → ok, not_found, disconnected, stopped
+  /// Tries the requested rate, then the usual ones. → ok, not_found, disconnected, stopped
   [[nodiscard]] DeviceStatus find();
-  /// Identifies the device; the generation is derived from its answer, not its name. → ok,
+  /// Identifies the device; the generation follows from its answer, not its name. → ok,
   /// unsupported, disconnected, stopped
   [[nodiscard]] DeviceStatus identify(Identity* identity);
-  /// Output, rate, lines and baud rate. → ok, unsupported, no_bandwidth, disconnected, stopped,
-  /// failed
+  /// Sets outputs, rate, synchronisation lines and baud rate. → ok, unsupported, no_bandwidth,
+  /// disconnected, stopped, failed
   [[nodiscard]] DeviceStatus set(const Identity& identity, double rate_hz, StreamSettings* stream);
   /// → ok, no_bandwidth, disconnected, stopped, failed
   [[nodiscard]] DeviceStatus measure();
@@ -93,7 +96,7 @@ class Setup {
 
  private:
   [[nodiscard]] DeviceStatus probe(std::uint32_t baud, Duration limit);
-  // Each ends with Refused where the device does not do it; last_error_ says why.
+  // Each throws Refused if the device refuses; last_error_ has the reason.
   [[nodiscard]] Identity identified();
   void set_legacy(double rate_hz, StreamSettings* stream);
   void set_mark4(double rate_hz, StreamSettings* stream);
@@ -104,7 +107,8 @@ class Setup {
   void write(xbus::MessageId id, std::span<const std::uint8_t> payload, const char* what);
   void check_load(const xbus::LineBudget& budget, double rate_hz);
   [[noreturn]] void refuse(DeviceStatus status, std::string message);
-  /// Answer to the newest request; `refused` if the device declined.
+  /// Throws Refused for the response to the newest request; `refused` is the status if the device
+  /// declined.
   [[noreturn]] void fail(const char* what, DeviceStatus refused = DeviceStatus::failed);
   [[nodiscard]] std::uint32_t baud_to_be() const noexcept {
     return options_.baud != 0 ? options_.baud : line_.baud();

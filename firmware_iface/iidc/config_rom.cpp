@@ -20,7 +20,8 @@ enum Key : std::uint8_t {
 struct Entry {
   std::uint8_t key = 0;
   std::uint32_t value = 0;
-  std::size_t at = 0;  // quadlet: offsets count from here
+  // Quadlet index from which offsets count.
+  std::size_t at = 0;
 };
 
 /// A directory whose entries all lie inside the ROM.
@@ -56,7 +57,8 @@ std::size_t target(const Entry& e) noexcept { return e.at + e.value; }
 
 void read_text(std::span<const std::uint32_t> rom, const std::optional<Entry>& leaf,
                std::array<char, 64>* text) noexcept {
-  constexpr std::size_t kBefore = 2;  // quadlets: character set and language
+  // Quadlets of character set and language.
+  constexpr std::size_t kBefore = 2;
   if (!leaf || target(*leaf) >= rom.size()) return;
   const std::size_t header = target(*leaf), quadlets = rom[header] >> 16U;
   if (quadlets > rom.size() - header - 1) return;
@@ -93,7 +95,8 @@ std::string_view to_string(RomStatus s) noexcept {
 
 RomStatus parse_config_rom(std::span<const std::uint32_t> quadlets, ConfigRom* rom) noexcept {
   const auto all = quadlets.first(std::min(quadlets.size(), kMaxRomQuadlets));
-  constexpr std::size_t kBusBlock = 5;  // header, name, capabilities, two of GUID
+  // Header, name, capabilities and two of the GUID.
+  constexpr std::size_t kBusBlock = 5;
   if (all.size() < kBusBlock + 1) return RomStatus::too_short;
   if (all[1] != kName1394) return RomStatus::not_1394;
   const std::size_t root_at = 1 + (all[0] >> 24U);

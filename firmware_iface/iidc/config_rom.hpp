@@ -5,35 +5,43 @@
 #include <span>
 #include <string_view>
 
-/// The configuration ROM of a camera (IEEE 1212): who it is and where its registers are.
+/// Configuration ROM of a camera (IEEE 1212): identity and address of the registers.
 namespace vergence::iidc {
 
-inline constexpr std::uint64_t kRegisterSpace =
-    0xFFFF'F000'0000;  // the last 256 MB of a node's 48-bit addresses
+/// Last 256 MB of a node's 48-bit address space.
+inline constexpr std::uint64_t kRegisterSpace = 0xFFFF'F000'0000;
 inline constexpr std::uint64_t kRomAddress = kRegisterSpace + 0x400;
-inline constexpr std::size_t kMaxRomQuadlets = 256;  // the ROM's window ends at 0x800
+/// The ROM's window ends at 0x800.
+inline constexpr std::size_t kMaxRomQuadlets = 256;
 
 enum class RomStatus : std::uint8_t {
   ok,
-  too_short,        // not even a bus information block
-  not_1394,         // the block does not say "1394"
-  broken_root,      // the root directory leaves the ROM
-  no_camera,        // no unit of the specifiers of IIDC or Point Grey
-  no_command_base,  // the unit does not say where its registers are
+  /// There is no complete bus information block.
+  too_short,
+  /// The block does not contain "1394".
+  not_1394,
+  /// The root directory exceeds the ROM.
+  broken_root,
+  /// There is no unit with a specifier of IIDC or Point Grey.
+  no_camera,
+  /// The unit lacks the address of its registers.
+  no_command_base,
 };
 [[nodiscard]] std::string_view to_string(RomStatus) noexcept;
 
 struct ConfigRom {
   std::uint64_t guid = 0;
-  std::uint64_t command_base = 0;  // address of the command registers
-  std::array<char, 64> model{};    // zero-terminated, printable ASCII; empty: the ROM has none
+  /// Address of the command registers.
+  std::uint64_t command_base = 0;
+  /// Zero-terminated, printable ASCII; empty if the ROM has none.
+  std::array<char, 64> model{};
 };
 
-/// Parses quadlets read from kRomAddress on; more than kMaxRomQuadlets are not looked at.
+/// Parses quadlets read from kRomAddress on, at most kMaxRomQuadlets.
 ///
-/// Time    Linear in the quadlets: directories are followed to depth three and never back.
-/// Errors  A status; *rom is written only when ok. No offset or length in the ROM is believed
-///         before it is checked. Checksums are not looked at: cameras in the field get them wrong.
+/// Takes linear time: directories are followed to depth three and never back. *rom is written only
+/// when ok. Every offset and length is checked before use. Checksums are ignored, because many
+/// cameras have wrong ones.
 [[nodiscard]] RomStatus parse_config_rom(std::span<const std::uint32_t> quadlets,
                                          ConfigRom* rom) noexcept;
 

@@ -3,17 +3,21 @@
 
 #include "firmware_iface/iidc/registers.hpp"
 
-/// Features: shutter, gain and the like, the trigger and the strobe outputs.
+/// Features such as shutter and gain, the trigger and the strobe outputs.
 namespace vergence::iidc {
 
-/// Those that the driver sets; the number is the place in every table of features.
+/// Features set by the driver; the number is their index in every table of features.
 enum class Feature : std::uint8_t {
   auto_exposure = 1,
   gamma = 6,
-  shutter = 7,         // absolute: s
-  gain = 8,            // absolute: dB
-  trigger_delay = 13,  // absolute: s
-  frame_rate = 15,     // absolute: Hz
+  /// Absolute value in s.
+  shutter = 7,
+  /// Absolute value in dB.
+  gain = 8,
+  /// Absolute value in s.
+  trigger_delay = 13,
+  /// Absolute value in Hz.
+  frame_rate = 15,
 };
 
 namespace reg {
@@ -37,11 +41,13 @@ struct FeatureInquiry {
 
 struct FeatureValue {
   bool present = false;
-  bool absolute = false;  // the absolute value rules
+  /// True if the absolute value is in effect.
+  bool absolute = false;
   bool one_push = false;
   bool on = false;
   bool automatic = false;
-  std::uint32_t value = 0;  // 12 bits
+  /// 12 bits.
+  std::uint32_t value = 0;
   [[nodiscard]] static constexpr FeatureValue of(std::uint32_t q) noexcept {
     return {(q & bit(31)) != 0, (q & bit(30)) != 0, (q & bit(26)) != 0,
             (q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 11, 0)};
@@ -54,11 +60,13 @@ struct FeatureValue {
 
 inline constexpr unsigned kTriggerSourceSoftware = 7;
 
-/// reg::kTriggerInquiry.
+/// Content of reg::kTriggerInquiry.
 struct TriggerInquiry {
   bool present = false, polarity = false, software = false;
-  std::uint8_t sources = 0;  // bit n: input n, 0 … 3
-  std::uint16_t modes = 0;   // bit n: mode n; 0 … 5, 14, 15 exist
+  /// Bit n stands for input n, 0 to 3.
+  std::uint8_t sources = 0;
+  /// Bit n stands for mode n; 0 to 5, 14 and 15 exist.
+  std::uint16_t modes = 0;
   [[nodiscard]] static constexpr TriggerInquiry of(std::uint32_t q) noexcept {
     TriggerInquiry t{(q & bit(31)) != 0, (q & bit(25)) != 0, (q & bit(16)) != 0, 0, 0};
     for (unsigned n = 0; n < 4; ++n)
@@ -78,24 +86,30 @@ struct TriggerInquiry {
   }
 };
 
-/// reg::kTriggerMode.
+/// Content of reg::kTriggerMode.
 struct TriggerMode {
   bool on = false;
-  bool rising = true;   // active high
-  unsigned source = 0;  // 0 … 3: inputs, kTriggerSourceSoftware
-  unsigned mode = 0;    // 0: one frame an edge; 14: the same, exposing during readout
+  /// Active high.
+  bool rising = true;
+  /// Input 0 to 3, or kTriggerSourceSoftware.
+  unsigned source = 0;
+  /// 0: one frame per edge; 14: the same, exposing during readout.
+  unsigned mode = 0;
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
     return bit(31) | (on ? bit(25) : 0) | (rising ? bit(24) : 0) | (source & 7U) << 21U |
            (mode & 15U) << 16U;
   }
 };
 
-/// Settings of one strobe output (reg::strobe::control). Times in 1/1024 ms.
+/// Settings of a strobe output (reg::strobe::control). Times are in 1/1024 ms.
 struct StrobeControl {
   bool on = false;
-  bool high = true;            // active level
-  std::uint32_t delay = 0;     // 12 bits, from the start of the exposure
-  std::uint32_t duration = 0;  // 12 bits; 0: as long as the exposure
+  /// Active level.
+  bool high = true;
+  /// 12 bits, from the start of the exposure.
+  std::uint32_t delay = 0;
+  /// 12 bits; 0: as long as the exposure.
+  std::uint32_t duration = 0;
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
     return bit(31) | (on ? bit(25) : 0) | (high ? bit(24) : 0) | (delay & 0xFFFU) << 12U |
            (duration & 0xFFFU);

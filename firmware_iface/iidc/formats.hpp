@@ -5,10 +5,11 @@
 #include <span>
 #include <string_view>
 
-/// Video formats: the fixed modes of formats 0 to 2, and the arithmetic of Format 7.
+/// Video formats: fixed modes of formats 0 to 2, and arithmetic of Format 7.
 namespace vergence::iidc {
 
-enum class ColorCoding : std::uint8_t {  // the number is the COLOR_CODING_ID
+/// The number is the COLOR_CODING_ID.
+enum class ColorCoding : std::uint8_t {
   mono8 = 0,
   yuv411 = 1,
   yuv422 = 2,
@@ -22,11 +23,12 @@ enum class ColorCoding : std::uint8_t {  // the number is the COLOR_CODING_ID
   raw16 = 10,
 };
 inline constexpr unsigned kColorCodings = 11;
-[[nodiscard]] std::string_view to_string(ColorCoding) noexcept;  // Mono8, YUV411 …
+/// Name such as Mono8 or YUV411.
+[[nodiscard]] std::string_view to_string(ColorCoding) noexcept;
 [[nodiscard]] std::optional<ColorCoding> color_coding(std::string_view name) noexcept;
 [[nodiscard]] unsigned bits_per_pixel(ColorCoding) noexcept;
 
-/// One mode of formats 0 to 2.
+/// Mode of formats 0 to 2.
 struct FixedMode {
   std::uint8_t format = 0, mode = 0;
   std::uint16_t width = 0, height = 0;
@@ -36,28 +38,31 @@ struct FixedMode {
 [[nodiscard]] std::size_t frame_bytes(unsigned width, unsigned height, ColorCoding coding) noexcept;
 
 inline constexpr unsigned kRates = 8;
-/// Frames a second of a rate code: 1.875 · 2^code.
+/// Frame rate in Hz of a rate code: 1.875 · 2^code.
 [[nodiscard]] constexpr double rate_of(unsigned code) noexcept {
   return 1.875 * static_cast<double>(1U << code);
 }
 
-/// Bytes of one packet of a fixed mode; 0: not a whole number of quadlets, such a rate does not
-/// exist. A frame of 30 Hz is 240 packets, of 768 lines 256: whole parts of lines travel together.
+/// Packet size of a fixed mode in bytes; 0 if it is not a whole number of quadlets, so that the
+/// rate does not exist. A frame at 30 Hz has 240 packets, or 256 with 768 lines, because packets
+/// carry whole fractions of lines.
 [[nodiscard]] std::size_t fixed_packet_bytes(const FixedMode& mode, unsigned rate_code) noexcept;
 
-inline constexpr double kCyclesPerSecond = 8000;  // each carries one packet of every camera
+/// Each cycle carries one packet of every camera.
+inline constexpr double kCyclesPerSecond = 8000;
 
 [[nodiscard]] constexpr std::size_t packets_for(std::size_t bytes,
                                                 std::size_t packet_bytes) noexcept {
   return packet_bytes == 0 ? 0 : (bytes + packet_bytes - 1) / packet_bytes;
 }
-/// Highest frame rate that packets of this size allow, with one cycle between two frames.
+/// Highest frame rate for packets of this size, with one cycle between two frames.
 [[nodiscard]] double packet_rate(std::size_t image_bytes, std::size_t packet_bytes) noexcept;
-/// The smallest packet, a multiple of `unit`, with packet_rate ≥ rate; 0: none up to `most`.
+/// Smallest packet size, a multiple of `unit`, with packet_rate ≥ rate; 0 if there is none up to
+/// `most`.
 [[nodiscard]] std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t unit,
                                           std::size_t most) noexcept;
 
-/// Point Grey's register of the colour filters holds a mosaic's first two rows in four letters;
+/// True if Point Grey's colour filter register has a mosaic's first two rows in four letters;
 /// `YYYY` or 0 is mono.
 [[nodiscard]] bool is_bayer_tile(std::uint32_t quadlet) noexcept;
 

@@ -10,15 +10,17 @@
 /// 0x12F8).
 namespace vergence::iidc {
 
-/// Items in the order in which they stand in the image; the number is the bit that enables them.
+/// Items in the order of the image; the number is the bit that enables them.
 enum class FrameInfoItem : std::uint8_t {
-  time = 0,  // CycleTime at the end of the exposure
+  /// CycleTime at the end of the exposure.
+  time = 0,
   gain = 1,
   shutter = 2,
   brightness = 3,
   exposure = 4,
   white_balance = 5,
-  counter = 6,  // exposures, also those that were not sent
+  /// Number of exposures, including those not sent.
+  counter = 6,
   strobe_pattern = 7,
   pins = 8,
   region = 9,
@@ -29,8 +31,8 @@ inline constexpr std::uint32_t kFrameInfoPresent = 0x8000'0000;
   return std::uint32_t{1} << static_cast<unsigned>(i);
 }
 
-/// Where each item stands, from what the register reads after it was written (bits that a camera
-/// lacks stay 0).
+/// Positions of the items, from the register's value after it was written (bits that a camera lacks
+/// stay 0).
 class FrameInfoLayout {
  public:
   FrameInfoLayout() noexcept { at_.fill(-1); }
@@ -39,9 +41,9 @@ class FrameInfoLayout {
   [[nodiscard]] bool has(FrameInfoItem i) const noexcept {
     return at_[static_cast<std::size_t>(i)] >= 0;
   }
-  /// Bytes at the beginning of the image that are no pixels.
+  /// Bytes at the beginning of the image that are not pixels.
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  /// The item's quadlet. Precondition: has(i), image.size() ≥ size().
+  /// Quadlet of the item. Precondition: has(i), image.size() ≥ size().
   [[nodiscard]] std::uint32_t read(FrameInfoItem i,
                                    std::span<const std::uint8_t> image) const noexcept;
 
@@ -50,21 +52,22 @@ class FrameInfoLayout {
   std::size_t size_ = 0;
 };
 
-/// A 32-bit counter that wraps, widened and re-based: the first value is 0.
+/// Unwraps a 32-bit counter so that the first value is 0.
 class CounterUnwrapper {
  public:
-  /// Distance of `counter` from the last one taken, as a signed number; 0 before the first.
+  /// Signed distance of `counter` from the last one taken; 0 before the first.
   [[nodiscard]] std::int64_t step(std::uint32_t counter) const noexcept {
     return known_ ? static_cast<std::int32_t>(counter - last_) : 0;
   }
-  /// Takes it. Precondition: known and step(counter) > 0, or not known.
+  /// Takes a counter. Precondition: step(counter) > 0, or not known.
   [[nodiscard]] std::uint64_t take(std::uint32_t counter) noexcept {
     if (known_) count_ += static_cast<std::uint64_t>(step(counter));
     known_ = true;
     last_ = counter;
     return count_;
   }
-  /// The device began anew: `counter` is the next exposure after the last one taken.
+  /// Continues after a restart of the device: `counter` is the next exposure after the last one
+  /// taken.
   [[nodiscard]] std::uint64_t rebase(std::uint32_t counter) noexcept {
     if (known_) ++count_;
     known_ = true;

@@ -1,11 +1,11 @@
 #pragma once
-/// The IIDC 1.31/1.32 digital camera protocol (1394 TA 2003017, 2004006) as pure functions and
-/// layouts: no I/O, no clock. The same registers are reached over IEEE 1394 and, on Point Grey's
+/// IIDC 1.31/1.32 digital camera protocol (1394 TA 2003017, 2004006) as layouts and pure functions,
+/// without I/O or clock. The same registers are accessed over IEEE 1394 and, on Point Grey's
 /// cameras, over USB.
 ///
-/// Quadlets are 32-bit values in the processor's order; a bus turns them (big-endian on 1394,
-/// little-endian on USB). Bits are numbered as in C, bit 31 the most significant one; the documents
-/// of IIDC number the other way.
+/// Quadlets are 32-bit values in host byte order; the bus swaps them (big-endian on 1394,
+/// little-endian on USB). Bits are numbered as in C, with bit 31 the most significant; the IIDC
+/// documents number in reverse.
 #include "firmware_iface/iidc/bandwidth.hpp"
 #include "firmware_iface/iidc/config_rom.hpp"
 #include "firmware_iface/iidc/cycle_time.hpp"

@@ -6,8 +6,10 @@
 namespace vergence::nmea {
 namespace {
 
-constexpr double kKnot = 1852.0 / 3600.0;  // m/s
-constexpr std::size_t kAddress = 5;        // talker and type
+// In m/s.
+constexpr double kKnot = 1852.0 / 3600.0;
+// Talker and type.
+constexpr std::size_t kAddress = 5;
 constexpr std::size_t kMaxDigits = 20;
 
 bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
@@ -47,8 +49,9 @@ std::optional<int> digits(std::string_view text, std::size_t n) noexcept {
 std::optional<std::int64_t> time_of_day(std::string_view text) noexcept {
   const auto clock = digits(text, 6);
   if (!clock) return std::nullopt;
+  // A second of 60 is a leap second.
   const int hour = *clock / 10000, minute = *clock / 100 % 100, second = *clock % 100;
-  if (hour > 23 || minute > 59 || second > 60) return std::nullopt;  // 60: a leap second
+  if (hour > 23 || minute > 59 || second > 60) return std::nullopt;
   std::int64_t ns = (hour * 3600LL + minute * 60LL + second) * 1'000'000'000;
   if (text.size() == 6) return ns;
   if (text[6] != '.' || text.size() > 6 + 1 + 9) return std::nullopt;
@@ -88,7 +91,8 @@ std::optional<double> angle(std::string_view text, std::string_view side, char p
 }
 
 struct Fields {
-  std::array<std::string_view, kMaxFields> at{};  // missing ones are empty
+  // Missing fields are empty.
+  std::array<std::string_view, kMaxFields> at{};
 };
 
 bool split(std::string_view body, Fields* fields) noexcept {

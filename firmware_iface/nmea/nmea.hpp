@@ -7,61 +7,73 @@
 #include <string_view>
 
 /// NMEA 0183 sentences of a satellite receiver or compass: framing, checksum, and the fields of
-/// GGA, RMC, VTG, GST and HDT, from any talker (GP, GN, GL, GA, HE, …). Pure functions over bytes
-/// the caller owns.
+/// GGA, RMC, VTG, GST and HDT from any talker (GP, GN, GL, GA, HE, …). Pure functions over the
+/// caller's bytes.
 namespace vergence::nmea {
 
-/// Characters between `$` and the line's end. The standard has 79; receivers with more decimals
-/// send more.
+/// Maximum number of characters between `$` and the line's end. The standard has 79; receivers with
+/// more decimals send more.
 inline constexpr std::size_t kMaxCharacters = 120;
 inline constexpr std::size_t kMaxFields = 24;
 
 enum class Type : std::uint8_t { other, gga, rmc, vtg, gst, hdt };
 
-/// Content of a sentence; absent: the field is empty or makes no sense. Degrees, m, m/s.
+/// Content of a sentence. A field is absent if it is empty or invalid.
 struct Sentence {
   Type type = Type::other;
-  std::optional<std::int64_t> time_of_day_ns;  // UTC
-  std::optional<std::int32_t> days;            // since 1970-01-01, of RMC
+  /// UTC.
+  std::optional<std::int64_t> time_of_day_ns;
+  /// Days since 1970-01-01, of RMC.
+  std::optional<std::int32_t> days;
   std::optional<double> latitude_deg, longitude_deg;
-  std::optional<double> altitude_m;   // above the geoid (GGA)
-  std::optional<double> geoid_m;      // geoid above the ellipsoid (GGA)
-  std::optional<double> speed;        // m/s over ground
-  std::optional<double> course_deg;   // clockwise from true north, of the motion
-  std::optional<double> heading_deg;  // the same, of the body (HDT)
+  /// Altitude above the geoid (GGA).
+  std::optional<double> altitude_m;
+  /// Height of the geoid above the ellipsoid (GGA).
+  std::optional<double> geoid_m;
+  /// Speed over ground in m/s.
+  std::optional<double> speed;
+  /// Direction of motion, clockwise from true north.
+  std::optional<double> course_deg;
+  /// Heading of the body, clockwise from true north (HDT).
+  std::optional<double> heading_deg;
   std::optional<double> hdop;
-  std::optional<double> latitude_sigma_m, longitude_sigma_m, altitude_sigma_m;  // GST
-  std::uint8_t quality = 0;  // GGA: 0 none, 1 to 5 a fix, 6 dead reckoning, …
+  /// Of GST.
+  std::optional<double> latitude_sigma_m, longitude_sigma_m, altitude_sigma_m;
+  /// Of GGA: 0 none, 1 to 5 a fix, 6 dead reckoning, …
+  std::uint8_t quality = 0;
   std::uint8_t satellites = 0;
-  bool valid = false;  // RMC: status A
+  /// True for status A of RMC.
+  bool valid = false;
 };
 
 enum class Status : std::uint8_t { ok, no_checksum, checksum_wrong, malformed };
 
-/// A line without `$` and line end: `GPGGA,…*47`. Another type than those above is ok and `other`.
+/// Parses a line without `$` and line end: `GPGGA,…*47`. Other types are ok and `other`.
 [[nodiscard]] Status parse(std::string_view line, Sentence* sentence) noexcept;
 
 /// XOR of the characters between `$` and `*`.
 [[nodiscard]] std::uint8_t checksum(std::string_view body) noexcept;
 
 struct StreamCounters {
-  std::uint64_t sentences = 0;       // with the right checksum
-  std::uint64_t checksum_wrong = 0;  // also those without one
-  std::uint64_t malformed = 0;       // too long, or cut off by the next one
-  std::uint64_t garbage_bytes = 0;   // outside sentences
+  /// Sentences with a correct checksum.
+  std::uint64_t sentences = 0;
+  /// Includes sentences without a checksum.
+  std::uint64_t checksum_wrong = 0;
+  /// Sentences that are too long or cut off by the next one.
+  std::uint64_t malformed = 0;
+  /// Bytes outside sentences.
+  std::uint64_t garbage_bytes = 0;
 };
 
-/// Bytes into sentences, byte by byte, in place.
-///
-/// Threads  One caller. Memory: fixed. Errors: counted.
+/// Splits bytes into sentences, in place. One caller. Fixed memory. Errors are counted.
 class SentenceStream {
  public:
-  /// True: this byte completed a sentence; `bytes` of it are counted from `$`.
+  /// Returns true if this byte completes a sentence.
   [[nodiscard]] bool accept(std::uint8_t byte, Sentence* sentence) noexcept;
-  /// The apparent start of a sentence was none.
+  /// Discards an incomplete sentence.
   void abandon() noexcept { inside_ = false; }
   [[nodiscard]] const StreamCounters& counters() const noexcept { return counters_; }
-  /// Bytes of the newest sentence, from `$` to its CR LF.
+  /// Size of the newest sentence in bytes, from `$` to CR LF.
   [[nodiscard]] std::size_t size() const noexcept { return last_size_; }
 
  private:

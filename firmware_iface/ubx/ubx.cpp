@@ -28,7 +28,8 @@ std::array<std::uint8_t, 2> checksum(Bytes b) noexcept {
 }
 
 std::int64_t days_since_1970(int year, int month, int day) noexcept {
-  const int shifted = (month + 9) % 12;  // from March on: a leap day is a year's last
+  // Counts from March, so that a leap day is a year's last.
+  const int shifted = (month + 9) % 12;
   if (month <= 2) --year;
   return 365LL * year + year / 4 - year / 100 + year / 400 + (153 * shifted + 2) / 5 + day - 1 -
          719468;

@@ -6,14 +6,17 @@
 #include <span>
 
 /// u-blox UBX: frames and the navigation solution NAV-PVT (u-blox 7 on; protocol version 14 and
-/// later). Layout as in the interface descriptions of u-blox M8 and F9. Pure functions over bytes
-/// the caller owns.
+/// later). Layout as in the interface descriptions of u-blox M8 and F9. Pure functions over the
+/// caller's bytes.
 namespace vergence::ubx {
 
 inline constexpr std::uint8_t kSync1 = 0xB5, kSync2 = 0x62;
-inline constexpr std::size_t kOverhead = 8;       // sync, class, id, length, two of checksum
-inline constexpr std::size_t kMaxPayload = 2048;  // longer ones are refused: no length to wait for
-inline constexpr std::size_t kMinPvt = 84;        // u-blox 7; 92 from u-blox 8 on
+/// Sync, class, id, length and two bytes of checksum.
+inline constexpr std::size_t kOverhead = 8;
+/// Longer frames are refused, so that a false length causes no long wait.
+inline constexpr std::size_t kMaxPayload = 2048;
+/// Size for u-blox 7; 92 from u-blox 8 on.
+inline constexpr std::size_t kMinPvt = 84;
 
 struct Frame {
   std::uint8_t message_class = 0, id = 0;
@@ -23,26 +26,34 @@ struct Frame {
 
 enum class FixType : std::uint8_t { none, dead_reckoning, fix_2d, fix_3d, combined, time_only };
 
-/// NAV-PVT. Absent: the receiver says that it is not valid.
+/// NAV-PVT. A value is absent if the receiver marks it as invalid.
 struct Pvt {
-  std::optional<std::int64_t> utc_ns;  // since 1970, date and time fully resolved
+  /// UTC since 1970, with date and time fully resolved.
+  std::optional<std::int64_t> utc_ns;
   FixType fix = FixType::none;
-  bool fix_ok = false;  // within the receiver's limits
+  /// True if within the receiver's limits.
+  bool fix_ok = false;
   std::uint8_t satellites = 0;
   double latitude_deg = 0, longitude_deg = 0;
-  double height_m = 0;                                  // above the ellipsoid
-  double horizontal_sigma_m = 0, vertical_sigma_m = 0;  // the receiver's accuracy estimates
-  std::array<double, 3> velocity_ned{};                 // m/s
-  double ground_speed = 0, speed_sigma = 0;             // m/s
-  double course_deg = 0, course_sigma_deg = 0;          // of the motion, clockwise from true north
-  std::optional<double> heading_deg;                    // of the vehicle (sensor fusion)
+  /// Height above the ellipsoid.
+  double height_m = 0;
+  /// Accuracy estimates of the receiver.
+  double horizontal_sigma_m = 0, vertical_sigma_m = 0;
+  /// In m/s.
+  std::array<double, 3> velocity_ned{};
+  /// In m/s.
+  double ground_speed = 0, speed_sigma = 0;
+  /// Direction of motion, clockwise from true north.
+  double course_deg = 0, course_sigma_deg = 0;
+  /// Heading of the vehicle (sensor fusion).
+  std::optional<double> heading_deg;
   double position_dop = 0;
 };
 
-/// False: too short, or a field that cannot be; *pvt untouched.
+/// Returns false, with *pvt unchanged, if it is too short or a field is invalid.
 [[nodiscard]] bool decode_pvt(std::span<const std::uint8_t> payload, Pvt* pvt) noexcept;
 
-/// Writes a frame. → its size; 0: it does not fit
+/// Writes a frame. Returns its size; 0 if it does not fit.
 [[nodiscard]] std::size_t write_frame(std::uint8_t message_class, std::uint8_t id,
                                       std::span<const std::uint8_t> payload,
                                       std::span<std::uint8_t> out) noexcept;
@@ -54,17 +65,15 @@ struct StreamCounters {
   std::uint64_t frame_bytes = 0, garbage_bytes = 0;
 };
 
-/// Bytes into frames, however they are cut. After a refused frame the search goes on at its second
-/// byte.
-///
-/// Threads  One caller. Memory: in place. Errors: counted.
+/// Splits bytes into frames, whatever the sizes of the reads. After a refused frame the search
+/// continues at its second byte. One caller. Fixed memory. Errors are counted.
 class FrameStream {
  public:
-  /// Takes as many bytes as there is room for. → how many; all, once next() has said false
+  /// Takes as many bytes as fit and returns their number; all, once next() has returned false.
   [[nodiscard]] std::size_t accept(std::span<const std::uint8_t> bytes) noexcept;
-  /// The payload lives until the next call of accept(). False: no whole frame.
+  /// Returns false without a complete frame. The payload is valid until the next accept().
   [[nodiscard]] bool next(Frame* frame) noexcept;
-  /// The apparent start of a frame was none: the search goes on behind it.
+  /// Discards an incomplete frame and continues the search behind its start.
   void abandon() noexcept;
   [[nodiscard]] std::size_t waiting() const noexcept { return end_ - begin_; }
   [[nodiscard]] const StreamCounters& counters() const noexcept { return counters_; }

@@ -4,8 +4,7 @@
 #include <cstdint>
 #include <span>
 
-/// Big-endian numbers as they stand in Xbus payloads. Precondition of all: the span is as long as
-/// the type says.
+/// Big-endian numbers of Xbus payloads. Precondition: the span is at least as long as the type.
 namespace vergence::xbus {
 
 [[nodiscard]] constexpr std::uint16_t read_u16(std::span<const std::uint8_t> b) noexcept {
@@ -27,12 +26,12 @@ namespace vergence::xbus {
 [[nodiscard]] constexpr double read_float64(std::span<const std::uint8_t> b) noexcept {
   return std::bit_cast<double>(read_u64(b));
 }
-/// 12.20: a signed 32-bit count of 2⁻²⁰, range ±2048.
+/// Format 12.20: a signed 32-bit count of 2⁻²⁰, range ±2048.
 [[nodiscard]] constexpr double read_fp12_20(std::span<const std::uint8_t> b) noexcept {
   return static_cast<double>(read_i32(b)) / 1048576.0;
 }
-/// 16.32: the 32-bit fraction first, then the signed 16-bit integer part; 48 bits, so a double
-/// holds it exactly.
+/// Format 16.32: the 32-bit fraction, then the signed 16-bit integer part; a double holds its 48
+/// bits exactly.
 [[nodiscard]] constexpr double read_fp16_32(std::span<const std::uint8_t> b) noexcept {
   return static_cast<double>(static_cast<std::int16_t>(read_u16(b.subspan(4)))) +
          static_cast<double>(read_u32(b)) / 4294967296.0;
@@ -55,7 +54,7 @@ constexpr void write_u64(std::span<std::uint8_t> b, std::uint64_t v) noexcept {
 /// of the output settings (MTData).
 enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, float64 = 3 };
 
-/// Bytes of one number.
+/// Size of one number in bytes.
 [[nodiscard]] constexpr std::size_t size_of(NumberFormat format) noexcept {
   return format == NumberFormat::fp16_32 ? 6 : format == NumberFormat::float64 ? 8 : 4;
 }
@@ -72,11 +71,12 @@ enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, 
     case NumberFormat::float64:
       return read_float64(b);
   }
-  return 0;  // not reached: two bits have four values
+  // Not reached, because two bits have four values.
+  return 0;
 }
 
-/// Rounds to the format; outside a fixed-point format's range its nearest end. Not a number becomes
-/// 0 in fixed point.
+/// Rounds to the format and clamps to the range of a fixed-point format. NaN becomes 0 in fixed
+/// point.
 void write_number(std::span<std::uint8_t> b, NumberFormat format, double value) noexcept;
 
 }  // namespace vergence::xbus

@@ -56,7 +56,8 @@ std::optional<std::uint32_t> baud_of_code(std::uint8_t code) noexcept {
 }
 
 std::optional<std::uint16_t> period_of_rate(double rate_hz) noexcept {
-  constexpr double kMin = 10, kMax = 512;  // Hz
+  // In Hz.
+  constexpr double kMin = 10, kMax = 512;
   if (!(rate_hz >= kMin && rate_hz <= kMax)) return std::nullopt;
   const double period = std::round(kPeriodClock / rate_hz);
   if (std::abs(kPeriodClock / period - rate_hz) > 1e-6 * rate_hz) return std::nullopt;

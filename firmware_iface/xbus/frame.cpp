@@ -9,8 +9,10 @@
 namespace vergence::xbus {
 namespace {
 
-constexpr std::size_t kShortHeader = 4;     // FA, bus, id, length
-constexpr std::size_t kExtendedHeader = 6;  // and two bytes of length
+// FA, bus, id and length.
+constexpr std::size_t kShortHeader = 4;
+// Adds two bytes of length.
+constexpr std::size_t kExtendedHeader = 6;
 constexpr std::size_t kLongestShortPayload = 254;
 
 std::uint8_t sum(std::span<const std::uint8_t> bytes) noexcept {
@@ -75,7 +77,8 @@ std::size_t FrameStream::accept(std::span<const std::uint8_t> bytes) noexcept {
 }
 
 bool FrameStream::next(Message* message) noexcept {
-  while (begin_ < end_) {  // every turn returns or skips at least a byte
+  // Every round returns or skips at least a byte.
+  while (begin_ < end_) {
     const ParsedFrame frame = parse_frame({buffer_.data() + begin_, end_ - begin_});
     switch (frame.status) {
       case FrameStatus::ok:

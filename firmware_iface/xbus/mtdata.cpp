@@ -7,13 +7,16 @@ namespace vergence::xbus {
 namespace {
 
 constexpr std::size_t kRawSize = 20;
-constexpr std::size_t kBeforeAccuracies = 31;  // air pressure, time, position and velocity of a fix
+// Air pressure, time, position and velocity of a fix.
+constexpr std::size_t kBeforeAccuracies = 31;
 constexpr std::uint16_t kModesKnown = kModeTemperature | kModeCalibrated | kModeOrientation |
                                       kModeAuxiliary | kModePosition | kModeVelocity | kModeStatus |
                                       kModeGnss | kModeRaw;
 constexpr std::uint32_t kOrientationBits = 0xC;
-constexpr std::uint32_t kPlaceBits = 0x7U << 14U;  // 0: latitude, longitude, altitude on WGS84
-constexpr std::uint32_t kSpeedBits = 0x3U << 17U;  // 0: m/s along x, y, z
+// 0 means latitude, longitude and altitude on WGS 84.
+constexpr std::uint32_t kPlaceBits = 0x7U << 14U;
+// 0 means m/s along x, y, z.
+constexpr std::uint32_t kSpeedBits = 0x3U << 17U;
 
 /// Walks a payload in the layout's order; reading and writing differ only in what happens to a
 /// field. `Fields` has fix(), numbers(span of doubles by optional), u8(), u16(), utc(): each takes

@@ -10,7 +10,8 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr std::size_t kPacketHeader = 3;  // id, id, size
+// Two bytes of id and one of size.
+constexpr std::size_t kPacketHeader = 3;
 constexpr std::size_t kPvtSize = 94;
 constexpr std::size_t kSatelliteHeader = 8;
 

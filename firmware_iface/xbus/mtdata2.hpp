@@ -7,12 +7,12 @@
 
 #include "firmware_iface/xbus/values.hpp"
 
-/// MTData2 (message 36) of MTi-G-700/710 and their kin: packets of id (16 bits), size (8 bits),
-/// data; all big endian. Every packet is optional in every message, in any order: parse the whole
-/// message, then use its stamps.
+/// MTData2 (message 36) of MTi-G-700/710 and related devices: packets of id (16 bits), size (8
+/// bits) and data, big endian. All packets are optional and in any order, so stamps are valid only
+/// after the whole message was parsed.
 namespace vergence::xbus {
 
-/// Ids of the packets, without number format (+ 0 … 3) and frame (+ 0 ENU, + 4 NED, + 8 NWU).
+/// Ids of packets, without number format (+ 0 … 3) and frame (+ 0 ENU, + 4 NED, + 8 NWU).
 enum class PacketId : std::uint16_t {
   temperature = 0x0810,
   utc = 0x1010,
@@ -43,14 +43,14 @@ enum class PacketId : std::uint16_t {
 [[nodiscard]] constexpr PacketId packet_id(std::uint16_t id) noexcept {
   return static_cast<PacketId>(id & 0xFFF0U);
 }
-/// An id as it stands on the wire.
+/// Id as transmitted.
 [[nodiscard]] constexpr std::uint16_t wire_id(PacketId id,
                                               NumberFormat format = NumberFormat::float32,
                                               LocalFrame frame = LocalFrame::enu) noexcept {
   return static_cast<std::uint16_t>(static_cast<unsigned>(id) | static_cast<unsigned>(format) |
                                     (static_cast<unsigned>(frame) << 2U));
 }
-/// Bytes of a packet's data; nothing: not known, or not fixed.
+/// Size of a packet's data in bytes; empty if unknown or variable.
 [[nodiscard]] std::optional<std::size_t> packet_size(std::uint16_t id) noexcept;
 
 /// Bits of the status word (status_word); the status byte is its lowest eight.
@@ -65,19 +65,19 @@ inline constexpr std::uint32_t kStatusSyncOutMarker = 1U << 22U;
   return (status_word >> 23U) & 7U;
 }
 
-/// One packet as it stands in the payload.
+/// Packet in a payload.
 struct Packet {
   std::uint16_t id = 0;
   std::span<const std::uint8_t> data{};
 };
 
-/// Walks over a payload. Ends: each packet is at least three bytes.
+/// Iterates over a payload. Terminates, because each packet has at least three bytes.
 class PacketReader {
  public:
   explicit PacketReader(std::span<const std::uint8_t> payload) noexcept : rest_(payload) {}
-  /// The next packet. False: the payload is used up, or torn(); *packet untouched.
+  /// Returns the next packet. If false, the payload is at its end or torn(), and *packet unchanged.
   [[nodiscard]] bool next(Packet* packet) noexcept;
-  /// The rest is no whole packet: the message is false, whatever its checksum says.
+  /// True if the rest is no complete packet; the message is then invalid despite its checksum.
   [[nodiscard]] bool torn() const noexcept { return !rest_.empty(); }
 
  private:
@@ -86,42 +86,48 @@ class PacketReader {
 
 /// Quality of the fix from GNSS position, velocity and time (7010).
 struct GnssPvt {
-  std::uint8_t fix =
-      0;  // 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time only
-  std::uint8_t flags = 0;  // 1 fix ok, 2 differential, 20h heading of vehicle valid
+  /// 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time only.
+  std::uint8_t fix = 0;
+  /// Bits: 1 fix ok, 2 differential, 20h heading of vehicle valid.
+  std::uint8_t flags = 0;
   std::uint8_t satellites = 0;
-  std::uint32_t horizontal_accuracy_mm = 0, vertical_accuracy_mm = 0;  // FFFFFFFF without fix
+  /// FFFFFFFF without a fix.
+  std::uint32_t horizontal_accuracy_mm = 0, vertical_accuracy_mm = 0;
   std::uint32_t speed_accuracy_mm_s = 0;
-  std::uint16_t position_dop_1e2 = 0;  // 9999 without fix
+  /// 9999 without a fix.
+  std::uint16_t position_dop_1e2 = 0;
 };
 
-/// Fields of a message that an INS sample uses; absent: the message had no such
-/// packet, or one of a size or with a number that the field cannot have. Units as in the names.
+/// Fields of a message that an INS sample uses; absent without the packet, or if its size or number
+/// is invalid. Units as in the names.
 struct Mtdata2 {
-  std::optional<std::uint16_t> packet_counter;  // steps by one with every message, of any content
-  std::optional<std::uint32_t>
-      sample_time_fine;  // 0.1 ms; wraps at 864 000 000 (one day) or 2³², by generation
+  /// Increases by one with every message, whatever its content.
+  std::optional<std::uint16_t> packet_counter;
+  /// In 0.1 ms; wraps at 864 000 000 (one day) or 2³², by generation.
+  std::optional<std::uint32_t> sample_time_fine;
   std::optional<Utc> utc;
   std::optional<std::uint8_t> status_byte;
   std::optional<std::uint32_t> status_word;
-  std::optional<std::array<double, 4>> quaternion;  // w x y z, sensor → local frame
+  /// Quaternion w x y z, sensor → local frame.
+  std::optional<std::array<double, 4>> quaternion;
   LocalFrame orientation_frame = LocalFrame::enu;
   std::optional<std::array<double, 2>> latitude_longitude_deg;
   std::optional<double> altitude_ellipsoid_m;
-  std::optional<Three> velocity;  // m/s, in velocity_frame
+  /// In m/s, in velocity_frame.
+  std::optional<Three> velocity;
   LocalFrame velocity_frame = LocalFrame::enu;
   std::optional<GnssPvt> gnss_pvt;
-  bool satellites = false;  // there was a list of satellites (7020)
+  /// True if there was a list of satellites (7020).
+  bool satellites = false;
 };
 
-/// Puts packets one behind the other into a payload.
-///
-/// Memory  The caller's. Errors  What does not fit is not written, and full() says so from then on.
+/// Appends packets to a payload in the caller's memory. A packet that does not fit is not written,
+/// and full() is true from then on.
 class PacketWriter {
  public:
   explicit PacketWriter(std::span<std::uint8_t> out) noexcept : out_(out) {}
   void put(std::uint16_t id, std::span<const std::uint8_t> data) noexcept;
-  /// Numbers in the format of the id's lowest two bits; at most nine.
+  /// Writes at most nine numbers in the format of the id's lowest two bits.
   void put_numbers(std::uint16_t id, std::span<const double> values) noexcept;
   void put_u16(std::uint16_t id, std::uint16_t value) noexcept;
   void put_u32(std::uint16_t id, std::uint32_t value) noexcept;
@@ -136,8 +142,9 @@ class PacketWriter {
   bool full_ = false;
 };
 
-/// Decodes a message's payload. False: it is torn, *out untouched. A packet's length outranks its
-/// id's format bits: firmware has been seen to announce a double and send four bytes.
+/// Decodes a message's payload. Returns false, with *out unchanged, if it is truncated. A packet's
+/// length takes precedence over its id's format bits, because some firmware announces a double and
+/// sends four bytes.
 ///
 ///     Message message;  // of a FrameStream
 ///     Mtdata2 data;

@@ -85,8 +85,8 @@ std::int64_t unix_ns(const Utc& utc) noexcept {
 Utc utc_of_unix_ns(std::int64_t ns, std::uint8_t flags) noexcept {
   std::int64_t day = ns / kDayNs, of_day = ns % kDayNs;
   if (of_day < 0) --day, of_day += kDayNs;
-  int year = static_cast<int>(
-      1970 + day * 400 / 146'097);  // within a year; 146 097 days are four centuries
+  // Exact within a year; 146 097 days are four centuries.
+  int year = static_cast<int>(1970 + day * 400 / 146'097);
   while (days_before(year + 1) <= day) ++year;
   while (days_before(year) > day) --year;
   std::int64_t left = day - days_before(year);

@@ -1,7 +1,7 @@
 #pragma once
-/// Protocols of XSens sensors: the frames (Xbus), the data of both generations
-/// (MTData of the MTi-G, MTData2 of the MTi-G-700/710), what can be asked and set, and how much of
-/// a line it takes. Pure functions over bytes the caller owns; no line, no clock, no thread.
+/// Protocols of XSens sensors: frames (Xbus), data of both generations (MTData of the MTi-G,
+/// MTData2 of the MTi-G-700/710), requests and settings, and the load on a serial link. Pure
+/// functions over the caller's bytes, without I/O, clock or threads.
 #include "firmware_iface/xbus/configuration.hpp"
 #include "firmware_iface/xbus/frame.hpp"
 #include "firmware_iface/xbus/line_budget.hpp"

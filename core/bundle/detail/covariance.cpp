@@ -16,7 +16,7 @@ using Index = Eigen::Index;
 
 constexpr double kPivotTolerance = 1e-12;
 
-/// Rows of θ_S that are estimated, and those that are held but uncertain.
+/// Rows of θ_S that are estimated, and rows that are fixed but uncertain.
 struct Partition {
   int estimated[kMaxShared], held[kMaxShared];
   double held_variance[kMaxShared];
@@ -45,8 +45,8 @@ Partition partition(const SharedLayout& s, const BundleProblem& problem,
   return p;
 }
 
-/// K = L_SI L_II⁻¹ in the place of L_SI: what a pose's gradient adds to that of θ_S once the poses
-/// are eliminated.
+/// Replaces L_SI by K = L_SI L_II⁻¹, a pose gradient's contribution to that of θ_S after
+/// eliminating the poses.
 void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t size) noexcept {
   for (std::size_t c = first; c-- > 0;) {
     double* column = A + c * ld;
@@ -60,8 +60,8 @@ void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t s
   }
 }
 
-/// Prior in addition to the tracks: its information in H, and the variance that it brings into the
-/// gradient (clusters of their own).
+/// Prior in addition to the tracks: its information, and its contribution to the gradient's
+/// variance as a separate cluster.
 struct KnownBeside {
   Shared information, variance;
 };
@@ -91,8 +91,8 @@ KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem,
   return known;
 }
 
-/// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ; its first
-/// columns are the rows that there are.
+/// Matrix from the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ;
+/// only its first columns are used.
 Mat6 to_published(const SharedLayout& s, const KernelCamera& camera, const Transform& T,
                   int k) noexcept {
   Mat6 turn = Mat6::Zero();
@@ -110,13 +110,13 @@ Mat6 published(const Shared& estimated, const SharedLayout& s, const KernelCamer
   return to * rows * to.transpose();
 }
 
-/// A row of θ_S as rows of RigCovariance with their factors.
+/// A row of θ_S as a combination of rows of RigCovariance.
 struct PublishedRow {
   int first = 0, count = 0;
   double factor[6]{};
 };
 
-/// The joint covariance of what is estimated and what is held, in RigCovariance's order.
+/// Writes the joint covariance of estimated and fixed parameters in RigCovariance's order.
 void publish_all(const Shared& joint, const PublishedRow* rows, RigCovariance* out) noexcept {
   const auto n = static_cast<int>(joint.rows());
   for (int a = 0; a < n; ++a)
@@ -129,7 +129,7 @@ void publish_all(const Shared& joint, const PublishedRow* rows, RigCovariance* o
         }
 }
 
-/// Σ w|ε|²/σ² over what is left after the parameters.
+/// Σ w|ε|²/σ² over the degrees of freedom.
 double residual_variance(const BundleWorkspace& w, const BundleProblem& problem, const Partition& p,
                          double weighted) noexcept {
   const double freedom = 2.0 * static_cast<double>(problem.observations.size()) -
@@ -202,8 +202,8 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem,
       joint(p.estimated_count + c, p.estimated_count + c) = p.held_variance[c];
   }
   joint.topLeftCorner(p.estimated_count, p.estimated_count) = wide;
-  // Extrinsics are the first rows of θ_S and of the estimated ones alike; intrinsics are found by
-  // their place in the partition.
+  // Extrinsics are the first rows of both θ_S and the estimated ones; the partition gives the rows
+  // of intrinsics.
   for (std::size_t k = 1; k < problem.cameras.size(); ++k) {
     const int number = static_cast<int>(k);
     const KernelCamera& camera = system.job().cameras[k];

@@ -1,4 +1,4 @@
-// The dense half of a step: Y Yᵀ and Cholesky. Built once per SIMD target (see kernels.hpp).
+// Dense part of a step: Y Yᵀ and Cholesky. Compiled once per SIMD target (see kernels.hpp).
 #include <algorithm>
 #include <cmath>
 
@@ -21,23 +21,25 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, kBatch>;
 using V = hn::Vec<D>;
 
-// Accumulators of one tile: with 32 registers six rows by three columns, with 16 three by three.
+// Rows of a tile's accumulators: six by three columns with 32 registers, three by three with 16.
 #if HWY_TARGET <= HWY_AVX3 || HWY_ARCH_ARM_A64
 constexpr int kTileRows = 6;
 #else
 constexpr int kTileRows = 3;
 #endif
 
-/// One 6×6 block of Y, the same place in each batch of a group.
+/// One 6×6 block of Y at the same position in each batch of a group.
 struct YBlock {
   const double* first;
-  std::size_t stride;  // doubles from batch to batch
-  std::int32_t row;    // in A
+  // Number of doubles between batches.
+  std::size_t stride;
+  // Row in A.
+  std::int32_t row;
 };
 
 #if HWY_TARGET == HWY_SCALAR
 
-/// at[0] −= x, at[1] −= y.
+/// Computes at[0] −= x, at[1] −= y.
 HWY_INLINE void subtract_sums(V x, V y, double* at) {
   at[0] -= hn::GetLane(x);
   at[1] -= hn::GetLane(y);
@@ -45,7 +47,7 @@ HWY_INLINE void subtract_sums(V x, V y, double* at) {
 
 #else
 
-/// Folds a vector of pairs (x, y, x, y, …) to one pair.
+/// Sums a vector of pairs (x, y, x, y, …) to one pair.
 template <class DPairs>
 HWY_INLINE hn::Vec<hn::FixedTag<double, 2> > fold_pairs([[maybe_unused]] DPairs d,
                                                         hn::Vec<DPairs> v) {
@@ -57,7 +59,7 @@ HWY_INLINE hn::Vec<hn::FixedTag<double, 2> > fold_pairs([[maybe_unused]] DPairs 
   }
 }
 
-/// at[0] −= Σ x, at[1] −= Σ y.
+/// Computes at[0] −= Σ x, at[1] −= Σ y.
 HWY_INLINE void subtract_sums(V x, V y, double* at) {
   const D d;
   const hn::FixedTag<double, 2> pair;
@@ -67,8 +69,8 @@ HWY_INLINE void subtract_sums(V x, V y, double* at) {
 
 #endif
 
-/// A[a, b] −= Σ Y_a Y_bᵀ over `count` batches; rows row0 … row0 + kTileRows, columns col0 … col0 +
-/// 3 of the block.
+/// Computes A[a, b] −= Σ Y_a Y_bᵀ over `count` batches, for rows row0 … row0 + kTileRows and
+/// columns col0 … col0 + 3 of the block.
 HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int row0, int col0,
                      double* HWY_RESTRICT A, std::size_t ld) {
   const D d;
@@ -127,7 +129,8 @@ void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t la
   }
 }
 
-/// Columns p … p + 5 less what the columns before them explain, rows from the vector that holds p.
+/// Subtracts the contribution of earlier columns from columns p … p + 5, for rows from the vector
+/// that contains p.
 template <int kVectors>
 HWY_INLINE void update_panel(double* HWY_RESTRICT A, std::size_t ld, std::size_t p,
                              std::size_t row) {
@@ -160,7 +163,8 @@ PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t colu
   const D d;
   const std::size_t N = hn::Lanes(d);
   const std::size_t rows = (n + N - 1) / N * N;
-  constexpr double kFrozen = 1e100;  // pivot of a parameter that is not moved
+  // Pivot of a parameter that is not moved.
+  constexpr double kFrozen = 1e100;
   PivotReport report;
   for (std::size_t p = 0; p < columns; p += kBlock) {
     double diagonal[kBlock];
@@ -194,8 +198,8 @@ PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t colu
         L[r][c] = v * inverse[c];
       }
     }
-    // The rows of the diagonal block go through this loop too and are put right after it: whole
-    // vectors, no masks.
+    // This loop also processes the rows of the diagonal block, which are corrected afterwards, to
+    // use whole vectors without masks.
     for (row = p / N * N; row < rows; row += N) {
       V x[kBlock];
 #pragma GCC unroll 6
@@ -223,7 +227,7 @@ void solve_factored_one(const double* HWY_RESTRICT L, std::size_t n, std::size_t
     const double* column = L + k * ld;
     const double value = b[k] / column[k];
     const V f = hn::Set(d, value);
-    // The vector that holds row k also holds solved rows: they are saved around it.
+    // The vector of row k also contains solved rows, which are saved and restored.
     const std::size_t start = k / N * N;
     double head[kBatch];
     for (std::size_t i = start; i < k; ++i) head[i - start] = b[i];

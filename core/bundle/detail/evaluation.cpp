@@ -1,5 +1,5 @@
-// The cost alone at a state, and the step of the points once that of poses and cameras is known.
-// Built once per SIMD target.
+// Cost at a state, and the step of the points given that of poses and cameras. Compiled once per
+// SIMD target.
 #include <bit>
 
 #include "core/bundle/detail/kernels.hpp"
@@ -18,7 +18,8 @@ HWY_BEFORE_NAMESPACE();
 namespace vergence::detail {
 namespace HWY_NAMESPACE {
 
-constexpr double kDepthShare = 0.8;  // of its least depth that a point moves in one step at most
+// Maximum step of a point as a share of its minimum depth.
+constexpr double kDepthShare = 0.8;
 
 template <bool kJets>
 HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t lane) {
@@ -68,12 +69,14 @@ HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::si
   for (std::uint32_t at = batch.block_begin; at < batch.block_end; ++at) {
     const KernelPose& pose = job.poses[job.blocks[at].pose];
     if (pose.block < 0) continue;
-    const double* step = delta + pose.block * kBlock;  // τ, φ
+    // In the order τ, φ.
+    const double* step = delta + pose.block * kBlock;
     V Xi[3];
     transform(pose.R, pose.t, X, Xi);
     const double* y = job.y + static_cast<std::size_t>(at) * kYTop + lane;
+    // The step moves X_i by τ + φ × X_i.
 #pragma GCC unroll 3
-    for (int r = 0; r < 3; ++r) {  // how far the step moves X_i: τ + φ × X_i
+    for (int r = 0; r < 3; ++r) {
       const int a = (r + 1) % 3, b = (r + 2) % 3;
       const V moved =
           hn::MulAdd(set(step[3 + a]), Xi[b], hn::NegMulAdd(set(step[3 + b]), Xi[a], set(step[r])));

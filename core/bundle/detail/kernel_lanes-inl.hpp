@@ -1,5 +1,5 @@
-// Shared parts of the kernels: a point a lane, its residuals in a slot, the loss. Included once for
-// each SIMD target, behind <hwy/highway.h>; hence no `#pragma once`.
+// Shared parts of the kernels: one point per lane, residuals of a slot, the loss. Included once per
+// SIMD target after <hwy/highway.h>; hence no `#pragma once`.
 #if defined(VERGENCE_CORE_BUNDLE_DETAIL_KERNEL_LANES_INL_HPP) == defined(HWY_TARGET_TOGGLE)
 #ifdef VERGENCE_CORE_BUNDLE_DETAIL_KERNEL_LANES_INL_HPP
 #undef VERGENCE_CORE_BUNDLE_DETAIL_KERNEL_LANES_INL_HPP
@@ -34,18 +34,20 @@ HWY_INLINE void transform(const double* R, const double* t, const V X[3], V out[
         hn::MulAdd(set(R[3 * r + 1]), X[1], hn::MulAdd(set(R[3 * r + 2]), X[2], set(t[r]))));
 }
 
-/// Results of a slot for its points. Aggregate-initialised: its default constructor, which is not
-/// writes, would be compiled for the machine's least instruction set, and a vector's cannot be
-/// inlined there.
+/// Results of a slot for its points. It needs aggregate initialisation: a default constructor would
+/// be compiled for the baseline instruction set, where vector constructors cannot be inlined.
 struct Residual {
-  V x, y;    // observed less predicted, px
-  V weight;  // 1/σ², 0 where there is no observation
-  V depth;   // along the camera's axis; kFar where there is no observation
+  /// Observed minus predicted, in px.
+  V x, y;
+  /// 1/σ²; 0 without an observation.
+  V weight;
+  /// Depth along the camera's axis; kFar without an observation.
+  V depth;
   V iz, xn, yn;
 };
 
-/// Pinhole without distortion. Lanes without an observation may stand anywhere: what they compute
-/// is finite and weighs nothing.
+/// Pinhole without distortion. Lanes without an observation have arbitrary finite results with
+/// weight 0.
 HWY_INLINE Residual project(const KernelCamera& camera, const Slot& slot, std::size_t lane,
                             const V Xi[3], V* behind) {
   const D d;
@@ -68,7 +70,7 @@ HWY_INLINE Residual project(const KernelCamera& camera, const Slot& slot, std::s
           yn};
 }
 
-/// Computes it from the camera model's results.
+/// Computes the residuals from the camera model's results.
 HWY_INLINE Residual from_jets(const double* jet, const Slot& slot, std::size_t lane) {
   const V inverse_sigma = load(slot.inverse_sigma + lane);
   const V zero = hn::Zero(D());
@@ -81,7 +83,7 @@ HWY_INLINE Residual from_jets(const double* jet, const Slot& slot, std::size_t l
           zero};
 }
 
-/// Twice the loss of s = |ε|²/σ², and its derivative by s in *weight.
+/// Returns twice the loss of s = |ε|²/σ², with its derivative in *weight.
 HWY_INLINE V loss(BundleLoss kind, double threshold2, V s, V* weight) {
   const D d;
   const V one = set(1.0);
@@ -90,7 +92,8 @@ HWY_INLINE V loss(BundleLoss kind, double threshold2, V s, V* weight) {
     return s;
   }
   const V c2 = set(threshold2);
-  if (kind == BundleLoss::huber) {  // 2 c √s − c² beyond c
+  /// 2 c √s − c² beyond c.
+  if (kind == BundleLoss::huber) {
     const auto linear = hn::Gt(s, c2);
     const V root = hn::Sqrt(hn::Mul(c2, hn::IfThenElse(linear, s, c2)));
     *weight = hn::IfThenElse(linear, hn::Div(c2, root), one);

@@ -1,16 +1,15 @@
-// One pass over the observations: residuals, normal equations, eliminated points. Built once per
+// One pass over the observations: residuals, normal equations, eliminated points. Compiled once per
 // SIMD target.
 //
 // Every lane is a point. With F = ∂x/∂X_i (2×3, X_i the point in the base camera) all derivatives
-// of core/README.md are F times something that does not depend on the camera, in the
-// parametrisation of bundle.hpp:
+// of core/README.md are F times a factor independent of the camera, in the parametrisation of
+// bundle.hpp:
 //     pose (τ, φ):       B = F [ I  −[X_i]× ]
 //     camera k (τ, φ):   A = F [ I  −[X_i]× ]
 //     point:             C = F R_i
-// A camera's perturbation is written in the base camera's axes.
-// So one 3×3 matrix Q = Σ FᵀwF a pose and camera carries everything: P += R_iᵀ Q R_i, O = [I;
-// [X_i]×] Q R_i, and the sums of Bᵀ w B over the points of one camera serve as its share of I, of M
-// and of S alike.
+// A camera's perturbation is in the base camera's axes. So one 3×3 matrix Q = Σ FᵀwF per pose and
+// camera suffices: P += R_iᵀ Q R_i, O = [I; [X_i]×] Q R_i, and the sums of Bᵀ w B over the points
+// of one camera are its share of I, M and S.
 #include <algorithm>
 #include <bit>
 
@@ -30,17 +29,19 @@ HWY_BEFORE_NAMESPACE();
 namespace vergence::detail {
 namespace HWY_NAMESPACE {
 
-constexpr double kPivotTolerance =
-    1e-13;  // of a point's 3×3 block: below, that direction is not seen at all and stays
+// Minimum relative pivot of a point's 3×3 block; below it the direction is unobserved and is not
+// moved.
+constexpr double kPivotTolerance = 1e-13;
 
-/// sums += Bᵀ (Q, q) B with B = [I −[X]×]: 21 of the symmetric 6×6 (tt 6, φt 9 row-major, φφ 6),
-/// then the gradient.
+/// Adds Bᵀ (Q, q) B with B = [I −[X]×]: 21 elements of the symmetric 6×6 (tt 6, φt 9 row-major, φφ
+/// 6), then the gradient.
 HWY_INLINE void add_pose_sums(const V Q[6], const V q[3], const V X[3], double* HWY_RESTRICT sums) {
   constexpr int kSym[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   constexpr int kUpper[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
 #pragma GCC unroll 6
   for (int i = 0; i < 6; ++i) add_to(Q[i], sums + i * kBatch);
-  V C[3][3];  // [X]× Q
+  // [X]× Q.
+  V C[3][3];
 #pragma GCC unroll 3
   for (int c = 0; c < 3; ++c)
 #pragma GCC unroll 3
@@ -49,8 +50,9 @@ HWY_INLINE void add_pose_sums(const V Q[6], const V q[3], const V X[3], double* 
       C[r][c] = hn::NegMulAdd(X[b], Q[kSym[a][c]], hn::Mul(X[a], Q[kSym[b][c]]));
       add_to(C[r][c], sums + (6 + 3 * r + c) * kBatch);
     }
+    // Row r of C, crossed: X × C_r.
 #pragma GCC unroll 6
-  for (int i = 0; i < 6; ++i) {  // row r of C, crossed: X × C_r
+  for (int i = 0; i < 6; ++i) {
     const int r = kUpper[i][0], a = (kUpper[i][1] + 1) % 3, b = (kUpper[i][1] + 2) % 3;
     double* at = sums + (15 + i) * kBatch;
     store(hn::NegMulAdd(X[b], C[r][a], hn::MulAdd(X[a], C[r][b], load(at))), at);
@@ -64,7 +66,7 @@ HWY_INLINE void add_pose_sums(const V Q[6], const V q[3], const V X[3], double* 
   }
 }
 
-/// Intrinsics of one slot: their own equations, those with the pose, and their rows of N.
+/// Adds the intrinsics of one slot: their own equations, those with the pose, and their rows of N.
 HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, std::size_t lane,
                                std::uint16_t pose, V wx, V wy, const V F[6], V weight,
                                const V Xi[3], const double* R, double* HWY_RESTRICT rows) {
@@ -89,7 +91,8 @@ HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, st
     }
     add_to(hn::MulAdd(jx, wx, hn::Mul(jy, wy)),
            own + (i * (kIntrinsicsSize + 1) + kIntrinsicsSize) * kBatch);
-    V h[3];  // w Jᵀ F
+    // w Jᵀ F.
+    V h[3];
     for (int c = 0; c < 3; ++c) h[c] = hn::Mul(weight, hn::MulAdd(jx, F[c], hn::Mul(jy, F[3 + c])));
     for (int c = 0; c < 3; ++c) {
       const int a = (c + 1) % 3, b = (c + 2) % 3;
@@ -103,7 +106,7 @@ HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, st
   }
 }
 
-/// One batch's lanes [lane, lane + vector). kJets: cameras speak through job.jets.
+/// Linearises one batch's lanes [lane, lane + vector). kJets: cameras use job.jets.
 template <bool kJets>
 HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t lane) {
   const D d;
@@ -159,7 +162,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         squared = hn::Add(squared, hn::IfThenElseZero(hn::Gt(r.weight, zero), r2));
         min_depth = hn::Min(min_depth, r.depth);
         const V wx = hn::Mul(w, r.x), wy = hn::Mul(w, r.y);
-        if (!kJets && camera.identity) {  // F = [a 0 −a xn; 0 b −b yn]
+        // F = [a 0 −a xn; 0 b −b yn].
+        if (!kJets && camera.identity) {
           const V a = hn::Mul(set(camera.fx), r.iz), b = hn::Mul(set(camera.fy), r.iz);
           const V wa = hn::Mul(w, a), wb = hn::Mul(w, b), ax = hn::Mul(a, r.xn),
                   by = hn::Mul(b, r.yn);
@@ -174,7 +178,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
           continue;
         }
         V F[6];
-        if (kJets) {  // G R_k
+        // G R_k.
+        if (kJets) {
           const double* G = jet + lane;
           for (int row = 0; row < 2; ++row) {
             const V g0 = load(G + (3 * row) * kBatch), g1 = load(G + (3 * row + 1) * kBatch),
@@ -208,7 +213,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
           add_intrinsics(job, number, jet, lane, block.pose, wx, wy, F, w, Xi, R, rows);
       }
 
-      const bool moving = k > 0;  // class k > 0 is camera k, free
+      // Class k > 0 is camera k if it is free.
+      const bool moving = k > 0;
       if (moving || pose.block >= 0)
         add_pose_sums(
             Q, q, Xi,
@@ -217,7 +223,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
                  static_cast<std::size_t>(k)) *
                     kPoseSums * kBatch +
                 lane);
-      V Tk[3][3];  // Q R_i
+      // Q R_i.
+      V Tk[3][3];
 #pragma GCC unroll 3
       for (int c = 0; c < 3; ++c) {
         const V r0 = set(R[c]), r1 = set(R[3 + c]), r2 = set(R[6 + c]);
@@ -225,7 +232,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         Tk[1][c] = hn::MulAdd(Q[1], r0, hn::MulAdd(Q[3], r1, hn::Mul(Q[4], r2)));
         Tk[2][c] = hn::MulAdd(Q[2], r0, hn::MulAdd(Q[4], r1, hn::Mul(Q[5], r2)));
       }
-      if (moving) {  // rows of N before the basis: τ in its three places, φ after them
+      // Rows of N before the basis: three of τ, then φ.
+      if (moving) {
         double* N = rows + job.shared.extrinsic[k] * 3 * kBatch;
         const int phi = job.shared.exact[k] ? 2 : 3;
         const double* basis = job.cameras[k].basis.data();
@@ -274,8 +282,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
     }
   }
 
-  // P (1 + λ on the diagonal) = L Lᵀ; the inverse of L is what everything needs. Constant points:
-  // inverse 0, so they drop out.
+  // Factorise P (1 + λ on the diagonal) = L Lᵀ and invert L. For constant points the inverse is 0,
+  // so they drop out.
   const V grow = set(1.0 + job.damping), tolerance = set(kPivotTolerance),
           free = load(job.point_free + index * kBatch + lane);
   const V d0 = hn::Mul(P[0], grow), d1 = hn::Mul(P[3], grow), d2 = hn::Mul(P[5], grow);

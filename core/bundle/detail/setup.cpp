@@ -8,8 +8,8 @@
 namespace vergence::detail {
 namespace {
 
-constexpr double kOrthonormal =
-    1e-6;  // largest entry of RᵀR − I of a rotation that only rounding has touched
+// Maximum entry of RᵀR − I of a rotation with rounding.
+constexpr double kOrthonormal = 1e-6;
 
 bool refuse(BundleResult* result, BundleTermination termination) noexcept {
   result->termination = termination;
@@ -46,7 +46,7 @@ bool check_sizes(const BundleWorkspace& w, const BundleProblem& p, const BundleO
   return true;
 }
 
-/// The start: numbers, and rotations that are some.
+/// Checks that the start has finite numbers and valid rotations.
 bool check_state(const BundleProblem& p, const BundleOptions& o) noexcept {
   for (const Vec3& point : p.points)
     if (!point.allFinite()) return false;
@@ -60,14 +60,16 @@ bool check_state(const BundleProblem& p, const BundleOptions& o) noexcept {
     if (k == 0 && !(p.T_camera_left[0].R.isIdentity(kOrthonormal) &&
                     p.T_camera_left[0].t.norm() < kOrthonormal))
       return false;
+    // A length constraint needs a direction.
     if (k > 0 && o.configuration == BundleConfiguration::stereo_calibration &&
         o.length[k].kind != BundleLength::free && !(p.T_camera_left[k].t.norm() > kOrthonormal))
-      return false;  // a length without a direction
+      return false;
   }
   return true;
 }
 
-/// Observations: index, order, values; where each point's begin; how many each pose has.
+/// Checks indices, order and values of the observations, finds where those of each point begin, and
+/// counts those of each pose.
 bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) noexcept {
   std::fill(w.pose_observations.begin(), w.pose_observations.end(), 0U);
   const std::size_t points = p.points.size(), poses = p.T_left_world.size(),
@@ -94,7 +96,7 @@ bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult
   return true;
 }
 
-/// Numbers the free poses; every one of them has to be determined by something.
+/// Numbers the free poses, each of which must be determined by observations or a prior.
 bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o,
                  BundleResult* r) noexcept {
   w.free_poses = 0;
@@ -125,7 +127,7 @@ bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions
   return true;
 }
 
-/// Points with observations, those seen by the same poses together.
+/// Sorts the points with observations so that those seen by the same poses are adjacent.
 bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) noexcept {
   w.point_count = 0;
   w.free_points = 0;
@@ -143,8 +145,8 @@ bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) n
   return true;
 }
 
-/// Slots of a pose in order of camera: how many before camera k for every set of cameras, [set][k];
-/// [set][kMaxCameras]: all.
+/// Number of slots before camera k for every set of cameras, [set][k]; [set][kMaxCameras] is the
+/// total.
 constexpr auto kSlotsBefore = [] {
   std::array<std::array<std::uint8_t, kMaxCameras + 1>, 1U << kMaxCameras> table{};
   for (unsigned set = 0; set < table.size(); ++set)
@@ -153,8 +155,8 @@ constexpr auto kSlotsBefore = [] {
   return table;
 }();
 
-/// The images of one batch: the union of those that see its points. False: more than there is room
-/// for.
+/// Lays out the images of one batch, the union of those that see its points. Returns false if a
+/// capacity is exceeded.
 bool lay_out_batch(BundleWorkspace& w, const BundleProblem& p, std::size_t index) noexcept {
   Batch& batch = w.batches[index];
   batch.lanes =
@@ -241,7 +243,8 @@ void set_parameters(Intrinsics& k, const std::array<double, kIntrinsicsSize>& v)
 }
 
 double held_sigma(const BundleIntrinsics& intrinsics, const Intrinsics& k, int parameter) noexcept {
-  constexpr double kFocalShare = 1e-3, kPrincipalPoint = 0.5;  // px
+  // Defaults: share of a focal length, and px of a principal point.
+  constexpr double kFocalShare = 1e-3, kPrincipalPoint = 0.5;
   const double given = intrinsics.held_sigma[static_cast<std::size_t>(parameter)];
   if (given >= 0) return given;
   return parameter == 0   ? kFocalShare * k.fx

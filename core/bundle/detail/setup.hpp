@@ -3,19 +3,18 @@
 
 namespace vergence::detail {
 
-/// Checks a problem and lays it out for the kernels: points sorted by the poses that see them,
-/// eight to a batch.
-/// False: *result has the reason, the workspace is not to be used. Reads the problem's arrays only
+/// Checks a problem and lays it out for the kernels, with points sorted by the poses that see them,
+/// in batches of eight. Returns false with the reason in *result. Reads the problem's arrays only
 /// within their sizes.
 [[nodiscard]] bool set_up(BundleWorkspace& w, const BundleProblem& problem,
                           const BundleOptions& options, BundleResult* result) noexcept;
 
-/// Which rows of θ_S there are. `held_too`: the intrinsics that are held but uncertain get rows as
-/// well (for the wide covariance).
+/// Layout of the rows of θ_S. `held_too`: includes fixed but uncertain intrinsics, for the total
+/// covariance.
 [[nodiscard]] SharedLayout shared_layout(const BundleProblem& problem, const BundleOptions& options,
                                          bool held_too) noexcept;
 
-/// Sigma of a held intrinsic parameter with the default rule of BundleIntrinsics applied.
+/// Standard deviation of a fixed intrinsic parameter by the default rule of BundleIntrinsics.
 [[nodiscard]] double held_sigma(const BundleIntrinsics& intrinsics, const Intrinsics& k,
                                 int parameter) noexcept;
 

@@ -12,17 +12,16 @@ namespace vergence::detail {
 namespace {
 
 using Index = Eigen::Index;
-constexpr double kRidge =
-    1e-9;  // of a unit variance: keeps what was written with few digits positive definite
+// Added to a unit variance, to keep covariances written with few digits positive definite.
+constexpr double kRidge = 1e-9;
 
-/// Rows of the published parameters that constrain one place in the layout: at most six,
-/// with their factors.
+/// One row of the layout as a combination of at most six published parameters.
 struct Combination {
   int first = 0, count = 0;
   double factor[6]{};
 };
 
-/// (τ, φ) rows of camera k at the mean from the published (φ, τ): row r of Bᵀ [R₀ᵀ τ; R₀ᵀ φ].
+/// Row of (τ, φ) of camera k at the mean from the published (φ, τ): row r of Bᵀ [R₀ᵀ τ; R₀ᵀ φ].
 Combination extrinsic_combination(const Mat6& basis, const Mat3& R, int k, int row) noexcept {
   Combination c;
   c.first = extrinsic_row(k);
@@ -50,7 +49,8 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
     : layout_(layout), cameras_(cameras), weight_(prior.weight) {
   if (prior.rig == nullptr || layout.size == 0) return;
   Combination rows[kMaxShared];
-  int place[kMaxShared];  // in the layout, −1: not there
+  // Row in the layout; −1 if it has none.
+  int place[kMaxShared];
   int n = 0;
   for (std::size_t k = 1; k < cameras; ++k) {
     const int number = static_cast<int>(k);
@@ -60,8 +60,8 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
     const Mat6 basis = extrinsic_basis(layout, mean_[k], number);
     for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) {
       rows[n] = extrinsic_combination(basis, T.R, number, i);
-      if (!(covariance_of(prior.rig->covariance, rows[n], rows[n]) > 0))
-        return;  // of the transform nothing is known, nor of the rest
+      // If the transform is unknown, so is the rest.
+      if (!(covariance_of(prior.rig->covariance, rows[n], rows[n]) > 0)) return;
       place[n++] = layout.extrinsic[k] + i;
     }
   }

@@ -3,11 +3,11 @@
 
 namespace vergence::detail {
 
-/// BundleSharedPrior in the rows of one layout: ½ δᵀ Λ δ, δ the way from the prior's mean in the
-/// rows' own coordinates there.
+/// BundleSharedPrior in the rows of one layout: ½ δᵀ Λ δ with δ the difference from the prior's
+/// mean in the rows' coordinates.
 ///
-/// The covariance is of more parameters than a layout has; the others are where the prior has them:
-/// Λ is the block of the joint information that belongs to the layout's rows.
+/// The covariance has more parameters than a layout. The others are fixed at their prior, so Λ is
+/// the layout's block of the joint information.
 class SharedPrior {
  public:
   SharedPrior() noexcept = default;
@@ -15,11 +15,11 @@ class SharedPrior {
               std::size_t cameras) noexcept;
 
   [[nodiscard]] bool used() const noexcept { return rig_ != nullptr; }
-  /// Weighted; symmetric, layout.size rows.
+  /// Weighted information: symmetric, with layout.size rows.
   [[nodiscard]] const SharedMatrix& information() const noexcept { return information_; }
   [[nodiscard]] double weight() const noexcept { return weight_; }
   [[nodiscard]] SharedVector residual(const BundleState& state) const noexcept;
-  /// ∂residual/∂rows at `state`, whose cameras' bases are in `job`.
+  /// ∂residual/∂rows at `state`; the cameras' bases are in `job`.
   [[nodiscard]] SharedMatrix jacobian(const BundleState& state,
                                       const KernelJob& job) const noexcept;
 
@@ -28,7 +28,8 @@ class SharedPrior {
   SharedLayout layout_{};
   std::size_t cameras_ = 0;
   double weight_ = 1;
-  KernelCamera mean_[kMaxCameras]{};  // their bases
+  // Only their bases are used.
+  KernelCamera mean_[kMaxCameras]{};
   SharedMatrix information_;
 };
 

@@ -23,7 +23,8 @@ Row6 extrinsic_basis(const SharedLayout& shared, const KernelCamera& camera, int
   if (!shared.exact[k]) return Row6::Identity();
   J.topLeftCorner<3, 2>() = camera.basis;
   J.block<3, 3>(3, 2).setIdentity();
-  return J;  // the sixth column stays empty
+  // The sixth column stays empty.
+  return J;
 }
 
 System::System(BundleWorkspace& workspace, const BundleProblem& problem,

@@ -5,25 +5,25 @@
 
 namespace vergence::detail {
 
-/// Normal equations of the bundle adjustment about one state, points eliminated: A δ = rhs, δ =
+/// Normal equations of the bundle adjustment about one state with eliminated points: A δ = rhs, δ =
 /// [poses | θ_S].
 ///
-/// Threads  One at a time; lives on the stack of solve(). Memory  The workspace's.
+/// Not thread-safe; on the stack of solve(). Uses the workspace's memory.
 class System {
  public:
   System(BundleWorkspace& workspace, const BundleProblem& problem,
          const BundleOptions& options) noexcept;
 
-  /// Rows of θ_S from now on (free ones, or held intrinsics too).
+  /// Sets the layout of θ_S.
   void use(const SharedLayout& shared) noexcept;
 
-  /// Cost, gradient and damped reduced system about `state`. False: an observed point is behind its
-  /// camera or the cost is not finite.
+  /// Computes cost, gradient and damped reduced system about `state`. Returns false if an observed
+  /// point is behind its camera or the cost is not finite.
   [[nodiscard]] bool linearise(const BundleState& state, double damping) noexcept;
-  /// Cost alone; `squared`: also |ε|²/σ² of every slot into the workspace.
+  /// Computes the cost only; `squared`: writes |ε|²/σ² of every slot to the workspace.
   [[nodiscard]] bool evaluate(const BundleState& state, bool squared) noexcept;
-  /// candidate ← state moved by `delta` (the reduced system's solution), points by back
-  /// substitution. The last linearise() was about `state`.
+  /// Sets *candidate to `state` moved by `delta` (solution of the reduced system), with points by
+  /// back substitution. Precondition: the last linearise() was about `state`.
   void move(const BundleState& state, const double* delta, BundleState* candidate) noexcept;
 
   [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
@@ -32,9 +32,8 @@ class System {
   [[nodiscard]] double squared_px() const noexcept { return job_.squared_px; }
   [[nodiscard]] double weighted() const noexcept { return job_.weighted; }
   [[nodiscard]] double point_decrement() const noexcept { return job_.decrement; }
-  [[nodiscard]] double update_squared() const noexcept {
-    return update_;
-  }  // of the last move(): |δ|², |θ|²
+  /// |δ|² and |θ|² of the last move().
+  [[nodiscard]] double update_squared() const noexcept { return update_; }
   [[nodiscard]] double norm_squared() const noexcept { return norm_; }
   [[nodiscard]] const KernelJob& job() const noexcept { return job_; }
   [[nodiscard]] const SharedPrior& shared_prior() const noexcept { return shared_prior_; }

@@ -7,7 +7,7 @@
 #include "core/bundle/detail/system.hpp"
 #include "core/math/so3.hpp"
 
-/// The reduced system from the kernels' sums and the priors.
+/// Assembly of the reduced system from the kernels' sums and the priors.
 namespace vergence::detail {
 namespace {
 
@@ -19,7 +19,7 @@ double lane_sum(const double* lanes) noexcept {
   return s;
 }
 
-/// Symmetric 6×6 in (τ, φ) and gradient from one pose's sums.
+/// Unpacks the symmetric 6×6 in (τ, φ) and the gradient from one pose's sums.
 void unpack(const double* sums, Mat6* H, Vec6* e) noexcept {
   double s[kPoseSums];
   for (int i = 0; i < kPoseSums; ++i) s[i] = lane_sum(sums + i * kBatch);
@@ -33,7 +33,7 @@ void unpack(const double* sums, Mat6* H, Vec6* e) noexcept {
   for (int i = 0; i < 6; ++i) (*e)[i] = s[21 + i];
 }
 
-/// The prior's δ = (φ, τ) at T, and how it moves with the pose's own (τ, φ): ∂δ/∂(τ, φ).
+/// Computes the prior's δ = (φ, τ) at T, and its derivative ∂δ/∂(τ, φ) by the pose.
 void prior_residual(const BundlePosePrior& prior, const Transform& T, Vec6* delta,
                     Mat6* J) noexcept {
   const Mat3 turn = T.R * prior.T_left_world.R.transpose();
@@ -48,7 +48,7 @@ void prior_residual(const BundlePosePrior& prior, const Transform& T, Vec6* delt
 
 }  // namespace
 
-/// Undamped information: the diagonal grows by (1 + λ).
+/// Adds undamped information; its diagonal is multiplied by 1 + λ.
 void System::add_information(std::size_t row, std::size_t column, double value) noexcept {
   at(row, column) += row == column ? value * (1.0 + job_.damping) : value;
 }
@@ -59,7 +59,8 @@ void System::assemble(const BundleState& state) noexcept {
   assemble_intrinsics();
   add_priors(state);
   for (std::size_t i = first_shared_ + static_cast<std::size_t>(job_.shared.size); i < rows_;
-       ++i) {  // padding
+       // Padding rows.
+       ++i) {
     at(i, i) = 1;
     w_.rhs[i] = 0;
   }

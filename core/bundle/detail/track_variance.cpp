@@ -12,11 +12,12 @@ namespace {
 using Shared = SharedMatrix;
 using Index = Eigen::Index;
 
-constexpr std::size_t kBlockFrames = 8;  // at least, of a cluster in time
-constexpr double kMaxFewClusters = 4;    // times the variance, for there being few of them
+// Minimum number of frames of a cluster in time.
+constexpr std::size_t kBlockFrames = 8;
+// Maximum factor of the variance for a small number of clusters.
+constexpr double kMaxFewClusters = 4;
 
-/// The gradients of one lane's observations, straight from the camera model, and the robust weight
-/// of each.
+/// Gradients of a track's observations from the camera model, with their robust weights.
 class TrackGradient {
  public:
   TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state,
@@ -28,7 +29,7 @@ class TrackGradient {
         first_(static_cast<std::size_t>(w.free_poses) * kBlock),
         ld_(system.ld()) {}
 
-  /// s_j: the gradient of θ_S that this track causes, its point and the poses eliminated.
+  /// Returns s_j, this track's gradient of θ_S with its point and the poses eliminated.
   SharedVector operator()(const BundleProblem& problem, std::size_t index) noexcept {
     const SharedLayout& layout = job_.shared;
     SharedVector s = SharedVector::Zero(layout.size);
@@ -61,7 +62,7 @@ class TrackGradient {
     return {c(0), c(1), c(2)};
   }
 
-  /// By (τ, φ), where q is by the point in the base camera.
+  /// Gradient with respect to (τ, φ), where q is that with respect to the point in the base camera.
   static Vec6 of_pose(const Vec3& q, const Vec3& Xi) noexcept {
     Vec6 gradient;
     gradient << q, Xi.cross(q);
@@ -114,7 +115,7 @@ class TrackGradient {
   std::size_t first_, ld_;
 };
 
-/// Σ_j s_j s_jᵀ, a cluster a track.
+/// Σ_j s_j s_jᵀ with each track as a cluster.
 Shared variance_by_tracks(const BundleWorkspace& w, const BundleProblem& problem,
                           TrackGradient& gradient, int size) noexcept {
   Shared meat = Shared::Zero(size, size);
@@ -136,12 +137,12 @@ class Clusters {
       sums_[cluster] = s;
     any_[cluster] = true;
   }
-  /// A single cluster's gradient is zero at the minimum, whatever its errors: it is not used.
+  /// False for a single cluster, whose gradient is zero at the minimum, whatever its errors.
   [[nodiscard]] bool enough() const noexcept {
     return std::count(any_.begin(), any_.end(), true) > 1;
   }
-  /// Σ s sᵀ, made up for there being few: a mean over n clusters has taken up one of them, and
-  /// `parameters` each one more.
+  /// Σ s sᵀ, corrected for a small number n of clusters: the mean takes one degree of freedom, and
+  /// each of `parameters` another.
   [[nodiscard]] Shared variance(int parameters) const noexcept {
     Shared meat = Shared::Zero(size_, size_);
     int n = 0;
@@ -159,11 +160,10 @@ class Clusters {
   std::array<bool, static_cast<std::size_t>(kMaxCells* kMaxCells)> any_{};
 };
 
-/// Variance with larger clusters, of two kinds, since tracks share errors in both ways: a cell of
-/// the left image (what a lens model leaves is a field over the image, common to all tracks there),
-/// and a block of frames (what a scene does to it). Under independent errors each gives the
-/// variance by tracks; the mean of both is taken. Where all tracks are in one cell, or in the
-/// middle of their lives in one block, the other kind is left, or the tracks.
+/// Variance with two kinds of larger clusters, in which tracks share errors: cells of the left
+/// image (residual lens errors) and blocks of frames (effects of the scene). With independent
+/// errors each gives the variance by tracks, so their mean is used. If all tracks are in one cell
+/// or block, only the other kind is used, or the tracks.
 Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem, int cells,
                          TrackGradient& gradient, int size) noexcept {
   Clusters by_cell(size), by_block(size);
@@ -177,8 +177,7 @@ Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem,
   for (std::size_t i = 0; i < w.point_count; ++i) {
     const auto point = static_cast<std::uint32_t>(w.order[i]);
     const std::uint32_t begin = w.first_observation[point], end = w.first_observation[point + 1];
-    // In the middle of its life; any image does, for the fields of all are fields over the
-    // direction.
+    // The middle observation; any image will do, because all fields are functions of the direction.
     const BundleObservation& middle = problem.observations[begin + (end - begin) / 2];
     const SharedVector s = gradient(problem, i);
     by_cell.add(static_cast<std::size_t>(cell_of(middle.y, lens.height) * cells +

@@ -7,62 +7,75 @@
 
 namespace vergence::detail {
 
-inline constexpr int kBatch =
-    8;  // points worked on together: a cache line of doubles, the widest SIMD vector
-inline constexpr int kBlock =
-    6;  // rows of one pose in the reduced system; θ_S is padded to a multiple
-inline constexpr int kYSize = kBlock * 3 * kBatch;  // doubles of one block of Y
-inline constexpr int kYTop = 3 * 3 * kBatch;        // of its first three rows
-inline constexpr int kFactorRows = 11;              // of PointFactor
-inline constexpr double kFar = 1e30;                // m: depth of a point that no camera sees
-inline constexpr int kPoseSums = 27;                // 21 of the symmetric 6×6, 6 of the gradient
-inline constexpr int kGroupLimit =
-    16;  // batches multiplied together: one block of each, 18 kB, stays in the first-level cache
+/// Number of points processed together: the lanes of the widest SIMD vector.
+inline constexpr int kBatch = 8;
+/// Number of rows of one pose in the reduced system; θ_S is padded to a multiple.
+inline constexpr int kBlock = 6;
+/// Number of doubles in one block of Y.
+inline constexpr int kYSize = kBlock * 3 * kBatch;
+/// Number of doubles in its first three rows.
+inline constexpr int kYTop = 3 * 3 * kBatch;
+inline constexpr int kFactorRows = 11;
+/// Depth of a point that no camera sees, in metres.
+inline constexpr double kFar = 1e30;
+/// 21 elements of the symmetric 6×6 and 6 of the gradient.
+inline constexpr int kPoseSums = 27;
+/// Maximum number of batches multiplied together; one block of each, 18 kB, fits into the L1 cache.
+inline constexpr int kGroupLimit = 16;
 inline constexpr int kMaxShared = kBlock * (kMaxCameras - 1) + kIntrinsicsSize * kMaxCameras;
 inline constexpr int kMaxSharedBlocks = (kMaxShared + kBlock - 1) / kBlock;
-inline constexpr int kMaxCells = 8;  // a side of the image, of a covariance by cells
+/// Maximum number of image cells per side in a covariance by cells.
+inline constexpr int kMaxCells = 8;
 inline constexpr int kJetDepth = 8;
 inline constexpr int kJetIntrinsics = 9;
-inline constexpr int kJetRows =
-    kJetIntrinsics + 2 * kIntrinsicsSize;  // G (6), ε (2), depth, ∂x/∂intrinsics (9 × 2)
+/// Rows of a jet: G (6), ε (2), depth, ∂x/∂intrinsics (9 × 2).
+inline constexpr int kJetRows = kJetIntrinsics + 2 * kIntrinsicsSize;
 
-/// Eight points' observations in one image; where inverse_sigma is 0 there is none.
+/// Observations of eight points in one image; inverse_sigma is 0 where there is none.
 struct alignas(kCacheLine) Slot {
   double x[kBatch], y[kBatch], inverse_sigma[kBatch];
 };
 
-/// One pose that sees at least one point of a batch: its images' slots follow each other from
-/// `slot`, cameras ascending.
+/// One pose that sees at least one point of a batch. The slots of its images follow each other from
+/// `slot`, in ascending order of cameras.
 struct PoseBlock {
   std::uint32_t slot = 0;
   std::uint16_t pose = 0;
-  std::uint8_t cameras = 0;  // bit k: camera k has a slot
+  /// Bit k is set if camera k has a slot.
+  std::uint8_t cameras = 0;
 };
 
 struct Batch {
   std::uint32_t block_begin = 0, block_end = 0;
-  std::uint32_t group = 0;  // batches of one group see the same poses
+  /// Batches of one group see the same poses.
+  std::uint32_t group = 0;
   std::uint32_t lanes = 0;
 };
 
 struct KernelPose {
-  double R[9], t[3];        // row-major, T_left_world
-  std::int32_t block = -1;  // its rows in the reduced system, −1: constant
+  /// T_left_world, row-major.
+  double R[9], t[3];
+  /// Its block in the reduced system; −1 if constant.
+  std::int32_t block = -1;
 };
 
 struct KernelCamera {
-  double R[9], t[3];  // row-major, T_camera_left
+  /// T_camera_left, row-major.
+  double R[9], t[3];
   double fx, fy, cx, cy;
-  Eigen::Matrix<double, 3, 2, Eigen::RowMajor> basis;  // where τ may go with the exact length
+  /// Directions in which τ is free with an exact length.
+  Eigen::Matrix<double, 3, 2, Eigen::RowMajor> basis;
   bool identity;
 };
 
-/// Rows of θ_S. Extrinsics of camera k: (τ, φ), or (β, φ) with τ = basis β; then free intrinsics of
-/// each camera.
+/// Layout of the rows of θ_S. Extrinsics of camera k: (τ, φ), or (β, φ) with τ = basis β; then free
+/// intrinsics of each camera.
 struct SharedLayout {
-  int size = 0;                                   // rows used
-  int blocks = 0;                                 // of kBlock rows, the last one padded
-  int extrinsic[kMaxCameras] = {-1, -1, -1, -1};  // first row, −1: constant
+  int size = 0;
+  /// Number of blocks of kBlock rows, the last one padded.
+  int blocks = 0;
+  /// First row; −1 if constant.
+  int extrinsic[kMaxCameras] = {-1, -1, -1, -1};
   bool exact[kMaxCameras] = {};
   int intrinsic[kMaxCameras] = {-1, -1, -1, -1};
   int intrinsic_count[kMaxCameras] = {};
@@ -73,7 +86,7 @@ using SharedMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxShared, kMaxShared>;
 using SharedVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxShared, 1>;
 
-/// Everything a kernel reads and writes; pointers into the adjuster's arena. Lane arrays are
+/// Inputs and outputs of the kernels, as pointers into the adjuster's arena. Lane arrays are
 /// [rows][kBatch].
 struct KernelJob {
   const Batch* batches = nullptr;
@@ -81,61 +94,87 @@ struct KernelJob {
   const Slot* slots = nullptr;
   const KernelPose* poses = nullptr;
   KernelCamera cameras[kMaxCameras];
-  const double* points = nullptr;      // [batch][3][kBatch]
-  const double* point_free = nullptr;  // [batch][kBatch], 1 or 0
-  const double* jets = nullptr;  // [slot of the batch][kJetRows][kBatch]; only for cameras with
-                                 // distortion or free intrinsics
-  double* candidate = nullptr;   // [batch][3][kBatch], out of back_substitute
-  double* y = nullptr;  // [block][3][3][kBatch]: of Y = O L⁻ᵀ with P = L Lᵀ the rows of τ; those of
-                        // φ are X_i × them, and kept for the group in hand alone
-  double* y_group = nullptr;    // [block of the group][6][3][kBatch]: Y whole
-  std::size_t group_begin = 0;  // block: the first of the group in hand
-  double* y_shared = nullptr;   // [batch][shared.blocks][6][3][kBatch]: N L⁻ᵀ
-  double* factors =
-      nullptr;  // [batch][kFactorRows][kBatch]: L⁻¹ (6), z = L⁻¹ e_P (3), least depth, 0
-  double* sums = nullptr;            // [pose][classes][kPoseSums][kBatch]
-  double* intrinsic_sums = nullptr;  // [pose][camera][kIntrinsicsSize][6][kBatch]: Σ JᵀwB
-  double* intrinsic_own =
-      nullptr;  // [camera][kIntrinsicsSize][kIntrinsicsSize + 1][kBatch]: Σ JᵀwJ, Σ Jᵀwε
-  double* reduced = nullptr;  // [reduced block][6][kBatch]: Σ Y z
-  float* squared = nullptr;   // [slot][kBatch], out of evaluate; may be null
-  int classes = 1;            // cameras whose normal equations are summed apart
+  /// [batch][3][kBatch].
+  const double* points = nullptr;
+  /// [batch][kBatch], 1 or 0.
+  const double* point_free = nullptr;
+  /// [slot of the batch][kJetRows][kBatch], only for cameras with distortion or free intrinsics.
+  const double* jets = nullptr;
+  /// [batch][3][kBatch], output of back_substitute().
+  double* candidate = nullptr;
+
+  /// [block][3][3][kBatch]: rows of τ of Y = O L⁻ᵀ with P = L Lᵀ. Those of φ are X_i × them and are
+  /// kept for the current group only.
+  double* y = nullptr;
+  /// [block of the group][6][3][kBatch]: all of Y.
+  double* y_group = nullptr;
+  std::size_t group_begin = 0;
+  /// [batch][shared.blocks][6][3][kBatch]: N L⁻ᵀ.
+  double* y_shared = nullptr;
+  /// [batch][kFactorRows][kBatch]: L⁻¹ (6), z = L⁻¹ e_P (3), minimum depth, 0.
+  double* factors = nullptr;
+
+  /// [pose][classes][kPoseSums][kBatch].
+  double* sums = nullptr;
+  /// [pose][camera][kIntrinsicsSize][6][kBatch]: Σ JᵀwB.
+  double* intrinsic_sums = nullptr;
+  /// [camera][kIntrinsicsSize][kIntrinsicsSize + 1][kBatch]: Σ JᵀwJ, Σ Jᵀwε.
+  double* intrinsic_own = nullptr;
+  /// [reduced block][6][kBatch]: Σ Y z.
+  double* reduced = nullptr;
+  /// [slot][kBatch], output of evaluate(); may be null.
+  float* squared = nullptr;
+
+  /// Number of cameras whose normal equations are summed separately.
+  int classes = 1;
   std::uint8_t class_cameras[kMaxCameras] = {};
+
   SharedLayout shared;
   int free_poses = 0;
   BundleLoss loss = BundleLoss::none;
-  double threshold2 = 1;  // of the loss, squared sigmas
+  /// Squared threshold of the loss, in squared sigmas.
+  double threshold2 = 1;
   double damping = 0;
 
-  double cost = 0;        // out: Σ ρ / 2 over what was visited
-  double squared_px = 0;  // out: Σ |ε|², px²
-  double weighted = 0;    // out: Σ w |ε|²/σ²
-  double decrement = 0;   // out: Σ |z|²
-  double update = 0;      // out of back_substitute: Σ |δ|² and Σ |X|² of the points
+  /// Output: Σ ρ / 2 over the visited batches.
+  double cost = 0;
+  /// Output: Σ |ε|², in px².
+  double squared_px = 0;
+  /// Output: Σ w |ε|²/σ².
+  double weighted = 0;
+  /// Output: Σ |z|².
+  double decrement = 0;
+  /// Output of back_substitute(): Σ |δ|² and Σ |X|² of the points.
+  double update = 0;
   double norm = 0;
-  bool behind = false;  // out: an observed point is behind its camera
+  /// Output: true if an observed point is behind its camera.
+  bool behind = false;
 };
 
-/// A set of parameters. Two of them: the best so far and the one being tried.
+/// A set of parameters: the best so far, or the one being tried.
 struct BundleState {
   std::span<Transform> poses;
-  std::span<double> points;  // [batch][3][kBatch]
+  /// [batch][3][kBatch].
+  std::span<double> points;
   Transform T_camera_left[kMaxCameras];
   Camera cameras[kMaxCameras];
 };
 
-/// All memory of one adjuster; sized by its capacities, laid out once.
+/// Memory of one adjuster, laid out once for its capacities.
 struct BundleWorkspace {
   BundleCapacities capacity;
   std::size_t block_capacity = 0, slot_capacity = 0, reduced_capacity = 0;
 
-  std::span<std::uint64_t> order;  // points with observations: (first pose, last pose, index)
-  std::span<std::uint32_t> first_observation;  // of each point; as many as points + 1
-  std::span<std::uint32_t> pose_observations;  // how many
-  std::span<std::uint32_t>
-      pose_slot;  // scratch of the set-up: first slot of each pose in the batch
-  std::span<std::uint8_t> pose_cameras;       // scratch of the set-up
-  std::span<std::uint32_t> observation_lane;  // of each observation: slot · kBatch + lane
+  /// Points with observations as (first pose, last pose, index).
+  std::span<std::uint64_t> order;
+  /// First observation of each point, with one more element at the end.
+  std::span<std::uint32_t> first_observation;
+  std::span<std::uint32_t> pose_observations;
+  /// Buffers of the set-up: first slot of each pose in the batch, and its cameras.
+  std::span<std::uint32_t> pose_slot;
+  std::span<std::uint8_t> pose_cameras;
+  /// slot · kBatch + lane of each observation.
+  std::span<std::uint32_t> observation_lane;
   std::span<Batch> batches;
   std::span<PoseBlock> blocks;
   std::span<Slot> slots;
@@ -146,8 +185,8 @@ struct BundleWorkspace {
   std::span<float> squared;
   BundleState states[2];
 
-  std::size_t batch_count = 0, block_count = 0, slot_count = 0,
-              point_count = 0;  // of the problem at hand; points with observations
+  /// Sizes of the current problem; points have observations.
+  std::size_t batch_count = 0, block_count = 0, slot_count = 0, point_count = 0;
   std::size_t free_points = 0;
   int free_poses = 0;
 };

@@ -9,26 +9,31 @@ namespace vergence::calibration::detail {
 namespace {
 
 // Initial inflation by errors correlated along tracks, as a multiple of the first frame's spread,
-// and the number of frames that this guess weighs.
+// and the number of frames by which it is weighted.
 constexpr double kFirstLife = 6.5, kGuessFrames = 30;
-constexpr double kSlowUpdate = 1.0 / 300, kFastUpdate = 1.0 / 10;  // a frame
-constexpr double kMinInflation = 0.3,
-                 kMaxInflation =
-                     200;  // below: stated sigmas are far too large; above: not a spread any more
-constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most,
-                                      // else one frame blinds the monitor
-// Windows that are also held against what was seen before them: a knock smaller than the
-// reference's own error shows so, and only so.
+// Rates of the running means, per frame.
+constexpr double kSlowUpdate = 1.0 / 300, kFastUpdate = 1.0 / 10;
+// Limits of the inflation: below, stated sigmas are far too large; above, it is no longer a spread.
+constexpr double kMinInflation = 0.3, kMaxInflation = 200;
+// Limit of one frame's spread in units of the running mean; without it a single frame could
+// desensitise the monitor.
+constexpr double kSpreadOutlier = 5;
+// Lengths of windows that are also tested against the frames before them. Only this test shows a
+// knock smaller than the reference's own error.
 constexpr std::size_t kMinReferenceWindow = 10, kMaxReferenceWindow = 150;
-constexpr std::size_t kScatterBlocks =
-    10;  // before a block, that it is held against: longer ago a rig may have crept
+// Number of blocks that a block is compared with; the rig may have drifted since older ones.
+constexpr std::size_t kScatterBlocks = 10;
 // Beyond kFineBlocks only every kCoarse-th block is tried as the onset, which keeps the search
 // cheap in every frame of an alarm.
 constexpr std::size_t kFineBlocks = 24, kCoarse = 4;
-constexpr double kRelease = 0.5;  // of the threshold: an alarm stands until the statistic is below
-constexpr double kRampShare = 0.05;  // a ramp's best step explains 8/9 of it
-constexpr double kRampMargin = 10;   // gain by which a drift must beat a knock
-constexpr int kRampFrames = 150;     // and the least length of one
+// Share of the threshold below which an alarm ends.
+constexpr double kRelease = 0.5;
+// Relative gain by which a drift must exceed a knock; the best step explains 8/9 of a ramp.
+constexpr double kRampShare = 0.05;
+// Absolute gain by which a drift must exceed a knock.
+constexpr double kRampMargin = 10;
+// Minimum length of a ramp, in frames.
+constexpr int kRampFrames = 150;
 }  // namespace
 
 void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
@@ -59,7 +64,7 @@ void ChangeDetector::renew_floor() noexcept {
   bias2_ = std::max(options_.bias_px * options_.bias_px / kTheta, scatter_.variance());
 }
 
-/// The block just closed against those before it.
+/// Measures the scatter of the completed block against those before it.
 void ChangeDetector::measure_scatter() noexcept {
   // A possible change of the rig must not be counted as scatter.
   if (history_.closed() == 0 || newest_statistic_ > kRelease * options_.threshold) return;
@@ -73,7 +78,8 @@ void ChangeDetector::measure_scatter() noexcept {
 void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
   const auto follow = [](double* mean, double value, double rate) {
     const double most = kSpreadOutlier * *mean;
-    if (value > -most) *mean += rate * (std::min(value, most) - *mean);  // also refuses NaN
+    // The comparison also rejects NaN.
+    if (value > -most) *mean += rate * (std::min(value, most) - *mean);
   };
   if (history_.frames() == 0) {
     now_fast_ = now_slow_ = e.spread_now;
@@ -84,7 +90,8 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
     follow(&now_slow_, e.spread_now, std::max(kSlowUpdate, 1.0 / (n + 1)));
     follow(&life_slow_, e.spread_life, std::max(kSlowUpdate, 1.0 / (n + kGuessFrames)));
   }
-  // Noise that has just grown (rain, dusk) counts at once, for the tracks it will go on to spoil.
+  // Noise that has just grown (rain, dusk) counts immediately, because it will affect the tracks to
+  // come.
   const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
   lambda_ = std::clamp(std::max(life_slow_, now_slow_) * grown, kMinInflation, kMaxInflation);
 }
@@ -132,11 +139,11 @@ void ChangeDetector::estimate_reference(const Evidence& window, Vec5* mean,
                                         Mat5* covariance) const noexcept {
   Evidence past = history_.total();
   past.add(window, -1.0);
-  // Without the floor: window and past share most of the slow error, and the window's own floor
-  // stands for what they do not share.
+  // Without the floor: the window and the past share most of the slow error, and the window's own
+  // floor covers the rest.
   Evidence e;
   e.add(past, 1.0 / lambda_);
-  // (C⁻¹ + A)⁻¹, written so that neither need have an inverse.
+  // This is (C⁻¹ + A)⁻¹ in a form that needs neither inverse.
   const Mat5 spread = Mat5::Identity() + covariance_ * e.A;
   *covariance = lu_solve(spread, covariance_);
   *mean = *covariance * e.g;
@@ -153,7 +160,8 @@ Decision ChangeDetector::decide() noexcept {
   const std::size_t count = history_.frames();
   if (count == 0) return d;
   d.onset = history_.recent(0).frame;
-  std::size_t window = 0;  // of the largest statistic
+  // Length of the window with the largest statistic.
+  std::size_t window = 0;
   Evidence sum;
   std::size_t summed = 0;
   for (std::size_t w = 0; w < window_count_ && detector_[w] <= count; ++w) {
@@ -182,7 +190,7 @@ Decision ChangeDetector::decide() noexcept {
 }
 
 void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
-  // Σ e, Σ age e, Σ age² e from now back, from which a ramp's sums follow.
+  // Sums Σ e, Σ age e and Σ age² e from the newest entry back, from which a ramp's sums follow.
   Evidence zeroth, first, second;
   const auto take = [&](const Entry& entry, double age, int frames, bool ask) {
     zeroth.add(entry.evidence);
@@ -195,12 +203,13 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
     };
     keep(&found->step, zeroth);
     if (frames < kRampFrames) return;
-    Evidence ramp = zeroth;  // weight 1 − age/frames
+    // The weight of an entry is 1 − age/frames.
+    Evidence ramp = zeroth;
     ramp.g -= first.g / frames;
     ramp.A += (second.A / frames - 2 * first.A) / frames;
     keep(&found->ramp, ramp);
   };
-  // Single frames up to a block's edge, then blocks.
+  // Single frames back to the edge of a block, then blocks.
   constexpr std::size_t kBlock = EvidenceHistory::kBlock;
   const std::size_t open = history_.open_frames();
   const std::size_t whole = std::min((EvidenceHistory::kRecent - open) / kBlock, history_.closed());
@@ -215,8 +224,8 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
 }
 
 void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
-  // The offset before the window, where it is known, is subtracted: a slightly wrong reference is
-  // not an onset.
+  // Subtract the offset before the window if it is known: a slightly wrong reference is not an
+  // onset.
   Vec5 mean = Vec5::Zero();
   const std::size_t recent_frames = std::clamp(window, kMinReferenceWindow, kMaxReferenceWindow);
   if (history_.frames() >= 2 * recent_frames) {

@@ -11,51 +11,55 @@
 
 namespace vergence::calibration::detail {
 
-/// Evidence of one moving frame.
 struct FrameEvidence {
   std::uint64_t frame = 0;
   Evidence evidence;
-  double spread_now = 0, spread_life = 0;  // of the StereoResiduals
+  /// See StereoResiduals.
+  double spread_now = 0, spread_life = 0;
 };
 
-/// Result of all windows together.
+/// Combined result of all windows.
 struct Decision {
   MonitorResult::Kind kind = MonitorResult::Kind::quiet;
   double statistic = 0;
-  bool undecided = false;  // the newest frame stands out by itself, and waits for the next one
-  double shift_px = 0;     // rms that the change since the onset moves matches by; 0 with `quiet`
+  /// True if the newest frame is a single outlier so far; the next frame decides.
+  bool undecided = false;
+  /// Displacement of the matches by the change since the onset, rms; 0 with `quiet`.
+  double shift_px = 0;
   std::uint64_t onset = 0;
-  int frames = 0;  // measured since the onset
+  /// Number of frames measured since the onset.
+  int frames = 0;
 };
 
-/// Evidence of the past moving frames in sliding windows, and the tests on it. Independent of
-/// images and tracks.
+/// Change tests on the evidence of past moving frames in sliding windows. Independent of images and
+/// tracks.
 ///
-/// Memory  Fixed, in place (some 50 kB). Time: a few µs a frame; up to 0.1 ms while something is
-///         over the threshold.
+/// Memory  Fixed, in place (about 50 kB). Time: a few µs per frame; up to 0.1 ms during an alarm.
 class ChangeDetector {
  public:
-  /// covariance: of θ's first five at the reference.
+  /// `covariance`: of θ at the reference.
   void reset(const MonitorOptions& options, const Mat5& covariance) noexcept;
-  /// As Monitor::expect_scatter().
   void expect_scatter(double bias_px) noexcept;
-  /// A frame that stands out by itself counts once the next one does, too: a knock stays, and
-  /// images that are spoilt once (skewed exposure, a shaken rolling shutter) do not.
+  /// A frame that exceeds the threshold on its own counts only if the next one does as well: a
+  /// knock lasts, whereas a distorted image (skewed exposure, a shaken rolling shutter) does not.
   void push(const FrameEvidence& e) noexcept;
   [[nodiscard]] Decision decide() noexcept;
-  /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
+  /// Statistic of a single frame, for a standing rig; `spread` is its own inflation λ.
   [[nodiscard]] double single(const Evidence& frame, double spread) const noexcept;
 
  private:
   using Entry = EvidenceHistory::Entry;
   struct Onset {
-    double gain = 0;  // twice the log likelihood ratio against "nothing has changed"
+    // Twice the log likelihood ratio against no change.
+    double gain = 0;
     std::uint64_t frame = 0;
     int frames = 0;
-    Evidence since;  // not inflated; of a ramp, weighted by it
+    // Evidence since the onset, not inflated; that of a ramp is weighted by the ramp.
+    Evidence since;
   };
   struct Search {
-    Onset step, ramp;  // a change at a moment; one that grows from zero
+    // A sudden change, and one that grows from zero.
+    Onset step, ramp;
   };
 
   void follow_spread(const FrameEvidence& e) noexcept;
@@ -72,16 +76,20 @@ class ChangeDetector {
 
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();
-  double bias2_ = 0;  // px², of a mode: the floor
+  // Variance of the slowly varying error per parameter, in px².
+  double bias2_ = 0;
   BlockScatter scatter_{};
   std::array<std::size_t, 6> detector_{};
   std::size_t window_count_ = 0;
   EvidenceHistory history_;
-  std::optional<FrameEvidence> pending_;  // stands out, and waits for the next one
+  // Frame above the threshold that waits for the next one.
+  std::optional<FrameEvidence> pending_;
   double lambda_ = 0;
-  double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;  // running means of the spreads
-  double newest_statistic_ = 0;                         // of the last decide()
-  int over_ = 0;                                        // frames in a row over the threshold
+  // Running means of the spreads.
+  double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;
+  double newest_statistic_ = 0;
+  // Number of consecutive frames above the threshold.
+  int over_ = 0;
 };
 
 }  // namespace vergence::calibration::detail

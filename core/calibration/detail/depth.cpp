@@ -9,15 +9,16 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr int kDepthSteps = 4;  // of Newton: from a few percent off to rounding
+// Number of Newton steps, which reduce an error of a few percent to rounding.
+constexpr int kDepthSteps = 4;
 
 }  // namespace
 
 DepthGradient depth_gradient(const CovisiblePoint& p, const Transform& T, int k,
                              bool lenses) noexcept {
   // The right pixel moves by by_depth per metre, by G (−[R X]×, I) per error of the transform, by
-  // ∂x/∂intrinsics per error of the right lens, and along with the ray per error of the left one:
-  // the depth that a match then gives is the one that takes up the part along the epipolar line.
+  // ∂x/∂intrinsics per error of the right intrinsics, and with the ray per error of the left ones.
+  // The depth of a match absorbs the component along the epipolar line.
   const Vec2 along = -p.by_depth / (p.by_depth.squaredNorm() * p.depth_m);
   DepthGradient g;
   Mat26 by_rig;
@@ -29,8 +30,8 @@ DepthGradient depth_gradient(const CovisiblePoint& p, const Transform& T, int k,
   Vec2 unused;
   Mat23 G_left;
   if (p.left->project(p.ray, &unused, &G_left) != ProjectStatus::ok) return g;
-  // The pixel is fixed, so a change of the intrinsics moves the ray: by the negative of the pixel's
-  // change, through the inverse projection.
+  // The left pixel is fixed, so a change of the intrinsics moves the ray by the negative change of
+  // the pixel through the inverse projection.
   const Eigen::Matrix<double, 2, 9> ray_by_left =
       -G_left.leftCols<2>().inverse() * p.left->intrinsics_jacobian(p.ray);
   const Mat2 by_ray = p.depth_m * (p.G * T.R.leftCols<2>());
@@ -66,8 +67,8 @@ DepthReader::DepthReader(const RigCalibration& rig, int k) noexcept
 bool DepthReader::difference(const CovisiblePoint& p, double* relative) const noexcept {
   Vec3 ray;
   if (!left_.unproject(p.pixel, &ray)) return false;
-  // Where along its own ray is the point that projects nearest to the match? In units of the depth,
-  // so that also what lies beyond infinity has a projection.
+  // Find the point on the own ray that projects nearest to the match, by its inverse depth, so that
+  // points beyond infinity have a projection too.
   double inverse = 1.0 / p.depth_m;
   for (int step = 0; step < kDepthSteps; ++step) {
     Vec2 at;

@@ -6,22 +6,28 @@
 
 namespace vergence::calibration::detail {
 
-inline constexpr int kDepthGrid = 7;  // places a side of the image
+/// Number of grid points along each side of the image.
+inline constexpr int kDepthGrid = 7;
 
 /// A pixel of the left image, a depth, and the projection of that point into camera k.
 struct CovisiblePoint {
   const Camera* left = nullptr;
   const Camera* right = nullptr;
   double depth_m = 0;
-  Vec2 pixel = Vec2::Zero();     // left
-  Vec3 ray = Vec3::Zero();       // left, (x, y, 1)
-  Vec3 X = Vec3::Zero();         // the point in camera k, m
-  Vec2 at = Vec2::Zero();        // right pixel
-  Mat23 G = Mat23::Zero();       // ∂at/∂X
-  Vec2 by_depth = Vec2::Zero();  // ∂at/∂depth, px/m
+  Vec2 pixel = Vec2::Zero();
+  /// Left ray (x, y, 1).
+  Vec3 ray = Vec3::Zero();
+  /// Point in the frame of camera k, in metres.
+  Vec3 X = Vec3::Zero();
+  /// Pixel in camera k's image.
+  Vec2 at = Vec2::Zero();
+  /// Derivative of `at` with respect to X, in px/m.
+  Mat23 G = Mat23::Zero();
+  /// Derivative of `at` with respect to the depth, in px/m.
+  Vec2 by_depth = Vec2::Zero();
 };
 
-/// Calls each(place) for a grid of places that both cameras see at a depth.
+/// Calls each(place) for those points of a grid that both cameras see at a depth.
 template <class Each>
 void for_places(const RigCalibration& rig, int k, double depth_m, Each each) noexcept {
   const auto c = static_cast<std::size_t>(k);
@@ -45,7 +51,7 @@ void for_places(const RigCalibration& rig, int k, double depth_m, Each each) noe
   }
 }
 
-/// Derivatives of a relative depth by a rig's parameters: the rows of RigCovariance that it has and
+/// Derivatives of a relative depth with respect to a rig's parameters, as rows of RigCovariance and
 /// their factors.
 struct DepthGradient {
   std::array<int, 6 + 2 * kIntrinsicsSize> row;
@@ -58,17 +64,17 @@ struct DepthGradient {
   }
 };
 
-/// `lenses`: theirs too, else the transform's alone.
+/// `lenses`: includes the intrinsics, otherwise only the transform.
 [[nodiscard]] DepthGradient depth_gradient(const CovisiblePoint& place,
                                            const Transform& T_camera_left, int k,
                                            bool lenses) noexcept;
 
-/// Variance of the relative depth; without `joint` that of the transform alone, by covariance_total
-/// or the wide sigmas.
+/// Variance of the relative depth; without `joint` only by the transform's covariance_total or, if
+/// that is zero, sigma_total.
 [[nodiscard]] double variance_of(const RigCalibration& rig, int k, const DepthGradient& g,
                                  bool joint) noexcept;
 
-/// The depths that a rig gives to pairs of pixels.
+/// Computes the depths that a rig assigns to pairs of pixels.
 class DepthReader {
  public:
   DepthReader(const RigCalibration& rig, int k) noexcept;

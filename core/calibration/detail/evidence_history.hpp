@@ -7,13 +7,14 @@
 
 namespace vergence::calibration::detail {
 
-/// The evidence of past moving frames: the newest one by one, older ones summed by blocks. A value;
-/// fixed, in place (some 50 kB). Full: the oldest block goes.
+/// Evidence of past moving frames: recent ones individually, older ones summed in blocks. When it
+/// is full, the oldest block is dropped. A value of about 50 kB.
 class EvidenceHistory {
  public:
-  static constexpr std::size_t kRecent = 64;  // single frames: an onset among them is exact
-  static constexpr std::size_t kBlock = 15;   // frames that older ones are summed by
-  // Two minutes at 30 Hz: how far back a drift is traced.
+  /// Number of individual frames, among which an onset is exact.
+  static constexpr std::size_t kRecent = 64;
+  static constexpr std::size_t kBlock = 15;
+  // Number of blocks over which a drift is traced: two minutes at 30 Hz.
   static constexpr std::size_t kBlocks = 240;
   struct Entry {
     std::uint64_t frame = 0;
@@ -25,18 +26,18 @@ class EvidenceHistory {
     open_ = Entry{};
     total_ = Evidence{};
   }
-  /// True: the block being filled is full, to be looked at before close_block().
+  /// Returns true if the open block is full; use it, then call close_block().
   [[nodiscard]] bool push(const Entry& entry) noexcept;
   void close_block() noexcept;
 
   [[nodiscard]] std::size_t frames() const noexcept { return count_; }
-  /// Blocks closed so far, those that are gone included, and those that are there.
+  /// Number of blocks closed so far, and of those still kept.
   [[nodiscard]] std::size_t closed() const noexcept { return closed_; }
   [[nodiscard]] std::size_t blocks() const noexcept { return std::min(closed_, kBlocks); }
-  /// Frames of the block being filled.
+  /// Number of frames in the open block.
   [[nodiscard]] std::size_t open_frames() const noexcept { return count_ % kBlock; }
   [[nodiscard]] const Entry& open() const noexcept { return open_; }
-  /// age 0: the newest.
+  /// Age 0 is the newest.
   [[nodiscard]] const Entry& recent(std::size_t age) const noexcept {
     return recent_[(count_ - 1 - age) % kRecent];
   }
@@ -50,12 +51,14 @@ class EvidenceHistory {
   [[nodiscard]] Evidence total() const noexcept;
 
  private:
-  // Frames, full blocks; where indices have 32 bits, 30 Hz for four and a half years.
+  // Numbers of frames and of full blocks; 32 bits last for four years at 30 Hz.
   std::size_t count_ = 0, closed_ = 0;
   std::array<Entry, kRecent> recent_{};
   std::array<Entry, kBlocks> blocks_{};
-  Entry open_{};      // the block being filled
-  Evidence total_{};  // of the blocks kept
+  // The block being filled.
+  Entry open_{};
+  // Sum over the kept blocks.
+  Evidence total_{};
 };
 
 }  // namespace vergence::calibration::detail

@@ -8,13 +8,12 @@
 
 namespace vergence::calibration::detail {
 
-/// θ of the monitor: φ (3, rad), α, β (rad: direction of t).
+/// Size of the monitor's θ: rotation φ (3, rad) and the direction of t by α and β (rad).
 inline constexpr int kTheta = 5;
 
-/// Gradient and information of θ from some observations: with residuals r at θ = 0 and derivatives
-/// J, weights w,
-///   g = −Σ w Jᵀ r / σ²,   A = Σ w Jᵀ J / σ²,   n = Σ w / σ², 1/px².
-/// All numbers add up over frames.
+/// Gradient g, information A and weight n (1/px²) of θ from observations with residuals r at θ = 0,
+/// derivatives J and weights w: g = −Σ w Jᵀ r / σ², A = Σ w Jᵀ J / σ², n = Σ w / σ². All numbers
+/// add up over frames.
 struct Evidence {
   Vec5 g = Vec5::Zero();
   Mat5 A = Mat5::Zero();
@@ -27,14 +26,14 @@ struct Evidence {
   }
 };
 
-/// A with a prior of 0.2 rad, wider than any rig that still matches is off: unobserved directions
-/// stay where they are.
+/// Factorises A with a prior of 0.2 rad, which is wider than the error of any rig that still
+/// matches. It keeps unobserved directions at zero.
 [[nodiscard]] inline Cholesky<5> with_prior(const Mat5& A) noexcept {
-  constexpr double kPriorSigma = 0.2;  // rad
+  constexpr double kPriorSigma = 0.2;
   return Cholesky<5>(A + Mat5::Identity() / (kPriorSigma * kPriorSigma));
 }
 
-/// Distance that θ = A⁻¹ g moves matches by, px rms over the image.
+/// Displacement of matches by θ = A⁻¹ g, px rms over the image.
 [[nodiscard]] inline double shift_px(const Evidence& e) noexcept {
   const Vec5 theta = with_prior(e.A).solve(e.g);
   return e.n > 0 ? std::sqrt(std::max(0.0, theta.dot(e.A * theta)) / e.n) : 0;

@@ -9,13 +9,15 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr int kStereoRounds =
-    3;  // of reweighting: the scale falls from that of a knock to that of the noise in two
-constexpr double kMinScale = 0.1;  // of the observations' sigma
-// An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors
-// at kTukey.
+// Number of reweighting rounds; two reduce the scale from that of a knock to that of the noise.
+constexpr int kStereoRounds = 3;
+// Minimum scale, in sigmas of the observations.
+constexpr double kMinScale = 0.1;
+// Correction because an M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')²
+// for Gaussian errors at kTukey.
 constexpr double kTukeySpread = 1.46;
-constexpr std::uint64_t kTrackGap = 30;  // frames: a number seen after longer is another track
+// Number of frames after which a track number denotes another track.
+constexpr std::uint64_t kTrackGap = 30;
 
 Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
   return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
@@ -44,8 +46,8 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     if (!c.epipolar.to_line(left, right, &row.r, &row.J)) continue;
     row.r *= f;
     row.J *= f;
-    row.inverse_sigma2 =
-        1.0 / (2.0 * s.sigma_px * s.sigma_px);  // two images' errors across the line
+    // The errors of both images add up across the line.
+    row.inverse_sigma2 = 1.0 / (2.0 * s.sigma_px * s.sigma_px);
     row.track = s.track;
     if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) ++rows_;
   }
@@ -80,9 +82,9 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
 
 void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame,
                                  bool follow, StereoResiduals* look) noexcept {
-  // With x the part of a track in the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹ x|²,
-  // and the variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), s what the
-  // track brought before.
+  // With x a track's contribution to the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹
+  // x|². The variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), with s the
+  // sum of the track's earlier contributions.
   const Mat5 whiten = with_prior(evidence.A).whitening();
   double now = 0, before = 0;
   for (std::size_t i = 0; i < rows_; ++i) {

@@ -9,9 +9,9 @@
 
 namespace vergence::calibration::detail {
 
-inline constexpr std::size_t kMaxObservations = 1024;  // of a frame; further ones are left out
+/// Maximum number of observations of a frame; further ones are left out.
+inline constexpr std::size_t kMaxObservations = 1024;
 
-/// The reference calibration with derived quantities.
 struct Reference {
   EpipolarGeometry epipolar{Transform{}};
   Pinhole left{}, right{};
@@ -19,36 +19,43 @@ struct Reference {
 
 /// Evidence from one frame's stereo matches.
 struct StereoResiduals {
-  bool usable = false;  // enough matches
+  /// True if there are enough matches.
+  bool usable = false;
   Evidence evidence;
-  double spread_now = 0;   // variance of g, this frame alone, over the white one: mean of the five
-  double spread_life = 0;  // and with what the same tracks said before: its sum over frames is the
-                           // variance of the sum
+  /// Ratio of the variance of g in this frame to that of white noise: mean over the five
+  /// parameters.
+  double spread_now = 0;
+  /// This ratio with the correlation to earlier observations of the same tracks. Its sum over
+  /// frames gives the variance of the summed gradient.
+  double spread_life = 0;
 };
 
-/// Turns observations into evidence about θ, with redescending weights about the frame's own robust
-/// fit: a shifted rig is no outlier.
+/// Turns observations into evidence about θ, with redescending weights around the frame's own
+/// robust fit, so that the matches of a shifted rig are not outliers.
 ///
-/// Memory  Fixed, in place (some 250 kB): lives in an arena. Time: linear in the observations.
+/// Memory  Fixed, in place (about 250 kB): lives in an arena. Time: linear in the observations.
 class MonitorResiduals {
  public:
   void reset() noexcept;
-  /// `follow`: remember what each track said, for spread_life. Off while the camera stands, where
-  /// tracks do not end.
+  /// `follow`: accumulate each track's gradient for spread_life. False at standstill, where tracks
+  /// do not end.
   [[nodiscard]] StereoResiduals stereo(const Reference& reference, const MonitorFrame& frame,
                                        int min_matches, bool follow) noexcept;
 
  private:
   struct StereoRow {
-    Vec5 J;                 // px
-    double r;               // px
-    double inverse_sigma2;  // of r, 1/px²
+    Vec5 J;
+    // Residual, in px.
+    double r;
+    // Inverse variance of r, in 1/px².
+    double inverse_sigma2;
     double weight;
     std::uint32_t track;
   };
   struct Memory {
     std::uint32_t track = 0;
-    std::uint64_t frame = 0;  // of the last observation, plus one; 0: empty
+    // Number of the last observation's frame plus one; 0 if empty.
+    std::uint64_t frame = 0;
     Vec5 sum = Vec5::Zero();
   };
   void spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
@@ -56,9 +63,9 @@ class MonitorResiduals {
 
   std::size_t rows_ = 0;
   std::array<StereoRow, kMaxObservations> stereo_{};
-  std::array<double, kMaxObservations> sizes_{};  // scratch of the median
-  std::array<Memory, 4096> memories_{};  // by track number; a newer track takes the place of one
-                                         // that has the same last bits
+  std::array<double, kMaxObservations> sizes_{};
+  // Memory by track number; a newer track replaces one with the same low bits.
+  std::array<Memory, 4096> memories_{};
 };
 
 }  // namespace vergence::calibration::detail

@@ -5,9 +5,10 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr double kMaxOfExpected = 20;  // a block that lies farther off than so many times what is
-                                       // expected is a change, no scatter
-constexpr double kMaxBlocks = 60;      // that are remembered: half a minute at 30 Hz
+// Ratio to the expected scatter above which a block's offset is a change of the rig.
+constexpr double kMaxOfExpected = 20;
+// Length of the running mean, in blocks: half a minute at 30 Hz.
+constexpr double kMaxBlocks = 60;
 
 }  // namespace
 
@@ -19,7 +20,8 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
   const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
   const double most = kMaxOfExpected * std::max(variance(), lambda / block.n);
-  if (!(scatter < most)) return;  // also refuses NaN
+  // The comparison also rejects NaN.
+  if (!(scatter < most)) return;
   if (static_cast<double>(blocks_) >= kMaxBlocks) {
     sum_ *= (kMaxBlocks - 1) / kMaxBlocks;
     --blocks_;

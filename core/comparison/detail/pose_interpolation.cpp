@@ -7,14 +7,13 @@
 namespace vergence::detail {
 namespace {
 
-/// Change an interval from its two neighbours', at one of its ends: the mean weighted so that a
-/// parabola is met.
+/// Slope at the end of an interval from its two neighbours, weighted to be exact for a parabola.
 Vec3 slope(const Vec3& before, double span_before, const Vec3& after, double span_after) {
   return (span_after / span_before * before + span_before / span_after * after) /
          (span_before + span_after);
 }
 
-/// Cubic Hermite from 0 at u = 0 to `whole` at u = 1, with the slopes there, of one interval.
+/// Cubic Hermite interpolation from 0 at u = 0 to `whole` at u = 1, with the slopes per interval.
 Vec3 hermite(double u, const Vec3& whole, const Vec3& slope_begin, const Vec3& slope_end) {
   const double v = 1 - u;
   return u * v * v * slope_begin - u * u * v * slope_end + u * u * (3 - 2 * u) * whole;

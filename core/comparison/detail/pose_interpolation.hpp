@@ -6,9 +6,9 @@
 
 namespace vergence::detail {
 
-/// A trajectory at a time, by cubics through four poses where there are four, else straight:
-/// between poses a tenth of a second apart a car that brakes or turns is some millimetres from the
-/// straight line. False: no two poses at most `max_gap` apart are around it. Threads pure.
+/// Interpolates a trajectory by cubics through four poses, or linearly if there are not four:
+/// between poses 0.1 s apart, a braking or turning car deviates from a straight line by
+/// millimetres. Returns false if no two poses at most `max_gap` apart enclose the time. Pure.
 [[nodiscard]] bool pose_at(std::span<const StampedPose> trajectory, Stamp at, Duration max_gap,
                            Transform* out);
 

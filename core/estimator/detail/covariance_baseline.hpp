@@ -10,29 +10,24 @@
 
 namespace vergence {
 
-/// Baseline of the motions' uncertainty: the median of the last ones. A motion whose sigma is
-/// several times larger is reported as less reliable, whatever the cause; a single certain motion
-/// among uncertain ones does not end the report.
+/// Baseline of the motions' uncertainty: the median over recent motions. A motion whose sigma is
+/// several times larger is reported; a single certain motion among uncertain ones does not end the
+/// report.
 ///
-/// Without faults no motion is more than 1.6 times as uncertain as usual on the recorded drives,
-/// and 2.3 times on the rendered street (build/bench/covariance_bench). Cameras out of sync give
-/// more than 4 times, a tunnel 3 times from its third frame on
-/// (FaultPairs.imageLateAfterALostOneIsNotOk).
+/// Without faults no motion is more than 1.6 times as uncertain as the baseline on recorded
+/// sequences, and 2.3 times on the rendered street (build/bench/covariance_bench). Cameras out of
+/// sync give more than 4 times, a tunnel 3 times (FaultPairs.imageLateAfterALostOneIsNotOk).
 ///
-/// Threads  One. Memory: none of the heap.
+/// Not thread-safe. Does not allocate.
 class CovarianceBaseline {
  public:
-  /// Standing still, residuals are smaller than they are on the way: such motions are no measure,
-  /// and need none. By the usual sigma: the more uncertain a motion, the more it has to be judged.
+  /// Returns true if the motion is significant against the baseline's sigma. Residuals are smaller
+  /// at standstill, so such motions must not enter the baseline.
   [[nodiscard]] bool measurable(double step_m, double sigma_m) const noexcept {
-    constexpr double kMoves = 2;  // sigmas
+    // Minimum length of a motion, in sigmas.
+    constexpr double kMoves = 2;
     return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
-  /// Returns true from a motion more than 3 times as uncertain as usual on, until the last three
-  /// are less than twice as uncertain, root mean square. A motion judged so makes nothing usual:
-  /// what stays so uncertain is reported for as long.
-  ///
-  /// sigma_m: of the translation of a motion that measurable(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
     recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
     times_ = kept_ >= kMin ? sigma_m / median() : 0;
@@ -49,7 +44,8 @@ class CovarianceBaseline {
   [[nodiscard]] double times_usual() const noexcept { return times_; }
 
  private:
-  static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 3;  // motions
+  // Numbers of motions in the baseline, before it is used, and in the test for the end.
+  static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 3;
   static constexpr double kTimes = 3, kRelease = 2;
 
   [[nodiscard]] double median() const noexcept {
@@ -59,9 +55,11 @@ class CovarianceBaseline {
 
   std::array<double, kKept> sigma_{};
   std::size_t next_ = 0, kept_ = 0;
-  std::array<double, kRecent> recent_{};  // squares
+  // Variances of the most recent motions, in m².
+  std::array<double, kRecent> recent_{};
   std::size_t evaluated_ = 0;
-  double times_ = 0;  // the last one
+  // Sigma of the last motion over the baseline.
+  double times_ = 0;
   bool unusual_ = false;
 };
 

@@ -15,8 +15,8 @@
 namespace vergence {
 
 struct Estimator::Parts {
-  // Without a calibration the baseline between two poses found separately is the scale: assumed,
-  // not measured; such poses are degraded.
+  // Relative uncertainty of lengths without a calibration, in percent. The baseline length then
+  // sets the scale and is assumed, not measured; such poses are degraded.
   static constexpr double kUnlinkedLengthPercent = 10;
 
   Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal,
@@ -87,22 +87,34 @@ struct Estimator::Parts {
   odometry::DriftCovariance drift{};
   CovarianceBaseline usual{};
   DegradationLedger degradations{};
-  double length_sigma_percent;  // relative sigma of all lengths, from the calibration in use
+  // Standard deviation of all lengths, in percent, from the calibration in use.
+  double length_sigma_percent;
   State state = State::initialising;
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
-  double verified_percent = 0;      // depth error of the calibration that was confirmed
-  ChangeEvidence verified_by;       // that it is the rig's
-  bool focal_contradicted = false;  // an event has reported it
-  bool moves = false;  // this frame's pose differs from the last one by more than its uncertainty
+
+  // Standard deviation of the depth by the verified calibration, in percent.
+  double verified_percent = 0;
+  // Evidence that the verified calibration is the rig's.
+  ChangeEvidence verified_by;
+  // True if an event has reported a wrong focal length.
+  bool focal_contradicted = false;
+  // True if this frame's pose differs from the last one by more than its uncertainty.
+  bool moves = false;
+
   int without_pose = 0;
-  bool in_gap = false;       // a gap was reported and has not ended
-  int unmatched_frames = 0;  // in a row
+  // True if a gap was reported and has not ended.
+  bool in_gap = false;
+  // Number of consecutive frames without stereo matches.
+  int unmatched_frames = 0;
   Reason notified_missing = Reason::none;
+
   std::atomic<bool> requested{false};
-  FixedVector<EstimatorEvent, 16> events;         // a frame raises at most eight
-  FixedVector<CalibrationDecision, 3> decisions;  // three in finish() at most
+  // One frame records at most eight events.
+  FixedVector<EstimatorEvent, 16> events;
+  // finish() makes at most three decisions.
+  FixedVector<CalibrationDecision, 3> decisions;
 };
 
 }  // namespace vergence

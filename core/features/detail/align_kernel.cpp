@@ -11,12 +11,13 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// A row of the window is 16 floats: at most that many lanes, and always a divisor of it.
+// A row of the window has 16 floats; the number of lanes always divides it.
 using Tag = hn::CappedTag<float, kWindowStride>;
-constexpr int kRows = kWindow + 2;  // with a border of one pixel for the gradients
+// Rows with a border of one pixel for the gradients.
+constexpr int kRows = kWindow + 2;
 
-/// Bilinear samples of the patch on the turned grid: kRows × (kWindowStride + 2), of which kRows
-/// columns count.
+/// Samples the patch bilinearly on the rotated grid: kRows × (kWindowStride + 2), of which kRows
+/// columns are used.
 void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4], float* out) {
   const Tag d;
   const hn::RebindToSigned<Tag> d32;
@@ -24,7 +25,7 @@ void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4
   constexpr float kHalf = 0.5F * static_cast<float>(kRows - 1);
   const auto zero = hn::Zero(d), last = hn::Set(d, kPatchSide - 1.001F);
   const auto byte = hn::Set(d32, 0xFF);
-  // Four bytes at once: the two neighbours in x are the lower ones. kPatchBytes leaves room behind
+  // Load four bytes at once, of which the lower two are neighbours in x. kPatchBytes has room after
   // the last pixel.
   const auto* base = reinterpret_cast<const std::int32_t*>(patch);
   for (int c = 0; c < kWindowStride; c += lanes) {
@@ -52,8 +53,8 @@ void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4
   }
 }
 
-/// Sums over a window by its columns, closed in one order whatever the vector's width: targets that
-/// fuse products with sums (AVX2, AVX3, NEON) give the same bits.
+/// Sums over a window by columns, reduced in an order independent of the vector width. Targets with
+/// fused multiply-add (AVX2, AVX3, NEON) give the same bits.
 struct ColumnSums {
   HWY_ALIGN float of[kWindowStride];
 

@@ -10,13 +10,13 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kColumns =
-    kMaxBlock + 32;  // floats a row of the working buffers: block, window and whole vectors
+// Number of floats per row of the working buffers: block, window and whole vectors.
+constexpr int kColumns = kMaxBlock + 32;
 constexpr int kWindowSide = 2 * kTensorRadius + 1;
 using Tag = hn::CappedTag<float, 16>;
 
-/// Products of the gradients of one image row: xx, xy, yy at x0 − radius … , n of them rounded up
-/// to whole vectors.
+/// Products xx, xy and yy of the gradients of one image row from x0 − radius on, n of them rounded
+/// up to whole vectors.
 void gradient_products(const ImageView& image, int x, int y, int n, float* xx, float* xy,
                        float* yy) {
   const Tag d;
@@ -43,7 +43,7 @@ void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* s
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   const int columns = w + 2 * kTensorRadius;
-  // A ring of rows: the products of the seven image rows under the window.
+  // Ring buffer with the products of the seven image rows under the window.
   HWY_ALIGN float ring[kWindowSide][3][kColumns];
   HWY_ALIGN float column_sum[3][kColumns];
   for (int p = 0; p < 3; ++p)
@@ -53,8 +53,8 @@ void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* s
     float(*oldest)[kColumns] = ring[row % kWindowSide];
     gradient_products(image, x0 - kTensorRadius, y0 - kTensorRadius + row, columns, newest[0],
                       newest[1], newest[2]);
-    // Sums of quarters below 2²⁴ quarters: exact in float, so adding the new row and taking the old
-    // one away leaves no error.
+    // The sums are multiples of 1/4 below 2²⁴/4 and thus exact in float, so adding the new row and
+    // subtracting the old one leaves no error.
     for (int p = 0; p < 3; ++p) {
       for (int i = 0; i < columns; i += lanes) {
         const auto in = hn::LoadU(d, newest[p] + i);

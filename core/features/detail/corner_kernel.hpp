@@ -5,13 +5,14 @@
 
 namespace vergence::features::detail {
 
-inline constexpr int kTensorRadius = 3;  // px: the 7×7 window of the structure tensor
-inline constexpr int kMaxBlock =
-    136;  // px a side: a cell of kMaxCell with a ring of neighbours, in whole vectors of 16
+/// Radius of the structure tensor's 7×7 window, in px.
+inline constexpr int kTensorRadius = 3;
+/// Maximum side of a block in px: a cell of kMaxCell with its neighbours, in whole vectors of 16.
+inline constexpr int kMaxBlock = 136;
 
-/// Corner score of the block of w×h px whose first pixel is (x0, y0): score[y · kMaxBlock + x].
-/// Precondition: w, h ≤ kMaxBlock − 8; the block with kTensorRadius + 1 px around, and 24 px more
-/// to the right, lies inside the image or its padding.
+/// Corner scores of the block of w×h px whose first pixel is (x0, y0): score[y · kMaxBlock + x].
+/// Precondition: w, h ≤ kMaxBlock − 8; the block with kTensorRadius + 1 px around it, and 24 px
+/// more to the right, is inside the image or its padding.
 void corner_scores(const ImageView& image, int x0, int y0, int w, int h, float* score) noexcept;
 
 }  // namespace vergence::features::detail

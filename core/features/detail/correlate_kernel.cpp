@@ -10,8 +10,8 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Σ T·I, Σ I and Σ I² of one place. Eight pixels are one row: 16-bit lanes, products summed
-/// pairwise into 32 bits. Where 16 lanes fit into a vector, two rows are summed at a time.
+/// Σ T·I, Σ I and Σ I² at one position. Eight pixels are one row: 16-bit lanes, with products
+/// summed pairwise into 32 bits. With 16 lanes per vector, two rows are summed at a time.
 template <class D8, class Load>
 HWY_INLINE void SumsAt(D8 d8, const std::uint8_t* block, Load load, std::int32_t* product,
                        std::int32_t* sum, std::int32_t* square) {

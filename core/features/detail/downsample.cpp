@@ -10,10 +10,10 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kMargin =
-    64;  // entries before and after the row: room for mirrored pixels and for whole vectors
+// Number of entries before and after the row, for mirrored pixels and whole vectors.
+constexpr int kMargin = 64;
 
-/// Column sums of five rows, weights 1 4 6 4 1: at most 255 · 16.
+/// Column sums of five rows with weights 1 4 6 4 1: at most 255 · 16.
 void filter_rows(const std::uint8_t* const rows[5], int width, std::uint16_t* out) {
   const hn::ScalableTag<std::uint16_t> d16;
   const hn::Rebind<std::uint8_t, decltype(d16)> d8;
@@ -32,7 +32,7 @@ void filter_rows(const std::uint8_t* const rows[5], int width, std::uint16_t* ou
                                         6 * rows[2][x]);
 }
 
-/// Every second pixel of the row, filtered the same way; v[-2] … v[width + 1] are valid.
+/// Filters every second pixel of the row the same way; v[-2] … v[width + 1] are valid.
 void filter_columns(const std::uint16_t* v, int out_width, std::uint8_t* out) {
   const hn::ScalableTag<std::uint16_t> d16;
   const hn::Rebind<std::uint8_t, decltype(d16)> d8;

@@ -8,12 +8,16 @@
 namespace vergence::features::detail {
 namespace {
 
-constexpr int kParts = 4;                 // a side
-constexpr int kSamples = 5;               // of a part, a side
-constexpr int kSide = kParts * kSamples;  // samples a side
-constexpr float kDescriptorSigma = 3.3F;  // s
-constexpr int kReach = 6;                 // s, of the orientation
-constexpr float kOrientationSigma = 2.F;  // s
+// Number of parts per side.
+constexpr int kParts = 4;
+// Number of samples per side of a part.
+constexpr int kSamples = 5;
+// Number of samples per side.
+constexpr int kSide = kParts * kSamples;
+// Sigmas and radius in units of the scale s.
+constexpr float kDescriptorSigma = 3.3F;
+constexpr int kReach = 6;
+constexpr float kOrientationSigma = 2.F;
 constexpr float kSector = std::numbers::pi_v<float> / 3;
 constexpr std::size_t kMaxDirections = (2 * kReach + 1) * (2 * kReach + 1);
 
@@ -21,19 +25,19 @@ struct Gradient {
   float x = 0, y = 0;
 };
 
-constexpr float kMaxPixels =
-    1e6F;  // of a coordinate or side: whole numbers of 32 bits hold it with room to spare
+// Maximum coordinate or side, far inside the range of 32-bit integers.
+constexpr float kMaxPixels = 1e6F;
 
-/// Half of a wavelet's side, px.
+/// Half of a wavelet's side, in px.
 int half_side(float s) noexcept {
   return s > 1.F ? static_cast<int>(std::lround(std::min(s, kMaxPixels))) : 1;
 }
 
-/// Haar wavelets of side 2 h about the corner of pixels nearest to (x, y). Nothing where they leave
-/// the picture: half a wavelet would see the picture's edge.
+/// Haar wavelets of side 2 h around the corner of pixels nearest to (x, y); zero outside the image,
+/// whose edge would otherwise be a gradient.
 Gradient haar(const IntegralImage& image, float x, float y, int h) noexcept {
   if (!(std::abs(x) < kMaxPixels && std::abs(y) < kMaxPixels)) return {};
-  // Pixel centres lie at whole numbers, the corners between them at halves.
+  // Pixel centres are at integers, the corners between them at halves.
   const int cx = static_cast<int>(std::lround(x + 0.5F)),
             cy = static_cast<int>(std::lround(y + 0.5F));
   if (cx < h || cy < h || cx + h > image.width() || cy + h > image.height()) return {};
@@ -59,7 +63,7 @@ std::array<float, kSide> descriptor_weights() noexcept {
 
 const std::array<float, kSide> kWeights = descriptor_weights();
 
-/// By squared distance, s².
+/// Weights by squared distance, in s².
 std::array<float, kReach * kReach> circle_weights() noexcept {
   std::array<float, kReach * kReach> w{};
   for (int r2 = 0; r2 < kReach * kReach; ++r2)
@@ -97,13 +101,15 @@ float surf_orientation(const IntegralImage& image, float x, float y, float scale
   std::sort(directions.begin(), directions.begin() + static_cast<std::ptrdiff_t>(n),
             [](const Direction& a, const Direction& b) {
               if (a.angle != b.angle) return a.angle < b.angle;
-              return a.g.x != b.g.x ? a.g.x < b.g.x : a.g.y < b.g.y;  // one order, so one sum
+              // A unique order gives a unique sum.
+              return a.g.x != b.g.x ? a.g.x < b.g.x : a.g.y < b.g.y;
             });
-  // Each sector begins at a direction: nothing is gained by one that begins between two. Its end
-  // only moves on.
+  // Each sector begins at a direction, because no other start can contain more. Its end only
+  // advances.
   float best = -1.F, angle = 0.F;
   Gradient sum;
-  std::size_t end = 0;  // first beyond the sector, counted on over the turn
+  // Index of the first direction beyond the sector, which continues after a full turn.
+  std::size_t end = 0;
   for (std::size_t first = 0; first < n; ++first) {
     const auto beyond = [&](std::size_t i) noexcept {
       return directions[i % n].angle - directions[first].angle +

@@ -5,8 +5,8 @@
 namespace vergence::features::detail {
 
 float squared_distance(const SurfDescriptor& a, const SurfDescriptor& b) noexcept {
-  // Sums of their own for every eighth number: the order of additions is then the same for vectors
-  // of four or eight.
+  // Separate sums for every eighth number keep the order of additions the same for vectors of four
+  // and eight.
   constexpr std::size_t kSums = 8;
   std::array<float, kSums> sums{};
   for (std::size_t i = 0; i < a.values.size(); i += kSums) {

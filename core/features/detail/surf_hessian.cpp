@@ -3,8 +3,8 @@
 namespace vergence::features::detail {
 namespace {
 
-/// The rows of the integral image that the boxes of one row of centres end on, and how far their
-/// columns lie from a centre.
+/// Rows of the integral image at the edges of the boxes for one row of centres, and the distances
+/// of their columns from a centre.
 struct Boxes {
   Boxes(const IntegralImage& image, int y, int L) noexcept
       : lobe(L / 3),
@@ -20,8 +20,8 @@ struct Boxes {
     const auto stereo = [](const std::uint32_t* row, int from, int to) noexcept {
       return row[to] - row[from];
     };
-    // Modulo 2³² until the end: the sums of boxes and their small multiples fit into 32 bits with
-    // sign.
+    // Compute modulo 2³² until the end; the sums of boxes and their small multiples fit into 32
+    // signed bits.
     const int a = x - half, b = x - middle, c = x + middle + 1, d = x + half + 1;
     const std::uint32_t dxx = stereo(xx[1], a, d) - stereo(xx[0], a, d) -
                               3U * (stereo(xx[1], b, c) - stereo(xx[0], b, c));
@@ -55,7 +55,7 @@ BoxHessian box_hessian(const IntegralImage& image, int x, int y, int L) noexcept
 void determinant_row(const IntegralImage& image, int x, int y, int L, int step, int n,
                      float* out) noexcept {
   const Boxes boxes(image, y, L);
-  // Neighbouring places are loaded as vectors; a loop of its own lets the compiler see it.
+  // Neighbouring positions are loaded as vectors; a separate loop lets the compiler do so.
   if (step == 1) {
     for (int i = 0; i < n; ++i) out[i] = boxes.at(x + i).determinant();
   } else {

@@ -7,11 +7,11 @@
 
 namespace vergence::features::detail {
 
-/// Sums over the rectangles of a picture (Viola & Jones 2001): S(x, y) = Σ of the pixels in columns
-/// below x and rows below y.
+/// Integral image for sums over rectangles (Viola & Jones 2001): S(x, y) = Σ of the pixels in
+/// columns below x and rows below y.
 ///
-/// Sums are modulo 2³²; that of a box is exact while 255 times its pixels stays below 2³¹.
-/// Memory  (width + 1) · (height + 1) numbers of the arena, for the largest picture.
+/// Sums are modulo 2³²; the sum of a box of fewer than 2³¹/255 pixels is exact.
+/// Memory  (width + 1) · (height + 1) numbers in the arena, for the largest image.
 class IntegralImage {
  public:
   IntegralImage() noexcept = default;

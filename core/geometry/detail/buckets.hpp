@@ -9,13 +9,14 @@
 
 namespace vergence::detail {
 
-/// The rectangle that observations fill, cut into buckets; sampling one observation a bucket keeps
-/// a sample spread out.
+/// Bounding rectangle of observations, divided into buckets; drawing at most one observation per
+/// bucket spreads a sample.
 class PixelBox {
  public:
   static constexpr int
       kColumns = 8,
-      kRows = 6;  // 48 buckets: a sample of five still finds five in a half-covered image
+      /// There are 48 buckets, so that a sample of five still finds five in a half-covered image.
+      kRows = 6;
 
   void include(double u, double v) noexcept {
     u0_ = std::min(u0_, u), u1_ = std::max(u1_, u), v0_ = std::min(v0_, v), v1_ = std::max(v1_, v);
@@ -35,14 +36,13 @@ class PixelBox {
   double u0_ = kFar, u1_ = -kFar, v0_ = kFar, v1_ = -kFar;
 };
 
-/// N different indices into `bucket`, uniform over the items (a bucket in proportion to what it
-/// holds), no two of one bucket as long as kTries allow, then merely different. False: fewer than N
-/// items, or chance failed kTries times over.
+/// Draws N different indices into `bucket`, uniformly over the items, from different buckets if
+/// kTries suffice. Returns false if there are fewer than N items or no different ones were found.
 template <std::size_t N>
 [[nodiscard]] bool draw_spread(std::span<const std::uint8_t> bucket, Random& random,
                                std::array<std::uint32_t, N>* picks) noexcept {
-  constexpr int kTries =
-      12;  // a bucket with half of all items is avoided in all but 2⁻¹² of the draws
+  /// A bucket with half of all items is avoided in all but 2⁻¹² of the draws.
+  constexpr int kTries = 12;
   if (bucket.size() < N) return false;
   for (std::size_t j = 0; j < N; ++j) {
     bool found = false;

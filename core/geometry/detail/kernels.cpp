@@ -76,8 +76,8 @@ float SampsonCost(const MatchColumns& c, std::size_t first, std::size_t last,
                              hn::Add(hn::Mul(k0, k0), hn::Mul(k1, k1)));
       const auto q = hn::Div(hn::Mul(hn::Mul(r, r), hn::LoadU(d, c.weight + i)), s);
       const auto cap = hn::LoadU(d, c.cap + i);
-      sum = hn::Add(
-          sum, hn::IfThenElse(hn::Lt(q, cap), q, cap));  // 0/0 is NaN, not less, and costs the cap
+      // 0/0 is NaN, which is not less and costs the cap.
+      sum = hn::Add(sum, hn::IfThenElse(hn::Lt(q, cap), q, cap));
     }
     hn::StoreU(sum, d, sums + lane);
   }
@@ -133,7 +133,7 @@ NormalSums NormalEquations(const RefineColumns& c, std::size_t n, const RefineCa
       const auto counted = hn::Gt(weight, zero);
       cost = hn::Add(cost, hn::IfThenElse(front, rho, hn::IfThenElseZero(counted, behind)));
       const auto w = hn::IfThenElseZero(front, hn::Mul(weight, robust));
-      // ∂pixel/∂X: rows (a, 0, p), (0, b, q); ∂/∂φ of a row g is q × g.
+      // The rows of ∂pixel/∂X are (a, 0, p) and (0, b, q); ∂/∂φ of a row g is q × g.
       const auto a = hn::Mul(m.fx, iz), b = hn::Mul(m.fy, iz);
       const auto p = hn::Neg(hn::Mul(a, px)), q = hn::Neg(hn::Mul(b, py));
       const auto u0 = hn::Mul(qy, p), u1 = hn::Sub(hn::Mul(qz, a), hn::Mul(qx, p)),

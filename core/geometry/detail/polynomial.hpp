@@ -6,10 +6,11 @@
 
 namespace vergence::detail {
 
-/// The real root of a x³ + b x² + c x + d where the cubic is steepest: the one that rounding of the
-/// coefficients moves least.
+/// Returns the real root of a x³ + b x² + c x + d at which the cubic is steepest, which is least
+/// sensitive to rounding of the coefficients.
 ///
-/// Precondition: finite. a = 0 is allowed; then the root of what is left, 0 when there is none.
+/// Precondition: finite. With a = 0 it returns the root of the remaining polynomial, or 0 if there
+/// is none.
 [[nodiscard]] inline double sharpest_cubic_root(double a, double b, double c, double d) noexcept {
   const double largest = std::max({std::abs(a), std::abs(b), std::abs(c), std::abs(d)});
   if (!(largest > 0.0)) return 0.0;
@@ -17,21 +18,21 @@ namespace vergence::detail {
     if (std::abs(b) < 1e-14 * largest) return c != 0.0 ? -d / c : 0.0;
     const double discriminant = std::max(0.0, c * c - 4.0 * b * d);
     const double q = -0.5 * (c + std::copysign(std::sqrt(discriminant), c));
-    return q != 0.0 ? d / q : 0.0;  // the smaller root
+    /// This is the smaller root.
+    return q != 0.0 ? d / q : 0.0;
   }
   const double i = 1.0 / a;
   b *= i, c *= i, d *= i;
-  // Newton from beyond the outer turning point converges monotonically; which side: where the cubic
-  // has its steep arm. x = y − b/3 turns it into y³ + p y + q.
+  // Newton's method converges monotonically from beyond the outer turning point, on the side of the
+  // steep arm. x = y − b/3 gives y³ + p y + q.
   const double shift = b / 3.0;
   const double p = c - b * shift, q = (2.0 * shift * shift - c) * shift + d;
-  // f(turning middle) = q: the root on the side opposite to q's sign is the outer, steep one (also
-  // the only one). Upper bound of |y| for y³ + p y + q = 0 (Lagrange): max(2 √|p| …) is within a
-  // factor 2 of the root.
+  // The value in the middle is q, so the root on the side opposite to q's sign is the steep (or
+  // only) one. There either |p y| or |q| is at least |y|³/2, which bounds |y| within a factor 2.
   double y =
       -std::copysign(std::max(std::cbrt(2.0 * std::abs(q)), std::sqrt(2.0 * std::max(0.0, -p))), q);
-  constexpr int kSteps = 12;  // from within a factor two: five or six quadratic steps; the rest is
-                              // for a flat triple root
+  /// Five or six quadratic steps suffice from within a factor two; more are for a flat triple root.
+  constexpr int kSteps = 12;
   for (int k = 0; k < kSteps; ++k) {
     const double f = (y * y + p) * y + q, slope = 3.0 * y * y + p;
     if (!(std::abs(slope) > 0.0)) break;
@@ -39,7 +40,7 @@ namespace vergence::detail {
     y -= step;
     if (std::abs(step) <= 1e-16 * std::abs(y)) break;
   }
-  // One step on the unshifted cubic takes away what the shift has rounded.
+  // One step on the unshifted cubic removes the rounding of the shift.
   double x = y - shift;
   const double slope = (3.0 * x + 2.0 * b) * x + c;
   if (slope != 0.0) {
@@ -49,20 +50,21 @@ namespace vergence::detail {
   return x;
 }
 
-/// Real roots in [-1, 1] of Σ c[i] xⁱ, i ≤ Degree, ascending, where the polynomial changes its
-/// sign; returns how many.
+/// Finds the real roots in [-1, 1] of Σ c[i] xⁱ, i ≤ Degree, at which the polynomial changes its
+/// sign, in ascending order. Returns their number.
 ///
-/// Between neighbouring critical points a polynomial is monotonic; those are the roots of its
-/// derivative, found the same way from the linear one upwards. Each root: Newton, bisected where it
-/// would leave its bracket, at most kSteps.
+/// A polynomial is monotonic between neighbouring critical points, which are the roots of its
+/// derivative and are found the same way, from the linear one upwards. Each root takes at most
+/// kSteps Newton steps, with bisection if a step would leave the bracket.
 template <std::size_t Degree>
 [[nodiscard]] std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c,
                                                  std::array<double, Degree>* roots) noexcept {
-  constexpr int kSteps = 60;  // bisection alone reaches the last bit of [-1, 1] in 54
+  /// Bisection alone reaches the last bit of [-1, 1] in 54 steps.
+  constexpr int kSteps = 60;
   std::array<double, Degree + 1> critical{};
   std::size_t n = 0;
   for (std::size_t degree = 1; degree <= Degree; ++degree) {
-    // The derivative of that degree, up to a common factor: d[i] ∝ c[i + m] (i + m)!/i!.
+    // Derivative of that degree, up to a common factor: d[i] ∝ c[i + m] (i + m)!/i!.
     const std::size_t m = Degree - degree;
     std::array<double, Degree + 1> d{};
     for (std::size_t i = 0; i <= degree; ++i) {

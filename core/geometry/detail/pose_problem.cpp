@@ -9,8 +9,8 @@
 namespace vergence::detail {
 namespace {
 
-constexpr double kBehindCost =
-    1e4;  // squared sigmas: a step that turns a point behind a camera has to be worth it
+// Cost in squared sigmas of a point behind a camera, high enough that few steps accept it.
+constexpr double kBehindCost = 1e4;
 
 }  // namespace
 
@@ -90,7 +90,7 @@ PoseProblem::Sums PoseProblem::sums(const Transform& T_left_world, double scale,
     Mat6 H;
     for (int r = 0, at = 0; r < 6; ++r)
       for (int c = r; c < 6; ++c) H(r, c) = H(c, r) = n.H[static_cast<std::size_t>(at++)];
-    // X_k = R_k X_left + t_k: the kernel's q is R_k X_left, its δ is (R_k φ, R_k τ).
+    // With X_k = R_k X_left + t_k, the kernel's q is R_k X_left and its δ is (R_k φ, R_k τ).
     const Mat3& R = s.T_camera_left.R;
     const Vec3 g_rotation(n.g[0], n.g[1], n.g[2]), g_translation(n.g[3], n.g[4], n.g[5]);
     out.g.head<3>() += R.transpose() * g_rotation;
@@ -125,7 +125,7 @@ Transform moved(const Transform& T_left_world, const Vec6& delta) noexcept {
 }
 
 bool solve_normal(const Mat6& H, const Vec6& g, Vec6* delta) noexcept {
-  // Equilibrated: rotation and translation have different units.
+  // Equilibrate, because rotation and translation have different units.
   Vec6 d;
   for (int i = 0; i < 6; ++i) {
     if (!(H(i, i) > 0.0)) return false;

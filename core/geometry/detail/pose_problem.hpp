@@ -9,23 +9,26 @@
 
 namespace vergence::detail {
 
-/// Least squares of T_left_world over the usable observations of a rig, points constant: columns
-/// and normal equations.
+/// Least-squares problem of T_left_world over the usable observations of a rig with constant
+/// points: columns and normal equations.
 ///
-/// Pixel of point p in camera k: X_k = R_k X_left + t_k, X_left = T_left_world p. The pose is moved
-/// in the camera's own axes,
+/// Pixel of point p in camera k: X_k = R_k X_left + t_k, X_left = T_left_world p. The pose is
+/// perturbed in the camera's own axes,
 ///
 ///     X_left ← Exp(φ) X_left + τ,   δ = (φ, τ),   ∂X_k/∂δ = R_k [ −[X_left]×   I ]
 ///
-/// not about the world's origin, which lies kilometres behind a vehicle: there rotation and
-/// translation would be the same thing.
+/// not about the world's origin, which is kilometres away from a vehicle, so that rotation and
+/// translation would be indistinguishable.
 /// Memory  In the arena at construction. Threads: one caller.
 class PoseProblem {
  public:
   struct Sums {
-    Mat6 H;       // Σ w JᵀJ, undamped
-    Vec6 g;       // Σ w Jᵀ r
-    double cost;  // Σ ρ
+    /// Σ w JᵀJ, undamped.
+    Mat6 H;
+    /// Σ w Jᵀ r.
+    Vec6 g;
+    /// Σ ρ.
+    double cost;
   };
 
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
@@ -33,14 +36,14 @@ class PoseProblem {
 
   /// Preconditions: consistent, size() ≤ capacity.
   void gather(const RigObservations& observations) noexcept;
-  /// Observation i of camera k counts (or not) from now on; all count after gather().
+  /// Sets whether observation i of camera k counts; all do after gather().
   void use(int camera, std::size_t i, bool counts) noexcept;
   [[nodiscard]] bool counts(int camera, std::size_t i) const noexcept {
     return sets_[static_cast<std::size_t>(camera)].weight[i] > 0.0;
   }
 
   [[nodiscard]] Sums sums(const Transform& T_left_world, double scale, double huber) const noexcept;
-  /// |r|²/σ² of every usable observation, infinity behind a camera; read back by errors().
+  /// Computes |r|²/σ² of every usable observation for errors(); infinity behind a camera.
   void evaluate(const Transform& T_left_world) noexcept;
 
   [[nodiscard]] int cameras() const noexcept { return cameras_; }
@@ -52,7 +55,7 @@ class PoseProblem {
     const Set& s = sets_[static_cast<std::size_t>(camera)];
     return s.error.first(s.count);
   }
-  /// Index of the point that observation i of that camera is of.
+  /// Index of the point of observation i.
   [[nodiscard]] std::size_t point(int camera, std::size_t i) const noexcept {
     return sets_[static_cast<std::size_t>(camera)].point[i];
   }
@@ -62,7 +65,8 @@ class PoseProblem {
   struct Set {
     std::span<double> x, y, z, u, v, weight, given_weight, error;
     std::span<std::uint32_t> point;
-    std::size_t count = 0, whole = 0;  // used, and rounded up to whole blocks
+    // Number of entries, and rounded up to whole blocks.
+    std::size_t count = 0, whole = 0;
     Transform T_camera_left;
     double fx = 0, fy = 0;
   };
@@ -74,10 +78,11 @@ class PoseProblem {
   int cameras_ = 0;
 };
 
-/// X_left ← Exp(φ) X_left + τ.
+/// Returns the pose perturbed by X_left ← Exp(φ) X_left + τ.
 [[nodiscard]] Transform moved(const Transform& T_left_world, const Vec6& delta) noexcept;
 
-/// Solves H δ = g for a positive definite H. False: not so, or not finite; *delta untouched.
+/// Solves H δ = g. Returns false and leaves *delta unchanged if H is not positive definite or not
+/// finite.
 [[nodiscard]] bool solve_normal(const Mat6& H, const Vec6& g, Vec6* delta) noexcept;
 
 }  // namespace vergence::detail

@@ -27,7 +27,8 @@ void FrameReceiver::supply_buffers() {
   free_.clear();
   for (std::size_t i = 0; i < memory_.slots(); ++i) {
     const auto slot = static_cast<FrameSlot>(i);
-    if (slots_.is_out(slot)) continue;  // comes when it is released
+    // A slot that is out follows when it is released.
+    if (slots_.is_out(slot)) continue;
     if (memory_.converts())
       free_.push_back(slot);
     else
@@ -50,7 +51,7 @@ void FrameReceiver::callback(void* self, ArvStreamCallbackType type, ArvBuffer*)
     receiver->take(done);
 }
 
-/// Slots that came back go to the transport again.
+/// Returns released slots to the transport.
 void FrameReceiver::recycle() noexcept {
   for (FrameSlot slot = 0; slots_.returned(&slot);) {
     if (memory_.converts())
@@ -62,11 +63,13 @@ void FrameReceiver::recycle() noexcept {
 
 void FrameReceiver::take(ArvBuffer* buffer) noexcept {
   const HostStamp arrival = monotonic_now();
-  g_object_unref(buffer);  // the memory's reference stands
+  // The reference of the ImageMemory remains.
+  g_object_unref(buffer);
   recycle();
   const std::size_t index = ImageMemory::index_of(buffer);
   Frame frame;
-  if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_ABORTED) return;  // the stream is closing
+  // Aborted buffers occur only while the stream closes.
+  if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_ABORTED) return;
   if (!describe(buffer, arrival, &frame)) {
     session_->push(buffer);
     return;
@@ -76,7 +79,8 @@ void FrameReceiver::take(ArvBuffer* buffer) noexcept {
     if (!slots_.offer(frame)) session_->push(buffer);
     return;
   }
-  if (free_.empty()) {  // cannot be: one more than may be out
+  // Cannot happen: there is one slot more than may be out.
+  if (free_.empty()) {
     session_->push(buffer);
     return;
   }
@@ -91,8 +95,9 @@ bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame)
   const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
   const std::uint64_t id = arv_buffer_get_frame_id(buffer);
   last_buffer_ns_.store(arrival.ns(), std::memory_order_release);
-  const auto step = blocks_.next(id);  // 0, as it was pushed: the leader is lost; the next frame's
-                                       // id shows that one is missing
+  // An id of 0, as set by push(), means that the leader was lost; the next frame's id then reveals
+  // the gap.
+  const auto step = blocks_.next(id);
   if (!step) return false;
   queue_.count_lost(step->missing);
   frame->counter = step->counter;
@@ -112,7 +117,7 @@ bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame)
   return true;
 }
 
-/// A frame that came whole may still be another than the one that was asked for.
+/// Checks the size: a complete frame may still not have the configured one.
 bool FrameReceiver::right_size(ArvBuffer* buffer) noexcept {
   gint x = 0, y = 0, width = 0, height = 0;
   std::size_t bytes = 0;

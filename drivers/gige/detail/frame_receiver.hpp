@@ -13,18 +13,20 @@
 
 namespace vergence::gige {
 
-/// Block ids of a stream, 16 or 64 bit, into exposures since its first frame.
+/// Unwraps the block ids of a stream (16 or 64 bit) into a count of exposures since its first
+/// frame.
 ///
-/// 16-bit ids are never 0: after 65535 comes 1. A 64-bit id shows itself by its size; until then
-/// both count alike.
-/// Not thread-safe. Fixed memory.
+/// 16-bit ids skip 0: 65535 is followed by 1. Ids count as 64 bit once one exceeds 65535. Not
+/// thread-safe.
 class BlockCounter {
  public:
   struct Step {
     std::uint64_t counter = 0;
-    std::uint64_t missing = 0;  // exposures between the newest before and this one
+    /// Exposures missing between the previous newest id and this one.
+    std::uint64_t missing = 0;
   };
-  /// Nothing: an id of 0, or one that is not newer than the newest (late or sent twice).
+  /// Returns nothing for an id of 0 and for an id that is not newer than the newest (late or
+  /// duplicate).
   [[nodiscard]] std::optional<Step> next(std::uint64_t id) noexcept {
     constexpr std::int64_t kIds = 65535;
     if (id == 0) return std::nullopt;
@@ -36,7 +38,8 @@ class BlockCounter {
     }
     wide_ = wide_ || id > static_cast<std::uint64_t>(kIds);
     auto ahead = static_cast<std::int64_t>(id - newest_);
-    if (!wide_) {  // the nearest of the ids that look like this one
+    if (!wide_) {
+      // Of all values congruent to this 16-bit id, the nearest to the newest is taken.
       ahead %= kIds;
       if (ahead > kIds / 2) ahead -= kIds;
       if (ahead < -(kIds / 2)) ahead += kIds;
@@ -53,43 +56,43 @@ class BlockCounter {
   std::uint64_t newest_ = 0, counter_ = 0;
 };
 
-/// Callback of Aravis's receive thread: completed buffers become frames with number, time,
-/// exposure and state, and go to the FrameQueue; slots that come back go to the transport again.
+/// Turns Aravis's completed buffers into frames with number, time, exposure and status, puts them
+/// into the FrameQueue, and returns released slots to the transport.
 ///
-/// Threads  begin(), supply_buffers(), end(): the owner, while no callback can come. callback():
-///          Aravis's thread, vergence-gige. The others: any.
-/// Memory   Taken by begin().
-/// Errors   A frame of another size than configured is torn, and counted.
+/// Threads  The owner calls begin(), supply_buffers() and end() while no callback can run.
+///          callback() runs on Aravis's thread. The other functions are thread-safe.
+/// Memory   Allocated by begin().
+/// Errors   A frame whose size is not the configured one is incomplete and counted.
 class FrameReceiver {
  public:
-  /// All outlive the receiver.
+  /// All arguments must outlive the receiver.
   FrameReceiver(FrameQueue& queue, SlotReturns& slots, ImageMemory& memory)
       : queue_(queue), slots_(slots), memory_(memory) {}
 
   /// Callback for Session::open_stream(); `self` is a FrameReceiver.
   static void callback(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
 
-  /// A stream of the session was opened. `applied` is its configuration, `exposure` what the
-  /// camera's registers hold; both are constant, `session` is there, until end().
+  /// Called after a stream of the session was opened. `applied` is its configuration, `exposure`
+  /// the setting in the camera's registers. `applied` and `session` must stay valid until end().
   void begin(Session& session, const Applied& applied, int width, int height,
              const ExposureSetting& exposure);
-  /// Gives the transport every buffer whose slot is not with the consumer.
+  /// Gives the transport every buffer whose slot is not held by the consumer.
   void supply_buffers();
-  /// The stream was closed: no callback comes any more.
+  /// Called after the stream was closed, when no further callback can run.
   void end() noexcept { session_ = nullptr; }
 
-  /// The camera's registers hold this from now on.
+  /// Reports that the camera's registers now hold this setting.
   void change_exposure(const ExposureSetting& setting) noexcept;
 
-  /// Time of the newest buffer, or of begin().
+  /// Time of the newest buffer, or of begin() before the first one.
   [[nodiscard]] HostStamp last_buffer() const noexcept {
     return HostStamp(last_buffer_ns_.load(std::memory_order_acquire));
   }
-  /// Frames in a row whose size is not the configured one.
+  /// Number of consecutive frames whose size is not the configured one.
   [[nodiscard]] int wrong_sizes() const noexcept {
     return wrong_sizes_.load(std::memory_order_relaxed);
   }
-  /// Value of the newest of these; 0 if unknown.
+  /// Size of the newest of these frames; 0 if unknown.
   [[nodiscard]] int wrong_width() const noexcept {
     return wrong_width_.load(std::memory_order_relaxed);
   }
@@ -111,8 +114,10 @@ class FrameReceiver {
   int width_ = 0, height_ = 0;
   BlockCounter blocks_;
   exposure::AppliedExposure exposures_;
-  Duration last_exposure_{};     // of the last frame
-  std::vector<FrameSlot> free_;  // converting: slots that are the transport's
+  // Exposure time of the last frame.
+  Duration last_exposure_{};
+  // Slots that belong to the transport; used only when images are converted.
+  std::vector<FrameSlot> free_;
   std::atomic<std::int64_t> last_buffer_ns_{0};
   std::atomic<int> wrong_sizes_{0}, wrong_width_{0}, wrong_height_{0};
 };

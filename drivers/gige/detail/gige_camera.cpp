@@ -103,7 +103,8 @@ DeviceTiming GigeCamera::timing() const noexcept {
   return t;
 }
 
-/// Addresses change hands: the left camera must not become the right one. Null: *why says it.
+/// Opens only the camera with the known identity: addresses are reassigned, and the left camera
+/// must not become the right one. If null, *why has the reason.
 std::unique_ptr<Session> GigeCamera::open_ours(const std::string& address, std::string* why) const {
   DeviceStatus status = DeviceStatus::ok;
   std::unique_ptr<Session> session = Session::open(address, &status, why);
@@ -113,7 +114,7 @@ std::unique_ptr<Session> GigeCamera::open_ours(const std::string& address, std::
   return nullptr;
 }
 
-/// A session, the old one or a new one. Precondition: device_ held.
+/// Ensures a working session, the old one or a new one. Precondition: device_ held.
 DeviceStatus GigeCamera::reach() {
   if (session_ != nullptr && !session_->lost() && session_->in_control()) return DeviceStatus::ok;
   session_.reset();
@@ -144,8 +145,8 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
     if (!configured_) return DeviceStatus::bad_configuration;
     const FrameQueue::State state = queue_.state();
     if (state == FrameQueue::State::streaming) return DeviceStatus::ok;
-    if (state == FrameQueue::State::gone)
-      return DeviceStatus::disconnected;  // the supervisor is at it
+    // The supervisor is reconnecting.
+    if (state == FrameQueue::State::gone) return DeviceStatus::disconnected;
     const std::lock_guard lock(device_);
     DeviceStatus status = state == FrameQueue::State::stopped ? reach() : DeviceStatus::ok;
     if (status == DeviceStatus::ok && stale_) status = apply_again();
@@ -156,7 +157,8 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
       return status;
     }
     close_stream(false);
-    if (state == FrameQueue::State::back) {  // not yet, after all
+    // The camera has disconnected again.
+    if (state == FrameQueue::State::back) {
       session_.reset();
       queue_.fail(monotonic_now());
       return DeviceStatus::disconnected;
@@ -212,7 +214,8 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
     ExposureSetting taken;
     if (const DeviceStatus s = session_->change_exposure(requested, &taken); s != DeviceStatus::ok)
       return last_error_.refuse(s, session_->last_error());
-    requested_.exposure = taken.exposure;  // also after it was unplugged
+    // The setting also applies after a reconnect.
+    requested_.exposure = taken.exposure;
     requested_.gain_db = taken.gain_db;
     in_force_ = taken;
     receiver_.change_exposure(taken);
@@ -242,13 +245,14 @@ DeviceStatus GigeCamera::trigger_once() noexcept {
 namespace {
 
 constexpr Duration kTick = Duration::milliseconds(100);
-constexpr Duration kMinSilence =
-    Duration::seconds(1);  // of a free running camera before it is taken for gone
-constexpr Duration kAskEvery =
-    Duration::seconds(1);  // a triggered one may rest; it is asked whether it is there
-constexpr Duration kFirstPause = Duration::milliseconds(500),
-                   kLongestPause = Duration::seconds(5);  // between attempts to reopen
-constexpr int kWrongSizes = 3;                            // in a row: no accident
+// Silence after which a free-running camera counts as disconnected.
+constexpr Duration kMinSilence = Duration::seconds(1);
+// Query interval of a triggered camera, which may be idle.
+constexpr Duration kAskEvery = Duration::seconds(1);
+// Pauses between attempts to reopen.
+constexpr Duration kFirstPause = Duration::milliseconds(500), kLongestPause = Duration::seconds(5);
+// Consecutive frames of wrong size that count as a fault.
+constexpr int kWrongSizes = 3;
 
 }  // namespace
 
@@ -284,7 +288,8 @@ void GigeCamera::supervise(Watch* watch) {
       case FrameQueue::State::stopped:
         break;
     }
-  } catch (const std::exception&) {  // no memory for a message: the next round tries again
+    // Out of memory for a message; the next round tries again.
+  } catch (const std::exception&) {
   }
 }
 
@@ -326,7 +331,7 @@ bool GigeCamera::reopen() {
   const std::lock_guard lock(device_);
   std::string why;
   session_ = open_ours(address_, &why);
-  // It may have another address, and another camera may have the old one.
+  // Searches by serial number: the camera may have a new address, and another camera its old one.
   if (session_ == nullptr && !info_.serial.empty() && !supervisor_.stopping())
     for (const Found& f : discover())
       if (f.info.serial == info_.serial && session_ == nullptr)

@@ -19,21 +19,22 @@
 
 namespace vergence::gige {
 
-/// A thread that does something every `interval`, the first time after one of them.
+/// Thread that calls a function every `interval`, first after one interval.
 ///
-/// Threads  start(), stop(): the owner. stopping(): any. Memory: start()'s.
-/// Errors   start() throws where there is no thread. What `round` throws ends the program.
+/// The owner calls start() and stop(). start() throws if no thread can be created. An exception
+/// from `round` terminates the program.
 ///
 ///     watch_.start("vergence-watch", Duration::milliseconds(100), [this] { poll(); });
 class PeriodicThread {
  public:
   ~PeriodicThread() { stop(); }
 
-  /// Nothing happens where it runs already. `name`: at most 15 letters, and it stays.
+  /// Does nothing if the thread already runs. `name` has at most 15 letters and must outlive the
+  /// thread.
   void start(const char* name, Duration interval, std::function<void()> round);
-  /// Returns when the round in progress is over; at once where none runs.
+  /// Waits for the current round. Returns immediately if the thread does not run.
   void stop() noexcept;
-  /// For long rounds: stop() is waiting.
+  /// True while stop() waits; long rounds should check it.
   [[nodiscard]] bool stopping() const noexcept { return stopping_; }
 
  private:
@@ -48,16 +49,16 @@ class PeriodicThread {
 /// `640 x 480`.
 [[nodiscard]] std::string size_text(int width, int height);
 
-/// A GigE Vision camera: drivers/camera.hpp and gige.hpp have the contract.
+/// GigE Vision camera; the contract is in drivers/camera.hpp and gige.hpp.
 ///
-/// Aravis's receive thread fills buffers of the ImageMemory, the FrameReceiver makes frames of them
-/// and offers them to the FrameQueue. A supervisor watches while
-/// streaming: a camera that answers no more, or sends no more, is gone; then it opens and
-/// configures it again, with growing pauses, until start() can go on.
-/// Threads  The owner, Aravis's, the supervisor; the session is under device_, which the frames'
-///          way never takes.
-/// Time     stop() and start() may take as long as the session's calls: 2.5 s each, once the camera
-///          has gone.
+/// Aravis's receive thread fills buffers of the ImageMemory. The FrameReceiver turns them into
+/// frames for the FrameQueue. A supervisor thread detects a camera that no longer responds or
+/// sends, then reopens and configures it with increasing pauses until start() can resume.
+///
+/// Threads  The mutex device_ guards the session between owner and supervisor. Frames are delivered
+///          without it.
+/// Time     start() and stop() may take as long as the session's calls, 2.5 s each for a
+///          disconnected camera.
 class GigeCamera final : public CameraDevice {
  public:
   explicit GigeCamera(std::unique_ptr<Session> session);
@@ -92,8 +93,10 @@ class GigeCamera final : public CameraDevice {
   // The supervisor.
   struct Watch;
   struct Fault {
-    std::string reason;     // empty: none
-    bool reachable = true;  // it still answers
+    // Empty if there is no fault.
+    std::string reason;
+    // True if the camera still responds.
+    bool reachable = true;
   };
   void start_supervising();
   void supervise(Watch* watch);
@@ -102,18 +105,23 @@ class GigeCamera final : public CameraDevice {
   [[nodiscard]] bool reopen();
 
   DeviceInfo info_;
-  mutable std::mutex device_;  // session_, address_
+  // Guards session_ and address_.
+  mutable std::mutex device_;
   std::unique_ptr<Session> session_;
-  std::string address_;  // where it was last; info_.place is where it was first
+  // Last address of the camera; info_.place is its first one.
+  std::string address_;
   LastError last_error_;
-  Published<std::string> remark_;  // of the session
+  // Remark of the session.
+  Published<std::string> remark_;
 
   // Set by configure(); constant while streaming.
   CameraConfiguration requested_{};
   Options options_{};
   Applied applied_{};
-  ExposureSetting in_force_{};               // what the camera's registers hold; under device_
-  bool configured_ = false, stale_ = false;  // stale: the camera may hold what was refused
+  // Exposure and gain in the camera's registers; guarded by device_.
+  ExposureSetting in_force_{};
+  // `stale_` means that the camera may hold parts of a rejected configuration.
+  bool configured_ = false, stale_ = false;
 
   ImageMemory memory_;
   FrameQueue queue_;

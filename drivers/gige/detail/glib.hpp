@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-/// Owners for what GLib hands out.
+/// Owners of GLib objects and memory.
 namespace vergence::gige {
 
 struct Unref {
@@ -19,7 +19,7 @@ struct Free {
 template <class T>
 using Memory = std::unique_ptr<T, Free>;
 
-/// A GError on its way into a message: `f(…, error.out())`, then `if (error)`.
+/// Owner of a GError: pass `error.out()` to the function, then test `if (error)`.
 class Error {
  public:
   Error() noexcept = default;
@@ -27,7 +27,7 @@ class Error {
   Error(const Error&) = delete;
   Error& operator=(const Error&) = delete;
 
-  /// Forgets what it held.
+  /// Clears the error before it is set again.
   [[nodiscard]] GError** out() noexcept {
     g_clear_error(&error_);
     return &error_;

@@ -3,9 +3,10 @@
 namespace vergence::gige {
 namespace {
 
-constexpr std::size_t kSpare =
-    3;  // buffers beside the slots that may be out: one is being filled, the next two wait
-constexpr std::size_t kWireBuffers = 4;  // where every frame is converted at once
+// Buffers in addition to the slots that may be out: one is filled while two wait.
+constexpr std::size_t kSpare = 3;
+// Number of wire buffers if every frame is converted immediately.
+constexpr std::size_t kWireBuffers = 4;
 
 constexpr std::size_t padded(std::size_t bytes) noexcept {
   return (bytes + kCacheLine - 1) / kCacheLine * kCacheLine;
@@ -19,7 +20,7 @@ void ImageMemory::allocate(const GreyFormat& format, int width, int height, std:
   width_ = width;
   height_ = height;
   converts_ = format.how != GreyFormat::How::as_it_is;
-  // Converting: one more, into which the frame goes that is then refused.
+  // When converting, one additional slot takes the frame that is then refused.
   slots_ = most + (converts_ ? 1 : kSpare);
   stride_ = converts_ ? FramePool::stride(width) : static_cast<std::size_t>(width);
   slot_bytes_ = converts_ ? stride_ * static_cast<std::size_t>(height) : padded(payload);

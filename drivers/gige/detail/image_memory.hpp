@@ -12,12 +12,12 @@
 
 namespace vergence::gige {
 
-/// The slots of a camera's images, and the buffers that Aravis fills: the slots themselves where
-/// the format is 8-bit grey, else a few beside them, from which images are converted.
+/// Slots of a camera's images, and the buffers that Aravis fills. For 8-bit grey these are the
+/// slots themselves; otherwise a few separate buffers, which are converted into slots.
 ///
-/// Ownership  One reference to every buffer is this object's.
-/// Threads    allocate(), clear(): the owner, while no stream is open. The others: any; pixels
-///            belong to whom the SlotReturns say.
+/// Ownership  Holds one reference to every buffer.
+/// Threads    The owner calls allocate() and clear() while no stream is open. The other functions
+///            are thread-safe; SlotReturns tracks who may access the pixels.
 /// Memory     One arena, taken by allocate().
 class ImageMemory {
  public:
@@ -26,8 +26,8 @@ class ImageMemory {
   ImageMemory(const ImageMemory&) = delete;
   ImageMemory& operator=(const ImageMemory&) = delete;
 
-  /// For images of this size, of which `most` may be out with the consumer. `payload`: bytes of a
-  /// frame on the wire.
+  /// Allocates for images of this size, of which the consumer may hold `most`. `payload` is the
+  /// size of a frame on the wire, in bytes.
   void allocate(const GreyFormat& format, int width, int height, std::size_t payload,
                 std::size_t most);
   void clear() noexcept;
@@ -36,16 +36,18 @@ class ImageMemory {
   /// True if images are converted into the slots; otherwise buffer i is slot i.
   [[nodiscard]] bool converts() const noexcept { return converts_; }
   [[nodiscard]] const std::vector<ArvBuffer*>& buffers() const noexcept { return buffers_; }
-  /// Which of buffers() it is.
+  /// Index of the buffer in buffers().
   [[nodiscard]] static std::size_t index_of(ArvBuffer* buffer) noexcept;
-  /// The image in buffer `index`, as grey into `slot`. Precondition: converts().
+  /// Converts the image in buffer `index` to grey into `slot`. Precondition: converts().
   void convert(const GreyFormat& format, std::size_t index, FrameSlot slot) noexcept;
   [[nodiscard]] ImageView view(FrameSlot slot) const noexcept;
 
  private:
   std::unique_ptr<Arena> arena_;
-  std::span<std::uint8_t> pixels_;  // of the slots
-  std::span<std::uint8_t> wire_;    // of the buffers where they are not the slots
+  // Pixels of the slots.
+  std::span<std::uint8_t> pixels_;
+  // Memory of the buffers if they are not the slots.
+  std::span<std::uint8_t> wire_;
   std::size_t slot_bytes_ = 0, wire_bytes_ = 0, slots_ = 0, stride_ = 0;
   int width_ = 0, height_ = 0;
   std::vector<ArvBuffer*> buffers_;

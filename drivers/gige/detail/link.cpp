@@ -20,15 +20,19 @@
 namespace vergence::gige {
 namespace {
 
-constexpr int kWireOverhead = 38;  // bytes: Ethernet's header 14, check sum 4, preamble 8, gap 12
-constexpr int kHeaders = 20 + 8 + 8;  // IP, UDP, GVSP
+// Bytes of Ethernet's header (14), checksum (4), preamble (8) and gap (12).
+constexpr int kWireOverhead = 38;
+// Bytes of the IP, UDP and GVSP headers.
+constexpr int kHeaders = 20 + 8 + 8;
 constexpr int kExtendedHeaders = 20 + 8 + 20;
-constexpr int kMaxBySwitches = 9000;  // bytes; beyond it few switches go
+// Largest packet in bytes that most switches forward.
+constexpr int kMaxBySwitches = 9000;
 
 double packet_count(const LinkLoad& load, int packet_size) noexcept {
   const int data = std::max(1, packet_size - (load.extended_ids ? kExtendedHeaders : kHeaders));
   const auto filled = (load.payload + data - 1) / data;
-  return static_cast<double>(filled + 2);  // leader and trailer
+  // Adds leader and trailer.
+  return static_cast<double>(filled + 2);
 }
 
 }  // namespace
@@ -113,18 +117,19 @@ int find_udp_socket(std::uint16_t port) {
 
 std::int64_t set_receive_buffer(int socket, std::int64_t bytes) {
   const int requested = static_cast<int>(std::min<std::int64_t>(bytes, INT_MAX / 4));
-  // Beyond the system's limit where we may (CAP_NET_ADMIN); the plain call is capped by it in
-  // silence.
+  // SO_RCVBUFFORCE exceeds the system's limit with CAP_NET_ADMIN; SO_RCVBUF is silently capped.
   if (::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &requested, sizeof requested) != 0)
     (void)::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &requested, sizeof requested);
   int got = 0;
   socklen_t length = sizeof got;
   if (::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &got, &length) != 0) return 0;
-  return got / 2;  // the kernel doubles what it is asked for, for its own book-keeping
+  // The kernel doubles the requested size for its own bookkeeping.
+  return got / 2;
 }
 
 LinkBudget link_budget(const LinkDemand& d) noexcept {
-  constexpr int kMinPacket = 576, kMaxPacket = 65'000, kStep = 4;  // bytes: what cameras have
+  // Typical limits of cameras, in bytes.
+  constexpr int kMinPacket = 576, kMaxPacket = 65'000, kStep = 4;
   const LinkLoad load{d.image_bytes, d.rate_hz, d.cameras, false};
   LinkBudget budget;
   budget.packet_size = choose_packet_size(d.packet_size, d.mtu, kMinPacket, kMaxPacket, kStep);

@@ -6,53 +6,61 @@
 
 namespace vergence::gige {
 
-/// The network interface that a camera is reached through.
+/// Network interface that leads to a camera.
 struct Interface {
   std::string name;
-  int mtu = 1500;          // bytes
-  std::int64_t speed = 0;  // bit/s; 0: the system does not say (loopback, virtual)
+  /// MTU in bytes.
+  int mtu = 1500;
+  /// Speed in bit/s; 0 if the system does not report it (loopback, virtual).
+  std::int64_t speed = 0;
 };
-/// The one with this IPv4 address; without one the name is empty.
+/// Interface with this IPv4 address; its name is empty if there is none.
 [[nodiscard]] Interface find_interface(const std::string& address);
 
 /// Requirements of a stream on its link.
 struct LinkLoad {
-  std::int64_t payload = 0;  // bytes a frame
+  /// Bytes per frame.
+  std::int64_t payload = 0;
   double rate_hz = 0;
-  int cameras = 1;  // that share the link, all alike
+  /// Number of identical cameras that share the link.
+  int cameras = 1;
   bool extended_ids = false;
 };
 struct LinkPlan {
-  int packet_size = 1500;  // bytes, GevSCPSPacketSize: with the IP, UDP and GVSP headers
-  Duration delay{};        // between two packets of one camera
-  Duration transfer{};     // of a frame
-  double share = 0;  // of the time between two frames that the transfer takes; above kMaxOfPeriod
-                     // it does not fit
+  /// Packet size in bytes (GevSCPSPacketSize), including the IP, UDP and GVSP headers.
+  int packet_size = 1500;
+  /// Delay between two packets of one camera.
+  Duration delay{};
+  /// Transfer time of a frame.
+  Duration transfer{};
+  /// Share of the frame interval that the transfer takes. Above kMaxOfPeriod it does not fit.
+  double share = 0;
 };
-inline constexpr double kMaxOfPeriod = 0.9;  // the rest is for resent packets and control
+/// Highest permitted share; the rest is reserved for resent packets and control.
+inline constexpr double kMaxOfPeriod = 0.9;
 
-/// The largest packet that interface, camera and request allow, a multiple of the camera's step.
-/// `wished` 0: at most 9000, what switches carry.
+/// Largest packet size that interface, camera and request allow, a multiple of the camera's step.
+/// If `wished` is 0, at most 9000, the limit of most switches.
 [[nodiscard]] int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most,
                                      std::int64_t step) noexcept;
 
-/// Delay and transfer time for a packet size: (N − 1) · (size + 38) · 8 / R between two packets, 10
-/// % more, so that the packets of N cameras that expose together interleave on a link of R bit/s.
-/// 38 bytes are Ethernet's header, check sum, preamble and gap. `speed` 0: no delay, no time.
-/// `delay` not negative: that delay instead of the computed one.
+/// Computes delay and transfer time for a packet size. The delay between two packets is (N − 1) ·
+/// (size + 38) · 8 / R plus 10 %, so that the packets of N cameras exposing simultaneously
+/// interleave on a link of R bit/s. The 38 bytes are Ethernet's header, checksum, preamble and gap.
+/// With `speed` 0 both results are 0. A non-negative `delay` replaces the computed one.
 [[nodiscard]] LinkPlan plan_link(const LinkLoad& load, int packet_size, std::int64_t speed,
                                  Duration delay) noexcept;
 
-/// Highest rate of such a stream, Hz.
+/// Highest frame rate of such a stream, in Hz.
 [[nodiscard]] double highest_rate(const LinkLoad& load, int packet_size,
                                   std::int64_t speed) noexcept;
 
-/// The UDP socket of this process that is bound to a port, −1: none. The descriptor stays its
-/// owner's.
+/// UDP socket of this process that is bound to the port, or −1. The caller does not own the
+/// descriptor.
 [[nodiscard]] int find_udp_socket(std::uint16_t port);
 
-/// Asks for a receive buffer of so many bytes, beyond net.core.rmem_max where the process may. →
-/// bytes that it then holds
+/// Requests a receive buffer of this size, beyond net.core.rmem_max if the process may. Returns the
+/// resulting size in bytes.
 [[nodiscard]] std::int64_t set_receive_buffer(int socket, std::int64_t bytes);
 
 }  // namespace vergence::gige

@@ -18,7 +18,8 @@ namespace {
 
 struct Names {
   Purpose purpose;
-  std::array<const char*, 4> names;  // newest standard first; null: no more
+  // Names from the newest standard to the oldest, null-padded.
+  std::array<const char*, 4> names;
 };
 constexpr std::array kNames{
     Names{Purpose::exposure, {"ExposureTime", "ExposureTimeAbs", "ExposureTimeRaw", "Exposure"}},
@@ -117,8 +118,8 @@ bool Features::set(const std::string& name, double value, const char* unit, doub
   const bool whole = limits->step > 0;
   if (whole)
     value = limits->least + std::round((value - limits->least) / limits->step) * limits->step;
-  const double slack =
-      1e-6 * std::max(1.0, std::abs(value));  // floats on their way through a register of 32 bits
+  // Tolerance for floats that pass through a 32-bit register.
+  const double slack = 1e-6 * std::max(1.0, std::abs(value));
   if (value < limits->least - slack || value > limits->most + slack)
     return refuse(name + " " + shown(value) + " " + unit + " is not possible: the camera offers " +
                   shown(limits->least) + " to " + shown(limits->most) + " " + unit);
@@ -191,8 +192,10 @@ namespace {
 
 constexpr std::uint64_t kCapabilities = 0x934, kControlPrivilege = 0xA00;
 constexpr std::uint32_t kCanResend = 4;
-constexpr std::int64_t kMinSocketBuffer = 4 << 20;  // bytes
-constexpr std::int64_t kBufferedFrames = 8;         // that the socket holds while it is not read
+// Minimum size of the socket's receive buffer, in bytes.
+constexpr std::int64_t kMinSocketBuffer = 4 << 20;
+// Number of frames that the receive buffer holds.
+constexpr std::int64_t kBufferedFrames = 8;
 
 std::string to_text(const char* text) { return text == nullptr ? "" : text; }
 
@@ -203,8 +206,8 @@ std::string to_address(GSocketAddress* address) {
   return to_text(text.get());
 }
 
-/// Guards Aravis's list of devices, which it reads and makes anew without a lock, while every
-/// camera that is away has a thread that looks for it.
+/// Guards Aravis's list of devices, which Aravis reads and rebuilds without a lock while the thread
+/// of each disconnected camera searches for it.
 std::shared_mutex& device_list() {
   static std::shared_mutex mutex;
   return mutex;
@@ -268,14 +271,15 @@ Session::Session(Object<ArvDevice> device) : device_(std::move(device)), feature
 Session::~Session() {
   close_stream(!lost());
   (void)g_signal_handlers_disconnect_by_data(device_.get(), this);
-  // Aravis's heartbeat holds the device for a moment when it notices that control is lost. Were its
-  // reference the last, it would have to wait for its own thread: so it is told that there is
-  // nothing to lose any more, and waited for.
+  // When Aravis detects a loss of control, its heartbeat thread holds a reference for a moment. If
+  // that became the last one, the thread would join itself. So control is given up first, and that
+  // reference awaited.
   if (!lost()) {
     Error error;
     (void)arv_gv_device_leave_control(ARV_GV_DEVICE(device_.get()), error.out());
   }
-  constexpr int kMoments = 1000;  // of a millisecond
+  // Longest wait, in milliseconds.
+  constexpr int kMoments = 1000;
   const auto references = [this] { return g_atomic_int_get(&G_OBJECT(device_.get())->ref_count); };
   for (int i = 0; i < kMoments && references() > 1; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -283,7 +287,7 @@ Session::~Session() {
 
 DeviceStatus Session::refuse(DeviceStatus status, std::string message) {
   last_error_ = std::move(message);
-  // A camera that has gone refuses everything; the message about the last feature would mislead.
+  // A disconnected camera refuses everything; the message about the last feature would mislead.
   if (lost() || !in_control()) {
     last_error_ = "the camera does not answer any more";
     return DeviceStatus::disconnected;
@@ -316,7 +320,7 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
     }
     return refuse(DeviceStatus::failed, "the stream cannot be made: " + error.text());
   }
-  // Aravis may have tried the size with a test packet and taken another one.
+  // Aravis may have tested the packet size and chosen another one.
   const int size = static_cast<int>(arv_gv_device_get_packet_size(gv, error.out()));
   if (!error && size > a.link.mtu)
     arv_gv_device_set_packet_size(gv, a.plan.packet_size, error.out());
@@ -344,8 +348,8 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
   return DeviceStatus::ok;
 }
 
-/// Before the first packet, which Aravis does after it: half of all streams would lose their first
-/// frame.
+/// Must be called before the first packet. Aravis sets the buffer later, and half of all streams
+/// would lose their first frame.
 void Session::enlarge_socket_buffer(const Applied& a) {
   const std::int64_t requested =
       a.options.socket_buffer_kb > 0
@@ -362,8 +366,8 @@ void Session::enlarge_socket_buffer(const Applied& a) {
 }
 
 void Session::push(ArvBuffer* buffer) noexcept {
-  arv_buffer_set_frame_id(
-      buffer, 0);  // an id that no frame has: Aravis leaves the old one where the leader is lost
+  // Sets an id that no frame has, because Aravis keeps the old one if the leader is lost.
+  arv_buffer_set_frame_id(buffer, 0);
   arv_stream_push_buffer(stream_.get(), static_cast<ArvBuffer*>(g_object_ref(buffer)));
 }
 
@@ -384,7 +388,8 @@ void Session::close_stream(bool reachable) noexcept {
     if (!error && features_.has("TLParamsLocked"))
       arv_device_set_integer_feature_value(device_.get(), "TLParamsLocked", 0, error.out());
   }
-  g_object_unref(stream_.get());  // joins its thread, whose callbacks use stream_ until then
+  // Joins the stream's thread, whose callbacks use stream_ until then.
+  g_object_unref(stream_.get());
   (void)stream_.release();
 }
 
@@ -403,8 +408,8 @@ DeviceStatus Session::apply(const CameraConfiguration& requested, const Options&
   a.options = options;
   remark_.clear();
   Error error;
-  arv_device_execute_command(device_.get(), "AcquisitionStop",
-                             error.out());  // what a killed program left running
+  // Stops an acquisition left running by a killed program.
+  arv_device_execute_command(device_.get(), "AcquisitionStop", error.out());
   features_.choose_if_there("AcquisitionMode", "Continuous");
   DeviceStatus status = set_format(requested, &a);
   if (status == DeviceStatus::ok) status = set_region(requested);
@@ -413,8 +418,7 @@ DeviceStatus Session::apply(const CameraConfiguration& requested, const Options&
   if (status == DeviceStatus::ok) status = set_rate(requested, &a);
   if (status == DeviceStatus::ok) status = set_clock(options, &a);
   if (status != DeviceStatus::ok) return status;
-  // With chunk data, which another program may have left on, a leader need not tell the image's
-  // size.
+  // With chunk data, which another program may have left on, a leader may lack the image size.
   if (const char* chunks = features_.find(Purpose::chunk_mode))
     (void)features_.switch_on(chunks, false);
   for (const auto& [name, value] : options.features)
@@ -468,7 +472,7 @@ DeviceStatus Session::set_region(const CameraConfiguration& requested) {
                       shown(limits ? limits->step : 1) + " px, " + shown(actual) +
                       " is the nearest");
   };
-  // Offsets first to zero: what is allowed of the one depends on the other.
+  // Offsets are zeroed first, because the permitted size depends on them.
   const bool offsets = features_.has("OffsetX") && features_.has("OffsetY");
   if (offsets)
     for (const char* name : {"OffsetX", "OffsetY"}) (void)features_.set(name, 0, "px", nullptr);
@@ -498,7 +502,7 @@ DeviceStatus Session::set_trigger(const CameraConfiguration& requested, const Op
   for (const char* selector : {"AcquisitionStart", "FrameBurstStart", "FrameStart"})
     features_.choose_if_there("TriggerSelector", selector);
   const bool software = requested.trigger == CameraTrigger::software;
-  // The mode before the source: some cameras offer sources only then.
+  // The mode is set first, because some cameras offer sources only then.
   if (!features_.choose("TriggerMode", "On") ||
       !features_.choose("TriggerSource", software ? "Software" : o.line))
     return refuse(DeviceStatus::unsupported, features_.last_error());
@@ -533,8 +537,8 @@ DeviceStatus Session::set_exposure(const CameraConfiguration& requested, Applied
   }
   const auto limits = features_.bounds(gain);
   double value = requested.gain_db;
-  if (value == 0 && limits)
-    value = std::max(value, limits->least);  // none asked for: the least there is
+  // Without a requested gain the minimum is used.
+  if (value == 0 && limits) value = std::max(value, limits->least);
   if (std::string(gain) == "GainRaw") {
     if (requested.gain_db != 0)
       return refuse(
@@ -568,8 +572,8 @@ DeviceStatus Session::change_exposure(const ExposureSetting& requested, Exposure
                   features_.last_error());
   actual->exposure = Duration::seconds(us * 1e-6);
   const char* gain = features_.find(Purpose::gain);
-  if (gain == nullptr ||
-      std::string_view(gain) == "GainRaw") {  // none, or in no unit that could be reckoned with
+  // The camera has no gain, or a gain without a unit.
+  if (gain == nullptr || std::string_view(gain) == "GainRaw") {
     actual->gain_db = 0;
     return DeviceStatus::ok;
   }
@@ -609,7 +613,8 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
       add_remark("the camera has no clock: its images are stamped when they arrive");
     return DeviceStatus::ok;
   }
-  a->tick_frequency = 1'000'000'000;  // PTP counts nanoseconds
+  // PTP stamps are in nanoseconds.
+  a->tick_frequency = 1'000'000'000;
   constexpr auto kSettle = std::chrono::seconds(3);
   const char *latch = features_.find(Purpose::ptp_latch),
              *state = features_.find(Purpose::ptp_status);

@@ -14,29 +14,35 @@
 
 namespace vergence::gige {
 
-/// Features of a camera; their names differ between cameras.
+/// Features of a camera whose names differ between cameras.
 enum class Purpose : std::uint8_t {
-  exposure,       // µs
-  gain,           // dB
-  frame_rate,     // Hz
-  trigger_delay,  // µs
+  /// In µs.
+  exposure,
+  /// In dB.
+  gain,
+  /// In Hz.
+  frame_rate,
+  /// In µs.
+  trigger_delay,
   serial,
   ptp_enable,
   ptp_status,
   ptp_latch,
-  chunk_mode,  // whether frames have chunk data at all
+  /// Enables chunk data in frames.
+  chunk_mode,
 };
 
-/// The GenICam features of an open camera, with messages for what it does not have.
+/// GenICam features of an open camera, with messages about missing ones.
 ///
-/// Threads  One caller at a time; each call asks the camera and may take 2.5 s when that is gone.
-/// Errors   Setters return false and leave the message in last_error().
+/// Threads  One caller at a time. Each call accesses the camera and may take 2.5 s if it is
+///          disconnected.
+/// Errors   Setters return false and store the message in last_error().
 class Features {
  public:
   explicit Features(ArvDevice* device) : device_(device) {}
 
   [[nodiscard]] bool has(const std::string& name) const;
-  /// The first name that this camera has; null: none.
+  /// First of the purpose's names that this camera has; null if none.
   [[nodiscard]] const char* find(Purpose purpose) const;
 
   struct Bounds {
@@ -47,16 +53,16 @@ class Features {
   [[nodiscard]] std::string text(const std::string& name) const;
   [[nodiscard]] std::vector<std::string> choices(const std::string& name) const;
 
-  /// A number of a float or integer feature, rounded to the integer's step; outside its bounds it
-  /// is refused. *actual: as read back.
+  /// Sets a float or integer feature, rounded to the integer's step. Rejects values out of bounds.
+  /// *actual receives the value read back.
   [[nodiscard]] bool set(const std::string& name, double value, const char* unit, double* actual);
-  /// One of the entries of an enumeration.
+  /// Selects an entry of an enumeration.
   [[nodiscard]] bool choose(const std::string& name, const std::string& entry);
   [[nodiscard]] bool switch_on(const std::string& name, bool on);
   [[nodiscard]] bool execute(const std::string& name);
-  /// As words, whatever the feature is.
+  /// Sets any feature from its text form.
   [[nodiscard]] bool set_text(const std::string& name, const std::string& value);
-  /// choose() where the camera has feature and entry; never complains.
+  /// Same as choose() if the camera has feature and entry; otherwise does nothing.
   void choose_if_there(const std::string& name, const std::string& entry);
 
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
@@ -70,63 +76,68 @@ class Features {
   std::string last_error_;
 };
 
-/// Cameras that answer a broadcast.
+/// Camera that responded to a broadcast.
 struct Found {
   DeviceInfo info;
-  std::string id;  // Aravis's, unique
+  /// Aravis's unique device id.
+  std::string id;
 };
-/// Takes a second.
+/// Broadcasts and collects responses for one second.
 [[nodiscard]] std::vector<Found> discover();
 
-/// A configuration as the camera took it.
+/// Configuration as applied by the camera.
 struct Applied {
   CameraConfiguration actual{};
   Options options{};
   const GreyFormat* format = nullptr;
-  std::size_t payload = 0;           // bytes a frame on the wire
-  std::uint64_t tick_frequency = 0;  // Hz; 0: the camera has no clock
+  /// Bytes per frame on the wire.
+  std::size_t payload = 0;
+  /// In Hz; 0 if the camera has no clock.
+  std::uint64_t tick_frequency = 0;
   LinkPlan plan{};
   Interface link{};
 };
 
-/// Control of one camera, and its stream.
+/// Control channel of one camera, and its stream.
 ///
-/// Threads  One caller at a time; `lost()` any. Every call may take 2.5 s when the camera has gone,
-///          and no longer.
-/// Errors   Statuses, with the message in last_error().
+/// Threads  One caller at a time; lost() is thread-safe. Every call takes at most 2.5 s if the
+///          camera is disconnected.
+/// Errors   Calls return a status and store the message in last_error().
 class Session {
  public:
-  /// By address or Aravis's id. Null: *status and *error say why. → ok, not_found, busy, failed
+  /// Opens a camera by its address or Aravis's id. Returns null on failure; *status and *error have
+  /// the reason. → ok, not_found, busy, failed
   [[nodiscard]] static std::unique_ptr<Session> open(const std::string& where, DeviceStatus* status,
                                                      std::string* error);
   ~Session();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept { return info_; }
-  /// The whole configuration, in the order that cameras want. → ok, unsupported, bad_configuration,
-  /// disconnected
+  /// Applies the whole configuration, in the order that cameras require. → ok, unsupported,
+  /// bad_configuration, disconnected
   [[nodiscard]] DeviceStatus apply(const CameraConfiguration& requested, const Options& options,
                                    Applied* applied);
 
-  /// Makes the stream; the callback comes from its thread, from the first push() on. → ok,
-  /// disconnected, failed
+  /// Creates the stream. Its thread calls `callback` from the first push() on. → ok, disconnected,
+  /// failed
   [[nodiscard]] DeviceStatus open_stream(const Applied& applied, ArvStreamCallback callback,
                                          void* user);
   /// Precondition: a stream is open.
   void push(ArvBuffer* buffer) noexcept;
   [[nodiscard]] ArvStream* stream() noexcept { return stream_.get(); }
-  /// The camera begins to expose. → ok, disconnected
+  /// Starts exposing. → ok, disconnected
   [[nodiscard]] DeviceStatus start_acquisition();
-  /// Ends both; after it no callback comes. `reachable`: the camera is told, too.
+  /// Ends acquisition and stream; no callback runs afterwards. If `reachable`, the camera is also
+  /// commanded to stop.
   void close_stream(bool reachable) noexcept;
   [[nodiscard]] DeviceStatus trigger();
-  /// The nearest that the camera has, also while it streams. *actual: as read back. → ok,
-  /// unsupported, disconnected
+  /// Applies the nearest supported values, also while streaming. *actual receives the values read
+  /// back. → ok, unsupported, disconnected
   [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& requested,
                                              ExposureSetting* actual);
 
-  /// Asks the camera: it answers, and we are in control.
+  /// Queries the camera. True if it responds and this program has control.
   [[nodiscard]] bool in_control();
-  /// Noticed by the heartbeat.
+  /// True once the heartbeat detected a lost connection.
   [[nodiscard]] bool lost() const noexcept { return lost_.load(std::memory_order_acquire); }
 
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }

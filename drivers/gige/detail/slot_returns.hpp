@@ -7,35 +7,36 @@
 
 namespace vergence::gige {
 
-/// The slots of a stream beside its FrameQueue: how many may be out, and those that come back to
-/// the transport.
+/// Limits how many slots of a stream may be out, and collects released slots for the transport.
 ///
-/// Ownership  A slot is the transport's, the queue's from offer() on, the consumer's, then on its
-///            way back from release() on, and the transport's again by returned(). The queue
-///            outlives it.
-/// Threads    Each call by whom its comment names. One mutex, held for a few assignments only.
-/// Memory     Fixed. Full: of more than `most` slots out the newest frame is refused and counted as
-///            an underrun.
+/// Ownership  A slot goes from the transport to the queue (offer()), to the consumer, and after
+///            release() and returned() back to the transport. The queue outlives this object.
+/// Threads    The comment above each group of calls names the thread. One mutex is held for a few
+///            assignments.
+/// Memory     Fixed. If `most` slots are out, the newest frame is refused and counted as an
+///            underrun.
 class SlotReturns {
  public:
   explicit SlotReturns(FrameQueue& queue) noexcept : queue_(queue) {}
 
-  // The owner.
-  /// At most so many slots are out. Precondition: stopped, no slot is held.
+  // Calls of the owner.
+
+  /// Sets the maximum number of slots that are out. Precondition: stopped, no slot is held.
   void set_limit(std::size_t most) noexcept;
-  /// Before the queue begins: what was offered and not taken, and what is on its way back, is the
-  /// transport's. Precondition: no thread offers.
+  /// Called before the queue begins: takes back the frames that were offered and not taken, and the
+  /// released slots. Precondition: no thread offers.
   void withdraw() noexcept;
 
-  // The releaser.
+  // Call of the releaser.
   void release(FrameSlot slot) noexcept;
 
-  // The transport.
-  /// False: refused, the slot stays the transport's.
+  // Calls of the transport.
+
+  /// Returns false if refused; the slot then stays with the transport.
   [[nodiscard]] bool offer(const Frame& frame) noexcept;
-  /// The next slot that came back; false: none.
+  /// Takes the next released slot; returns false if there is none.
   [[nodiscard]] bool returned(FrameSlot* slot) noexcept;
-  /// It is not the transport's.
+  /// True if the slot does not belong to the transport.
   [[nodiscard]] bool is_out(FrameSlot slot) const noexcept;
 
  private:

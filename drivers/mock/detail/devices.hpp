@@ -20,31 +20,30 @@
 #include "drivers/stream.hpp"
 #include "drivers/trigger.hpp"
 
-/// The mock's devices as their consumers meet them; what they deliver comes from the scheduler
-/// through their streams.
+/// Simulated devices as seen by their consumers; the scheduler delivers data through their streams.
 namespace vergence::mock {
 
-/// Exposure settings of a simulated camera by pulse: a setting holds from its pulse on, until
-/// the next.
+/// Exposure settings of a simulated camera by pulse: each applies from its pulse to the next
+/// change.
 ///
-/// Threads  Any. Memory: grows with changes that no pulse has passed yet. Errors: change() may
-///          throw std::bad_alloc, and has changed nothing that any pulse settled.
+/// Thread-safe. Grows with changes that are not yet reached. change() may throw std::bad_alloc; the
+/// settled pulses are then unchanged.
 class ExposurePlan {
  public:
-  /// From the first pulse on.
+  /// Applies from the first pulse on.
   void reset(const ExposureSetting& setting) {
     const std::lock_guard lock(mutex_);
     changes_ = {{0, setting}};
   }
-  /// From this pulse on, whatever was to hold later. What only pulses before `past` were exposed
-  /// with is forgotten. Precondition: reset().
+  /// Applies from this pulse on and replaces later changes. Settings used only before pulse `past`
+  /// are dropped. Precondition: reset().
   void change(std::uint64_t from, const ExposureSetting& setting, std::uint64_t past) {
     const std::lock_guard lock(mutex_);
     while (changes_.size() > 1 && changes_.back().from >= from) changes_.pop_back();
     while (changes_.size() > 1 && changes_[1].from < past) changes_.erase(changes_.begin());
     changes_.push_back({from, setting});
   }
-  /// Precondition: reset(); no change has forgotten this pulse.
+  /// Precondition: reset(); the setting of this pulse was not dropped.
   [[nodiscard]] ExposureSetting at(std::uint64_t pulse) const {
     const std::lock_guard lock(mutex_);
     ExposureSetting setting = changes_.front().setting;
@@ -55,12 +54,14 @@ class ExposurePlan {
 
  private:
   struct Change {
-    std::uint64_t from = 0;  // pulse
+    // Pulse of the change.
+    std::uint64_t from = 0;
     ExposureSetting setting{};
   };
 
   mutable std::mutex mutex_;
-  std::vector<Change> changes_;  // by pulse, the first is in force
+  // Ordered by pulse; the first one is in effect.
+  std::vector<Change> changes_;
 };
 
 using vergence::Delivery;
@@ -70,19 +71,25 @@ using vergence::Stream;
 struct RigContext {
   std::shared_ptr<const RigTruth> truth;
   MockRigOptions options;
-  WakeEvent room;  // signalled by a consumer that has made some: a slot, a place in a stream
-  std::atomic<bool> pulsing{false};  // the scheduler's threads use the devices
-  // State of camera 0 for exposure control: the pulse of the image handed out last, and whether
-  // images wait for their consumer or he is at one.
+  /// Signalled by a consumer that has freed a slot or a place in a stream.
+  WakeEvent room;
+  /// True while the scheduler's threads use the devices.
+  std::atomic<bool> pulsing{false};
+  // State of camera 0 for exposure control: pulse of the last image handed out, number of images
+  // that wait, and whether the consumer is processing one.
   std::atomic<std::uint64_t> looked_at{0};
   std::atomic<int> unseen{0};
   std::atomic<bool> looking{false};
-  std::atomic<std::uint64_t> planned{0};  // pulses whose exposures are settled
+  /// Number of pulses whose exposures are settled.
+  std::atomic<std::uint64_t> planned{0};
 };
 
-inline constexpr Duration kTransfer = Duration::milliseconds(5);       // of an image over its bus
-inline constexpr Duration kInsLatency = Duration::milliseconds(4);     // filter and serial line
-inline constexpr Duration kReportLatency = Duration::milliseconds(1);  // of a pulse
+/// Transfer time of an image over its bus.
+inline constexpr Duration kTransfer = Duration::milliseconds(5);
+/// Delay of filter and serial link.
+inline constexpr Duration kInsLatency = Duration::milliseconds(4);
+/// Delay of a pulse's report.
+inline constexpr Duration kReportLatency = Duration::milliseconds(1);
 
 class MockCamera final : public CameraDevice {
  public:
@@ -104,10 +111,10 @@ class MockCamera final : public CameraDevice {
   void stop() noexcept override;
   CameraStatistics statistics() const noexcept override;
 
-  // The scheduler's side.
+  // Used by the scheduler.
   Stream<Frame, 64> stream;
   std::atomic<std::uint64_t> underruns{0}, lost{0};
-  /// From the edge of a pulse to the start of its exposure.
+  /// Delay from the edge of a pulse to the start of the exposure.
   [[nodiscard]] Duration trigger_delay() const noexcept {
     return rig_->options.trigger_delay[static_cast<std::size_t>(k_)];
   }
@@ -116,15 +123,15 @@ class MockCamera final : public CameraDevice {
   [[nodiscard]] ExposureSetting setting_at(std::uint64_t pulse) const {
     return exposures_.at(pulse);
   }
-  /// Tells whose pulse the image in a slot is.
+  /// Records the pulse of the image in a slot.
   void label(FrameSlot slot, std::uint64_t pulse) noexcept {
     pulse_of_[slot].store(pulse, std::memory_order_release);
   }
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
-  /// Image memory, bytes.
+  /// Image memory in bytes.
   [[nodiscard]] std::size_t bytes() const noexcept { return arena_ ? arena_->capacity() : 0; }
-  /// The picture through this camera's lens, as this sensor gives it, into width x height bytes in
-  /// rows of the pool's stride.
+  /// Renders the image through this camera's lens and sensor into width x height bytes, in rows of
+  /// the pool's stride.
   void take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus,
             const RenderRequest& shot, std::uint8_t* out);
 
@@ -139,12 +146,15 @@ class MockCamera final : public CameraDevice {
   std::unique_ptr<Arena> arena_;
   std::unique_ptr<FramePool> pool_;
   std::unique_ptr<Renderer> renderer_;
-  std::vector<std::uint8_t> mosaic_;  // empty: the renderer's picture is what is handed out
+  // Empty if the renderer's image is output directly.
+  std::vector<std::uint8_t> mosaic_;
   std::atomic<std::uint64_t> delivered_{0}, starts_{0};
-  std::atomic<int> out_{0};  // slots the consumer holds
+  // Number of slots held by the consumer.
+  std::atomic<int> out_{0};
   std::array<std::atomic<std::uint64_t>, MockRig::kSlots> pulse_of_{};
   ExposurePlan exposures_;
-  bool disconnected_ = false;  // the consumer's
+  // Used by the consumer only.
+  bool disconnected_ = false;
 };
 
 class MockIns final : public InsDevice {
@@ -160,7 +170,7 @@ class MockIns final : public InsDevice {
   void stop() noexcept override;
   InsStatistics statistics() const noexcept override;
 
-  // The scheduler's side.
+  // Used by the scheduler.
   static constexpr std::size_t kRing = 1024;
   Stream<InsReading, kRing> stream;
   std::atomic<std::uint64_t> lost{0}, overruns{0};
@@ -177,20 +187,19 @@ class MockIns final : public InsDevice {
   std::atomic<std::uint64_t> delivered_{0};
 };
 
-/// Receiver of the board's start and stop.
+/// Receives start and stop of the simulated trigger board.
 class PulseListener {
  public:
   virtual ~PulseListener() = default;
-  /// Throws std::exception when that is not possible.
+  /// Throws std::exception on failure.
   virtual void begin(const TriggerConfiguration& c) = 0;
-  /// Twice is harmless.
+  /// May be called twice.
   virtual void halt() noexcept = 0;
-  /// So many slots of the plan, from that one on, are left out in this boot; slots that were made
-  /// already are not.
+  /// Omits this number of slots of the plan from `from` on in this boot, except those already made.
   virtual void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept = 0;
 };
 
-/// A pulse and its place in the plan.
+/// Pulse and its slot in the plan.
 struct BoardReport {
   Pulse pulse{};
   std::uint64_t slot = 0;
@@ -198,7 +207,7 @@ struct BoardReport {
 
 class MockTrigger final : public TriggerDevice {
  public:
-  /// The listener outlives it.
+  /// The listener must outlive this object.
   MockTrigger(RigContext* rig, PulseListener* listener);
   ~MockTrigger() override { stop(); }
 
@@ -208,13 +217,13 @@ class MockTrigger final : public TriggerDevice {
   DeviceTiming timing() const noexcept override { return {kReportLatency}; }
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
-  /// From the fourth slot after that of the newest report taken. One that is asked for before the
-  /// last is over changes nothing.
+  /// Starts at the fourth slot after that of the newest report taken. A request during a pause has
+  /// no effect.
   DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
   TriggerStatistics statistics() const noexcept override;
 
-  // The scheduler's side.
+  // Used by the scheduler.
   static constexpr std::size_t kRing = 64;
   Stream<BoardReport, kRing> stream;
   std::atomic<std::uint64_t> overruns{0}, lost{0}, reboots{0};
@@ -231,11 +240,14 @@ class MockTrigger final : public TriggerDevice {
   TriggerConfiguration configuration_{};
   std::atomic<bool> disconnected_{false};
   std::atomic<std::uint64_t> pulses_{0}, starts_{0};
-  std::mutex asking_;  // of what follows
+  // Guards the members below.
+  std::mutex asking_;
   bool any_ = false;
-  std::uint64_t newest_ = 0;  // slot of the report taken last, and its boot
+  // Slot and boot of the report taken last.
+  std::uint64_t newest_ = 0;
   std::uint32_t boot_ = 0;
-  std::uint64_t pause_end_ = 0;  // slot after the pause asked for last
+  // Slot after the last requested pause.
+  std::uint64_t pause_end_ = 0;
   std::uint32_t pause_boot_ = 0;
 };
 

@@ -9,23 +9,25 @@
 
 namespace vergence::mock {
 
-/// Seeds that differ in their low bits only give streams that have nothing in common.
-[[nodiscard]] inline std::uint64_t mixed(std::uint64_t a,
-                                         std::uint64_t b) noexcept {  // SplitMix64's finaliser
+/// Mixes seeds, so that those differing in low bits give independent streams.
+/// Finaliser of SplitMix64.
+[[nodiscard]] inline std::uint64_t mixed(std::uint64_t a, std::uint64_t b) noexcept {
   std::uint64_t z = a + 0x9e3779b97f4a7c15U * (b + 1);
   z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9U;
   z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
   return z ^ (z >> 31U);
 }
 
-/// A device's crystal: reads the host's time with an offset and a drift, in whole microseconds; may
-/// be set by a fault.
+/// Clock of a device: the host's time with offset and drift, in whole microseconds; faults may set
+/// it.
 struct DeviceOscillator {
-  std::int64_t offset = 0;  // ns
+  /// In ns.
+  std::int64_t offset = 0;
   double drift = 0;
-  int owner = -1;  // as Fault::camera
+  /// Device as in Fault::camera.
+  int owner = -1;
 
-  /// Each device has its own, up to `drift_ppm` fast or slow.
+  /// Each device has its own drift of up to ±`drift_ppm`.
   [[nodiscard]] static DeviceOscillator of(std::uint64_t seed, int owner,
                                            double drift_ppm) noexcept {
     Random random(mixed(seed, static_cast<std::uint64_t>(owner) + 10));

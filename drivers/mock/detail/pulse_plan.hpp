@@ -8,35 +8,35 @@
 
 namespace vergence::mock {
 
-/// When the mock's board pulses, over a whole drive: rate, varied intervals and its own restarts
-/// are known beforehand; only a pause is asked for while it drives.
-///
-/// Threads  As any value; const after construction. Time: since the drive's start, by the host's
-///          clock.
+/// Pulse times of the simulated trigger board over a whole drive. Rate, dither and restarts are
+/// known beforehand; only pauses are requested during the drive. Times are on the host's clock
+/// since the start of the drive. Constant after construction.
 class PulsePlan {
  public:
   struct Slot {
     Duration time{};
-    std::uint64_t number = 0;  // from 0 in every boot
-    std::uint32_t boot = 0;    // counts from 0
+    /// Number within the boot, from 0.
+    std::uint64_t number = 0;
+    /// Index of the boot, from 0.
+    std::uint32_t boot = 0;
   };
-  /// The line between host and board goes or is there again.
+  /// The link between host and trigger board fails or returns.
   struct LinkEvent {
     Duration time{};
     bool gone = false;
   };
 
   PulsePlan() = default;
-  /// The first pulse at 0, the last not after `length`.
+  /// The first pulse is at 0, the last not after `length`.
   PulsePlan(const TriggerConfiguration& c, Duration length, const std::vector<Fault>& faults);
 
   [[nodiscard]] std::size_t size() const noexcept { return slots_.size(); }
-  /// Beyond the last: evenly on.
+  /// Slot i; beyond the last one at even intervals.
   [[nodiscard]] Slot at(std::uint64_t i) const noexcept;
-  /// The first slot not before that time.
+  /// First slot not before that time.
   [[nodiscard]] std::size_t first_from(Duration time) const noexcept;
   [[nodiscard]] Duration period() const noexcept { return period_; }
-  /// When that boot began.
+  /// Start of that boot.
   [[nodiscard]] Duration boot_time(std::uint32_t boot) const noexcept { return boots_[boot]; }
   [[nodiscard]] const std::vector<LinkEvent>& link() const noexcept { return link_; }
   [[nodiscard]] bool link_down(Duration time) const noexcept;

@@ -17,18 +17,17 @@
 
 namespace vergence::mock {
 
-/// The slots of a pulse plan that a pause leaves out.
-///
-/// Threads  request(): any. make(): the scheduler's producer, slot after slot. Memory: none.
+/// Slots of a pulse plan that a pause omits. request() is thread-safe; the scheduler's producer
+/// calls make(), slot by slot.
 class PauseWindow {
  public:
-  /// So many slots from that one on, in this boot (0: in any); slots that were made already stay.
+  /// Omits this number of slots from `from` on in this boot (0: in any), except those already made.
   void request(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept {
     const std::lock_guard lock(mutex_);
     from = std::max(from, made_);
     pause_ = {from, from + pulses, boot};
   }
-  /// Slot `slot` is made now, in this boot. True: it is left out.
+  /// Makes a slot of this boot. Returns true if it is omitted.
   [[nodiscard]] bool make(std::uint64_t slot, std::uint32_t boot) noexcept {
     const std::lock_guard lock(mutex_);
     made_ = slot + 1;
@@ -40,50 +39,62 @@ class PauseWindow {
 
  private:
   struct Pause {
-    std::uint64_t from = 0, end = 0;  // slots
-    std::uint32_t boot = 0;           // of Pulse
+    // Range of slots.
+    std::uint64_t from = 0, end = 0;
+    // As in Pulse.
+    std::uint32_t boot = 0;
   };
   std::mutex mutex_;
   std::optional<Pause> pause_;
-  std::uint64_t made_ = 0;  // slots
+  // Number of slots made.
+  std::uint64_t made_ = 0;
 };
 
-/// One pulse as a camera's input meets it.
+/// Pulse as received by a camera.
 struct PulseAt {
-  std::uint64_t number = 0;  // its slot in the plan
-  Duration time{};           // of the exposure's start, since the drive's start
+  /// Slot in the plan.
+  std::uint64_t number = 0;
+  /// Start of the exposure, since the start of the drive.
+  Duration time{};
   const PulsePlan* plan = nullptr;
 };
 
-/// Fate of one camera's image of one pulse under the active faults.
+/// Image of one camera for one pulse under the active faults.
 struct Exposure {
-  bool missed = false;  // never happens
-  bool lost = false;    // never arrives
-  bool twice = false;   // arrives again
-  Duration delay{};     // of the arrival, beyond the usual
+  /// Does not happen.
+  bool missed = false;
+  /// Does not arrive.
+  bool lost = false;
+  /// Arrives twice.
+  bool twice = false;
+  /// Additional delay of the arrival.
+  Duration delay{};
   double brightness = 1;
-  // Which image it is: usually this camera's, of this pulse.
+  // Source of the image: usually this camera and pulse.
   int camera = 0;
-  std::uint64_t pulse = 0;  // numbers its noise
-  Duration time{};          // of the start of the exposure
+  /// Also selects the noise.
+  std::uint64_t pulse = 0;
+  /// Start of the exposure.
+  Duration time{};
 };
 
-/// Pure function of its arguments; the draws of faults with a share come from `seed`.
+/// Depends only on its arguments; `seed` determines the random draws of faults with a share.
 [[nodiscard]] Exposure make_exposure(const RigTruth& truth, std::uint64_t seed,
                                      const PulseAt& pulse, int camera) noexcept;
 
-/// Makes what the devices deliver, pulse after pulse; the DeliveryQueue hands it out.
+/// Generates the devices' data pulse by pulse; the DeliveryQueue delivers them.
 ///
-/// Threads  begin(), halt(): the owner's. One thread makes everything, a second one renders every
-///          other camera.
-/// Time     Virtual: what is made before the next pulse is delivered before it, and the producer
-///          waits for room. Real: a pulse that is over before its pictures are begun has none.
-/// Pauses   Virtual, with reports_read: slot n is made once every report that arrives before it
-///          was taken. Who asks at the report of slot m, before taking the next, finds slot m + 4
-///          not made: the report of m + 1 is here within two periods of its pulse.
+/// Threads  The owner calls begin() and halt(). One thread generates everything, a second renders
+///          every other camera.
+/// Time     Virtual: what is generated before the next pulse is delivered before it, and the
+///          producer waits for room. Real: a pulse that is over before rendering starts has no
+///          images.
+/// Pauses   Virtual, with reports_read: slot n is made once every report that arrives before it was
+///          taken. So when the consumer requests a pause at the report of slot m, slot m + 4 is not
+///          made yet, because the report of m + 1 arrives within two periods of its pulse.
 class Scheduler final : public PulseListener {
  public:
-  /// All of it outlives the scheduler; `trigger` is given by attach().
+  /// All arguments must outlive the scheduler; attach() sets `trigger`.
   Scheduler(RigContext* rig, std::vector<std::unique_ptr<MockCamera>>* cameras, MockIns* ins)
       : rig_(*rig), cameras_(*cameras), ins_(*ins) {}
   ~Scheduler() override { halt(); }
@@ -98,7 +109,7 @@ class Scheduler final : public PulseListener {
     pauses_.request(from, pulses, boot);
   }
   [[nodiscard]] PulsePlan make_plan(const TriggerConfiguration& c) const;
-  /// The host's time at the drive's start.
+  /// Host time at the start of the drive.
   [[nodiscard]] HostStamp start() const noexcept { return start_; }
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
 
@@ -106,16 +117,18 @@ class Scheduler final : public PulseListener {
   /// State of a camera in the scheduler.
   struct Sender {
     bool unplugged = false;
-    std::uint64_t counter_base = 0;  // of the slot less what the camera counts
+    // Slot minus the camera's counter.
+    std::uint64_t counter_base = 0;
   };
   struct Shooting {
-    int camera = 0;  // that sends it
+    // Camera that sends the image.
+    int camera = 0;
     Exposure exposure{};
     FrameSlot slot = 0;
     ExposureSetting setting{};
   };
-  static constexpr HostStamp kVirtualStart{
-      1'000'000'000'000};  // 1000 s after a machine's start, on every run
+  // Fixed start of every run, 1000 s after boot.
+  static constexpr HostStamp kVirtualStart{1'000'000'000'000};
 
   void produce();
   [[nodiscard]] Duration length() const noexcept;
@@ -157,8 +170,10 @@ class Scheduler final : public PulseListener {
   PulsePlan plan_;
   HostStamp start_ = kVirtualStart;
   std::uint64_t readings_ = 0;
-  std::size_t link_events_ = 0;  // of the plan, posted
-  bool resumed_ = true;          // the next pulse is the first after a start or a pause
+  // Number of posted link events of the plan.
+  std::size_t link_events_ = 0;
+  // True if the next pulse is the first after a start or a pause.
+  bool resumed_ = true;
   PauseWindow pauses_;
   std::array<Sender, kMaxCameras> senders_{};
   std::atomic<bool> stop_{false};

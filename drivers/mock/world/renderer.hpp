@@ -12,26 +12,31 @@ namespace vergence::mock {
 
 /// Parameters of one image.
 struct RenderRequest {
-  double exposure = 1.0;  // relative to the world's nominal daylight exposure; 0 is a covered lens
-  double vignetting = 0.5;   // brightness · 1/(1 + vignetting·r²)², r = tan of the angle to the
-                             // axis; 1: cos⁴ law, 0: none
-  double shot_noise = 0.02;  // variance per grey level; a 12 ke⁻ well on 255 levels: 255/12000
-  double read_noise = 0.6;   // grey levels, sigma
-  std::uint32_t noise_seed = 0;  // a different one for every frame and camera; 0: no noise at all
+  /// Exposure relative to the world's nominal daylight; 0 is a covered lens.
+  double exposure = 1.0;
+  /// Factor v of brightness · 1/(1 + v·r²)² with r the tangent of the angle to the axis; 1 gives
+  /// the cos⁴ law, 0 none.
+  double vignetting = 0.5;
+  /// Variance per grey level; a 12 ke⁻ well on 255 levels gives 255/12000.
+  double shot_noise = 0.02;
+  /// Standard deviation in grey levels.
+  double read_noise = 0.6;
+  /// Different for every frame and camera; 0 turns all noise off.
+  std::uint32_t noise_seed = 0;
 };
 
-/// One mock camera's image formation: casts a ray per pixel through the lens model into a world.
+/// Image formation of one simulated camera: casts a ray per pixel through the lens model into a
+/// world.
 ///
 /// Method     Rays in SIMD packets against the polygons binned to 16 x 16 tiles. Edges and textures
-///            are prefiltered over a pixel, so that a picture moves smoothly by any fraction of a
-///            pixel; no super-sampling.
-/// Ownership  The world is shared and outlives nothing: it is kept. Output memory is the caller's.
-/// Threads    One thread per renderer; any number of renderers on one world.
-/// Memory     Work buffers grow to the largest frame seen, then stay.
-/// Units      T_camera_enu: p_camera = T_camera_enu · p_enu, metres; camera x right, y down, z
+///            are prefiltered over a pixel, so images move smoothly at sub-pixel steps without
+///            super-sampling.
+/// Ownership  Shares the world. The caller owns the output memory.
+/// Threads    One thread per renderer; any number of renderers per world.
+/// Memory     Work buffers grow to the largest frame.
+/// Units      T_camera_enu: p_camera = T_camera_enu · p_enu in metres; camera x right, y down, z
 ///            forward.
-/// Errors     The constructor throws std::invalid_argument for an image without size. render()
-///            cannot fail.
+/// Errors     The constructor throws std::invalid_argument for an empty image size.
 class Renderer {
  public:
   Renderer(std::shared_ptr<const World> world, const Camera& camera,
@@ -40,9 +45,9 @@ class Renderer {
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;
 
-  /// One picture into width x height bytes, rows `stride` apart. Several poses are the camera's way
-  /// during the exposure, averaged (motion blur); precondition: at least one. `T_camera_bus`: where
-  /// the bus is at each of them, or nothing.
+  /// Renders an image of width x height bytes with rows `stride` apart. Several poses during the
+  /// exposure are averaged (motion blur); at least one is required. `T_camera_bus` has the bus at
+  /// each pose, or is empty.
   void render(std::span<const Transform> T_camera_enu, const RenderRequest& shot, std::uint8_t* out,
               std::ptrdiff_t stride, std::span<const Transform> T_camera_bus = {});
   void render(const Transform& T_camera_enu, const RenderRequest& shot, std::uint8_t* out,

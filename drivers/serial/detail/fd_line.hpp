@@ -7,7 +7,7 @@
 
 namespace vergence {
 
-/// Bytes over a tty's descriptor, non-blocking, waiting in poll().
+/// Link over a tty's non-blocking descriptor, waiting in poll().
 class FdLine final : public SerialLink {
  public:
   /// Precondition: the descriptor is open, non-blocking and a raw tty at this baud; `wake` is an

@@ -5,41 +5,51 @@
 
 namespace vergence::mock {
 
-inline constexpr double kFacadeWidth = 12.0;   // m: a facade's picture is one lot wide …
-inline constexpr double kFacadeHeight = 12.0;  // … and four storeys of 3 m high
-inline constexpr double kStorey = 3.0;         // m
+/// A facade's texture is one lot wide and four storeys of 3 m high, in m.
+inline constexpr double kFacadeWidth = 12.0;
+inline constexpr double kFacadeHeight = 12.0;
+inline constexpr double kStorey = 3.0;
 
-/// Index into Scene::materials; facades come first, kFacades of them.
+/// Index into Scene::materials; the kFacades facades come first.
 inline constexpr int kFacades = 7;
 namespace material {
 enum Index : int {
   side_wall = kFacades,
-  flats,  // tall blocks: 24 m x 24 m
+  /// Tall blocks of 24 m x 24 m.
+  flats,
   roof,
   asphalt,
   pavement,
   grass,
-  paint,     // road markings
-  concrete,  // kerbs, poles
+  /// Road markings.
+  paint,
+  /// Kerbs and poles.
+  concrete,
   foliage,
   bark,
-  car_side,  // 4.2 m x 1.5 m
-  car_end,   // 1.8 m x 1.5 m
+  /// 4.2 m x 1.5 m.
+  car_side,
+  /// 1.8 m x 1.5 m.
+  car_end,
   car_top,
   hedge,
   fence,
-  tree_line,  // 64 m x 16 m
-  hills,      // 2048 m x 128 m
+  /// 64 m x 16 m.
+  tree_line,
+  /// 2048 m x 128 m.
+  hills,
   clouds,
-  sign,    // 2 m x 2 m: four boards
-  shadow,  // 1 x 1 units
+  /// Four boards on 2 m x 2 m.
+  sign,
+  /// 1 x 1 units.
+  shadow,
 };
 }  // namespace material
 
-/// Paints every texture and fills scene->materials in the order above. `detail` as in WorldOptions.
+/// Paints every texture into scene->materials in the above order. `detail` as in WorldOptions.
 void paint_materials(std::uint64_t seed, int detail, Scene* scene);
 
-/// The seven house fronts and the plain side wall, one after the other (facades.cpp).
+/// The seven house fronts and the plain side wall (facades.cpp).
 Canvas paint_facade(int kind, std::uint64_t seed, int detail);
 Canvas paint_side_wall(std::uint64_t seed, int detail);
 Canvas paint_flats(std::uint64_t seed, int detail);

@@ -8,26 +8,29 @@
 
 namespace vergence::mock {
 
-/// The rays of a camera's pixels in tiles of 16 x 16, row after row of tiles, and the bounds of
-/// each tile. Pixels beyond the image's edge, or where the lens model has no ray, repeat the
-/// nearest one that has.
+/// Rays of a camera's pixels in tiles of 16 x 16, tile by tile in rows, with the bounds of each
+/// tile. Pixels outside the image, or without a ray in the lens model, repeat the nearest valid
+/// ray.
 struct RayTiles {
   explicit RayTiles(const Camera& camera);
 
   struct Bounds {
     float x0, x1, y0, y1;
   };
-  int columns = 0, rows = 0;  // of tiles
+  /// Numbers of tiles.
+  int columns = 0, rows = 0;
   std::vector<float> x, y;
-  std::vector<Bounds> bounds;                     // per tile
-  std::vector<Bounds> column_bounds, row_bounds;  // of all tiles in a column or row of tiles
+  /// Bounds by tile.
+  std::vector<Bounds> bounds;
+  /// Bounds of all tiles in a column or row of tiles.
+  std::vector<Bounds> column_bounds, row_bounds;
   Bounds all{};
 };
 
 /// View of one pose: the polygons in front of the camera and the candidates of every tile.
 class Projection {
  public:
-  /// `T_camera_bus`: null, there is none.
+  /// `T_camera_bus` is null if there is no bus.
   void build(const Scene& scene, const RayTiles& tiles, const Camera& camera,
              const Transform& T_camera_enu, const Transform* T_camera_bus, bool bayer);
 

@@ -7,16 +7,16 @@
 
 namespace vergence::mock {
 
-/// Colour as gains on the grey texture; grey cameras see `grey`.
+/// Colour as gains on the grey texture; grey cameras use `grey`.
 struct Tint {
   float grey = 1.0F, red = 1.0F, green = 1.0F, blue = 1.0F;
 };
 
-/// A painted surface: brightness, and opacity where it has holes, with how many texels a metre
-/// takes.
+/// Surface with its brightness, and opacity if it has holes.
 struct Material {
   TextureRef brightness;
-  TextureRef opacity;  // base < 0: solid
+  /// A negative base means solid.
+  TextureRef opacity;
   float texels_per_metre_u = 1.0F;
   float texels_per_metre_v = 1.0F;
   Tint tint;
@@ -27,29 +27,36 @@ struct Material {
 struct Polygon {
   std::array<Vec3, 4> corners;
   int count = 4;
-  Vec3 normal;  // unit, towards the front
+  /// Unit vector towards the front.
+  Vec3 normal;
   bool two_sided = false;
-  int material = 0;     // index into Scene::materials
-  Vec3 texture_origin;  // where (u, v) = (0, 0)
-  Vec3 axis_u, axis_v;  // in the plane; texels = axis · (p − origin): texels per metre included
-  float light = 1.0F;   // gain on the texture's brightness: illumination times this one's own paint
+  /// Index into Scene::materials.
+  int material = 0;
+  /// Point with (u, v) = (0, 0).
+  Vec3 texture_origin;
+  /// Axes in the plane: texels = axis · (p − origin), including texels per metre.
+  Vec3 axis_u, axis_v;
+  /// Gain on the texture's brightness: illumination times paint.
+  float light = 1.0F;
 };
 
 /// Polygons that are culled together.
 struct Object {
   std::size_t first = 0, count = 0;
-  Vec3 centre = Vec3::Zero();  // of the bounding sphere, m
+  /// Centre of the bounding sphere, in m.
+  Vec3 centre = Vec3::Zero();
   double radius = 0;
 };
 
-/// Everything there is to see, constant after construction.
+/// All visible things, constant after construction.
 struct Scene {
   TextureAtlas atlas;
   std::vector<Material> materials;
   std::vector<Polygon> polygons;
   std::vector<Object> objects;
-  std::vector<Polygon>
-      bus;  // in its own axes: x forward, y left, z up, the middle of its floor on the ground
+  /// Polygons in the bus's own axes: x forward, y left, z up, origin on the ground below the middle
+  /// of its floor.
+  std::vector<Polygon> bus;
 };
 
 }  // namespace vergence::mock

@@ -4,11 +4,11 @@
 
 namespace vergence::mock {
 
-/// A periodic grey picture under construction: brightness 0..1 over a rectangle of metres, row 0 at
+/// Periodic grey texture under construction: brightness 0 to 1 over a rectangle in metres, row 0 at
 /// v = 0 (bottom).
 class Canvas {
  public:
-  /// Texels are powers of two: 2^log2_width by 2^log2_height.
+  /// The size in texels is 2^log2_width by 2^log2_height.
   Canvas(int log2_width, int log2_height, double width_m, double height_m, float value);
 
   [[nodiscard]] int width() const noexcept { return 1 << log2_width_; }
@@ -28,16 +28,15 @@ class Canvas {
   void rectangle(double u0, double v0, double u1, double v1, float value, float opacity = 1.0F);
   /// Disc texture; the border is one texel wide.
   void disc(double u, double v, double radius_m, float value, float opacity = 1.0F);
-  /// A straight stroke of the given width.
+  /// Draws a straight stroke of the given width.
   void stroke(double u0, double v0, double u1, double v1, double width_m, float value,
               float opacity = 1.0F);
 
-  /// Adds periodic value noise of one band: lattice of about `cell_m`, uniform in ±amplitude. Cells
-  /// below three texels are widened to three, so that the picture holds nothing near its own
-  /// Nyquist frequency.
+  /// Adds periodic value noise of one band with a lattice of about `cell_m`, uniform in ±amplitude.
+  /// Cells below three texels are widened to three, to stay below the Nyquist frequency.
   void noise(double cell_u_m, double cell_v_m, float amplitude, std::uint64_t seed);
-  /// Octaves of noise() from `coarsest_m` down by halves, each `falloff` as strong as the one
-  /// before.
+  /// Adds octaves of noise() from `coarsest_m` down by halves, each with `falloff` times the
+  /// strength of the previous.
   void octaves(double coarsest_m, int count, float amplitude, float falloff, std::uint64_t seed);
   void clamp(float lo, float hi);
 
@@ -49,16 +48,17 @@ class Canvas {
   std::vector<float> texels_;
 };
 
-/// Where a texture lies in the atlas.
+/// Position of a texture in the atlas.
 struct TextureRef {
-  std::int32_t base = -1;  // first word; negative: none
+  /// Index of the first word; negative: none.
+  std::int32_t base = -1;
   std::int32_t log2_width = 0;
   std::int32_t log2_height = 0;
 };
 
-/// All textures of a world in one array of words, prefiltered per axis (rip-maps: level (i, j) is
-/// halved i times along u and j times along v), because streets are seen at grazing angles where
-/// one level for both axes would blur everything.
+/// All textures of a world in one array, prefiltered per axis (rip-maps: level (i, j) is halved i
+/// times along u and j times along v), because one level for both axes would blur streets seen at
+/// grazing angles.
 ///
 /// Layout  A texture of w x h texels takes 2w x 2h words, rows of 2w; level (i, j) starts at x = 2w
 ///         - (2w >> i), y = 2h - (2h >> j). One word holds the texel and its right, upper and upper
