@@ -4,9 +4,9 @@
 
 namespace vergence::app {
 
-/// The corners of the tags that an image shows, to about a tenth of a pixel; a part of the board is
-/// enough. Empty: fewer than four tags (or all, of a smaller board), or tags that do not lie as on
-/// a board of these rows and columns.
+/// Corners of the visible tags to about 0.1 px; a part of the target is enough. Empty for fewer
+/// than four tags (or not all, of a smaller target), or tags that do not match the rows and
+/// columns.
 ///
 /// Tags by the AprilTag library, family 36h11 with a black border of one or, as Kalibr prints them,
 /// two cells; corners by OpenCV's cornerSubPix within the gap between tags. Tag 0 may be at the

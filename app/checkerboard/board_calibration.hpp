@@ -7,57 +7,65 @@
 #include "app/datasets/image_file.hpp"
 #include "core/types/calibration.hpp"
 
-/// Lenses and places of a rig's cameras from views of a board, by OpenCV.
+/// Intrinsics and extrinsics of a rig from views of a calibration target, by OpenCV.
 namespace vergence::app {
 
-/// One board pose as the cameras saw it.
+/// Pose of the target as seen by the cameras.
 struct BoardView {
-  std::string name{};                               // for messages: the first image's
-  std::array<BoardCorners, kMaxCameras> corners{};  // empty: not found there
+  /// Name of the first image, for messages.
+  std::string name{};
+  /// Empty for a camera that does not see the target.
+  std::array<BoardCorners, kMaxCameras> corners{};
 };
 
 struct BoardCalibrationOptions {
   BoardPattern board{};
-  /// Sizes of the cameras' images, px; as many as cameras, 1 to kMaxCameras.
+  /// Image sizes of the 1 to kMaxCameras cameras, in px.
   std::vector<ImageSize> sizes{};
   CameraModelKind model = CameraModelKind::pinhole_radtan;
-  bool sixth_order = false;  // radtan: k3 is estimated too; otherwise it is 0
+  /// Also estimates k3 of radtan; otherwise it is 0.
+  bool sixth_order = false;
 };
 
 struct BoardViewResult {
   std::string name{};
-  double rms_px = 0;  // over the corners of all its images, norm of both coordinates
-  bool used = false;  // false: rejected, above kRejectedRatio times the median and kNeverRejected
+  /// RMS over the corners of all its images, norm of both coordinates.
+  double rms_px = 0;
+  /// False if rejected: above kRejectedRatio times the median and kNeverRejected.
+  bool used = false;
 };
 
 struct BoardCameraResult {
   int images = 0;
-  double alone_rms_px = 0;  // the camera calibrated by itself
+  /// RMS of the camera calibrated separately.
+  double alone_rms_px = 0;
 };
 
 struct BoardCalibration {
-  /// Sigmas by jackknife over the views, which contains what the corners of one view have in
-  /// common; `sigma_noise` with the lenses held. A lens' sigma is not below what OpenCV derives
-  /// from the residuals.
+  /// Sigmas are from a jackknife over the views, which includes errors common to the corners of a
+  /// view; `sigma_noise` is with fixed intrinsics. Sigmas of intrinsics are at least those that
+  /// OpenCV derives from the residuals.
   RigCalibration rig{};
   std::vector<BoardViewResult> views{};
-  std::vector<Transform> T_left_board{};  // of every view; identity where it is rejected
+  /// Pose of every view; identity if rejected.
+  std::vector<Transform> T_left_board{};
   std::array<BoardCameraResult, kMaxCameras> cameras{};
-  std::string error{};  // why this is no calibration; empty: it is one
+  /// Reason why there is no valid calibration; empty if there is.
+  std::string error{};
 };
 
-inline constexpr double kRejectedRatio = 3;  // of the median over the views
-/// rms, px: as good as the detector gets on real images; nothing is wrong with such a view.
+/// Ratio to the median over the views.
+inline constexpr double kRejectedRatio = 3;
+/// RMS in px that the detector reaches on real images; such a view is never rejected.
 inline constexpr double kNeverRejected = 0.25;
-/// Views that a camera needs; fewer leave focal length and centre open.
+/// Minimum number of views per camera; fewer do not determine focal length and principal point.
 inline constexpr std::size_t kMinViews = 3;
 
-/// Each camera alone (calibrateCamera, fisheye::calibrate), then each with camera 0
-/// (stereoCalibrate): the first pair of radtan lenses is refined together, all others are held.
-/// Views with large residuals are rejected. Of several cameras a view counts where camera 0 and
-/// another have it; the others are to be left out before.
-/// Errors  InputError: fewer than kMinViews views of a camera. `error`: no convergence, a result
-///         that cannot be a rig.
+/// Calibrates each camera separately (calibrateCamera, fisheye::calibrate), then each with camera 0
+/// (stereoCalibrate). The first pair of radtan cameras is refined jointly; all other intrinsics are
+/// fixed. Views with large residuals are rejected. With several cameras a view needs camera 0 and
+/// another; others must be removed before. Throws InputError for fewer than kMinViews views of a
+/// camera. `error` reports no convergence or an implausible rig.
 [[nodiscard]] BoardCalibration calibrate_boards(const std::vector<BoardView>& views,
                                                 const BoardCalibrationOptions& options);
 

@@ -4,16 +4,15 @@
 
 namespace vergence::app {
 
-/// True with at least six corners (of a board of fewer: all), of which two rows have two: no three
-/// of those four lie on a line. Without a homography OpenCV throws, at that view and at all views
-/// together.
+/// True with at least six corners (or all of a smaller target) and two rows with two corners each:
+/// no three of those four are collinear. Without a homography OpenCV throws for that view and for
+/// all views together.
 [[nodiscard]] bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board);
 
 /// Detects the target in an image: of a checkerboard all corners or none, of an AprilGrid or a
-/// ChArUco board those that are there, if they determine a homography.
-///
-/// `reference`: what another camera of the rig, mounted the same way up, shows of it at the same
-/// time; it decides where the board does not tell its ends. May be empty.
+/// ChArUco board the visible ones if they determine a homography. `reference` has the corners in
+/// another camera of the rig with the same orientation at the same time; it resolves a symmetric
+/// target. May be empty.
 [[nodiscard]] BoardCorners find_board(const ImageView& image, const BoardPattern& board,
                                       BoardSearch search, const BoardCorners& reference);
 

@@ -13,15 +13,17 @@ namespace vergence::app {
 
 struct BoardReport {
   const BoardCalibration& found;
-  const CalibrationFile& file;  // names, and the rig as it is written
+  /// Names, and the rig as written.
+  const CalibrationFile& file;
   const BoardPattern& board;
   const Coverage& coverage;
-  std::optional<double> measured_baseline{};  // m
+  /// In m.
+  std::optional<double> measured_baseline{};
 };
 
-/// Tables for a terminal: lenses, places with their sigmas, views refused, missing coverage.
+/// Tables for a terminal: intrinsics, extrinsics with sigmas, rejected views, missing coverage.
 [[nodiscard]] std::string format_report(const BoardReport& report);
-/// Formats the report as JSON; every key has its unit. docs/calibration.md.
+/// Report as JSON; every key has its unit (docs/calibration.md).
 [[nodiscard]] nlohmann::ordered_json json_report(const BoardReport& report);
 
 }  // namespace vergence::app

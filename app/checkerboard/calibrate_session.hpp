@@ -9,38 +9,42 @@
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 
-/// `vergence calibrate target` and `live`. All of it throws InputError where arguments, images or
-/// devices cannot be used.
+/// Commands `vergence calibrate target` and `live`. Functions throw InputError for unusable
+/// arguments, images or devices.
 namespace vergence::app {
 
 struct CalibrateRequest {
   BoardPattern board{};
   CameraModelKind model = CameraModelKind::pinhole_radtan;
-  bool sixth_order = false;                   // k3 of radtan
-  std::filesystem::path out{};                // calibration.yaml
-  std::optional<double> measured_baseline{};  // m, to report against
-  std::optional<std::filesystem::path>
-      keep_views{};  // live: a folder for the images of the views taken
+  /// Estimates k3 of radtan.
+  bool sixth_order = false;
+  /// Path of calibration.yaml.
+  std::filesystem::path out{};
+  /// Measured baseline in m, for comparison in the report.
+  std::optional<double> measured_baseline{};
+  /// Live: directory for the images of the used views.
+  std::optional<std::filesystem::path> keep_views{};
   bool json = false, quiet = false;
 };
 
-/// From image files: patterns of each camera, camera 0 first.
+/// Calibrates from image files: patterns of each camera, camera 0 first.
 [[nodiscard]] ExitCode calibrate_images(const CalibrateRequest& request,
                                         const std::vector<std::vector<std::string>>& patterns);
 
-/// From the cameras of a configuration, until nothing is missing or a signal comes.
+/// Calibrates from the cameras of a configuration, until coverage is complete or a signal arrives.
 [[nodiscard]] ExitCode calibrate_live(const CalibrateRequest& request,
                                       const Configuration& configuration);
 
 /// Data of a rig in addition to its views.
 struct CalibratedRig {
   std::string rig_name{};
-  std::vector<std::string> names{}, serials{};  // one a camera
+  /// One per camera.
+  std::vector<std::string> names{}, serials{};
   std::vector<ImageSize> sizes{};
 };
 
-/// Calibrates, prints the report on standard output and writes the file; messages go through
-/// *progress. → done, not_usable
+/// Calibrates, prints the report on standard output and writes the file; messages go to *progress.
+/// Returns done or not_usable.
 [[nodiscard]] ExitCode conclude_calibration(const CalibrateRequest& request,
                                             const CalibratedRig& rig,
                                             const std::vector<BoardView>& views,

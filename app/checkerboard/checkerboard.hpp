@@ -9,23 +9,25 @@
 namespace vergence::app {
 
 enum class BoardSearch : std::uint8_t {
-  thorough,  // images from files
-  quick,     // live: gives up soon where no board is
+  /// For images from files.
+  thorough,
+  /// For live images: gives up soon if there is no target.
+  quick,
 };
 
-/// The corners of the board in an image to about a tenth of a pixel, row by row, in the order of
-/// BoardPattern::corner(); pixel centres at integers. The corner from which the rows run to the
-/// right and down is found by the squares' colours where they tell, else it is the detector's
-/// choice: see same_way_up(). Nothing: not all of them are there.
+/// Corners of the checkerboard in an image to about 0.1 px, row by row in the order of
+/// BoardPattern::corner(), with pixel centres at integers. The first corner follows from the
+/// squares' colours if these are unambiguous, else it is the detector's choice: see same_way_up().
+/// Empty unless all corners are visible.
 ///
-/// OpenCV's findChessboardCorners and cornerSubPix with a window that fits the smallest square
-/// seen: a wider one reaches over the next corner.
+/// Uses OpenCV's findChessboardCorners, and cornerSubPix with a window that fits the smallest
+/// visible square; a wider one would reach over the next corner.
 [[nodiscard]] std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
                                                                  const BoardPattern& board,
                                                                  BoardSearch search);
 
-/// Turns a board that does not tell its ends so that its diagonal runs as it does in another camera
-/// of the rig, which is mounted the same way up.
+/// Rotates a symmetric target so that its diagonal has the direction seen in another camera of the
+/// rig with the same orientation.
 void same_way_up(const std::vector<Vec2>& reference, std::vector<Vec2>* corners);
 
 }  // namespace vergence::app

@@ -11,34 +11,38 @@ namespace vergence::app {
 
 /// Coverage of the views so far: missing parts of each image, tilts, sizes and number.
 ///
-/// Parts    Nine of each image, the outer ones a third wide: distortion is determined where the
-///          corners are, and nowhere else.
-/// Tilts    Four, kTilt and more: without them focal length and distance cannot be told apart. Of
-///          camera 0, as it sees the board.
-/// Sizes    Once as near as both cameras let it come, once clearly farther.
+/// Parts    Nine per image, the outer ones a third wide, because distortion is determined only
+///          where corners are.
+/// Tilts    Four directions of at least kTilt as seen by camera 0; without them focal length and
+///          distance are not separable.
+/// Sizes    Once as near as both cameras permit, once clearly further.
 class Coverage {
  public:
-  /// `names` and `sizes` one a camera; `focal_px` of camera 0, roughly: it only serves the tilts.
+  /// `names` and `sizes` are per camera. `focal_px` is the approximate focal length of camera 0,
+  /// used only for the tilts.
   Coverage(const BoardPattern& board, std::vector<std::string> names, std::vector<ImageSize> sizes,
            double focal_px);
 
   void add(const BoardView& view);
   /// Returns true if a view adds a missing part, tilt or size.
   [[nodiscard]] bool brings_something(const BoardView& view) const;
-  /// Describes missing coverage, the most useful first: "left: top right and bottom", "the board's
-  /// left edge nearer", "5 more views".
+  /// Describes missing coverage, most useful first: "left: top right and bottom", "the board's left
+  /// edge nearer", "5 more views".
   [[nodiscard]] std::vector<std::string> needs() const;
   [[nodiscard]] std::size_t views() const noexcept { return views_; }
 
  private:
   static constexpr std::size_t kParts = 9, kTilts = 4;
   struct Seen {
-    std::array<int, kParts> parts{};  // of the view that has most there
+    // Maximum number of corners in a part, over the views.
+    std::array<int, kParts> parts{};
   };
   /// Pose of the target in front of camera 0.
   struct Stand {
-    double extent = 0;  // of the image's width or height, whichever it fills more of
-    std::array<bool, kTilts> tilted{};  // right, left, bottom, top edge nearer
+    // Largest share of the image's width or height.
+    double extent = 0;
+    // True for the right, left, bottom or top edge nearer.
+    std::array<bool, kTilts> tilted{};
   };
   [[nodiscard]] Stand pose_bin(const BoardView& view) const;
   void count(const BoardView& view, std::size_t camera, Seen* seen) const;
@@ -49,14 +53,19 @@ class Coverage {
   double focal_px_;
   std::vector<Seen> seen_;
   std::array<bool, kTilts> tilted_{};
-  double nearest_ = 0, farthest_ = 1;  // extents
+  // Values of Stand::extent.
+  double nearest_ = 0, farthest_ = 1;
   std::size_t views_ = 0;
 };
 
 inline constexpr std::size_t kEnoughViews = 12;
-inline constexpr int kEnoughCorners = 6;     // of one view in a part
-inline constexpr double kTilt = 0.26;        // rad, 15°
-inline constexpr double kNearExtent = 0.35;  // of the image
-inline constexpr double kFarOfNear = 0.75;   // extents, far over near
+/// Number of corners of one view in a part.
+inline constexpr int kEnoughCorners = 6;
+/// In rad (15°).
+inline constexpr double kTilt = 0.26;
+/// Share of the image.
+inline constexpr double kNearExtent = 0.35;
+/// Ratio of extents, far to near.
+inline constexpr double kFarOfNear = 0.75;
 
 }  // namespace vergence::app

@@ -9,14 +9,14 @@
 /// Shared parts of targets with coded tags.
 namespace vergence::app {
 
-/// Mean distance, px, of points in an image to those of a flat board; infinite where no homography
-/// is found.
+/// Mean distance in px between points in an image and those of a flat target; infinite without a
+/// homography.
 [[nodiscard]] double homography_misfit(const std::vector<cv::Point2d>& on_board,
                                        const std::vector<cv::Point2d>& in_image);
 
-/// To the saddle points near `rough` (centres of pixels at integers), by OpenCV's cornerSubPix in
-/// windows of 2 `half_window` + 1 px. Corners too near to the image's edge, and those that would go
-/// farther than `max_moved` px, are left out; in order of index.
+/// Refines `rough` corners (pixel centres at integers) to saddle points by OpenCV's cornerSubPix in
+/// windows of 2 `half_window` + 1 px. Drops corners near the image's edge or moved by more than
+/// `max_moved` px. Ordered by index.
 [[nodiscard]] BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough,
                                           int half_window, double max_moved);
 

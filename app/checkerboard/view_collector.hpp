@@ -8,24 +8,25 @@ namespace vergence::app {
 
 enum class OfferResult : std::uint8_t {
   taken,
-  not_seen,     // camera 0, or every other camera, does not have the whole board
-  moving,       // the board is not where it was a moment ago, or was not seen then: exposures that
-                // differ would make it bend
-  nothing_new,  // all of this has been seen
+  /// Camera 0, or every other camera, does not see the whole target.
+  not_seen,
+  /// The target has moved since the last set, or was not seen then; different exposures would
+  /// deform it.
+  moving,
+  /// The view adds no coverage.
+  nothing_new,
 };
 
-/// Picks from live images the views that a calibration needs.
-///
-/// Not thread-safe. Allocates.
+/// Selects from live images the views that a calibration needs. Not thread-safe. Allocates.
 class ViewCollector {
  public:
   explicit ViewCollector(Coverage coverage, double image_width_px);
 
-  /// Corners of one set of images; sets come one after the other.
+  /// Offers the corners of one set of images; sets must be consecutive.
   [[nodiscard]] OfferResult offer(const BoardView& seen);
   [[nodiscard]] const std::vector<BoardView>& views() const noexcept { return views_; }
   [[nodiscard]] const Coverage& coverage() const noexcept { return coverage_; }
-  /// Nothing is missing any more.
+  /// True if coverage is complete.
   [[nodiscard]] bool complete() const { return coverage_.needs().empty(); }
 
  private:
@@ -38,9 +39,9 @@ class ViewCollector {
   std::vector<BoardView> views_{};
 };
 
-inline constexpr double kStillOfWidth =
-    0.0015;  // mean motion of the corners between two sets: 1 px of 640
-inline constexpr double kElsewhereOfWidth =
-    0.05;  // mean distance of the corners to those of every view taken
+/// Mean motion of the corners between two sets relative to the image width: 1 px of 640.
+inline constexpr double kStillOfWidth = 0.0015;
+/// Mean distance of the corners to those of every taken view, relative to the image width.
+inline constexpr double kElsewhereOfWidth = 0.05;
 
 }  // namespace vergence::app

@@ -5,17 +5,16 @@
 
 #include "app/datasets/foreign_calibration.hpp"
 
-/// Calibrations written in other programs' files.
+/// Calibrations in other programs' file formats.
 ///
-/// Ours     X_camera = R X_left + t, T_camera_left = [R t], metres; pixel centres at integers;
-///          radtan k1 k2 p1 p2 [k3], equidistant k1 … k4.
-///          All formats here share pixels, metres, axes (x right, y down, z forward) and the two
-///          distortion models.
-/// Errors   InputError: the format has no place for what images would need.
-/// Remarks  One message each for what is not carried over.
+/// Model    X_camera = R X_left + t, T_camera_left = [R t] in metres; pixel centres at integers;
+///          radtan k1 k2 p1 p2 [k3], equidistant k1 … k4. All formats share pixels, metres, axes (x
+///          right, y down, z forward) and the two distortion models.
+/// Errors   InputError if the format lacks something required.
+/// Remarks  One message for each item that is not carried over.
 namespace vergence::app {
 
-/// Kalibr's camchain: cam0, cam1 … with T_cn_cnm1, X_cn = T_cn_cnm1 X_cn-1.
+/// Kalibr camchain: cam0, cam1 … with T_cn_cnm1, X_cn = T_cn_cnm1 X_cn-1.
 [[nodiscard]] std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks);
 
 /// ROS camera_info of a stereo pair, left and right. Rectified by OpenCV's stereoRectify (fisheye's
@@ -23,19 +22,20 @@ namespace vergence::app {
 [[nodiscard]] std::array<std::string, 2> format_ros(const CalibrationFile& calibration,
                                                     Remarks* remarks);
 
-/// OpenCV's intrinsics and extrinsics without the head `%YAML:1.0`; a file may hold either or one
-/// after the other.
+/// OpenCV's intrinsics and extrinsics without the header `%YAML:1.0`; a file may hold either or
+/// both.
 [[nodiscard]] std::array<std::string, 2> format_opencv(const CalibrationFile& calibration,
                                                        Remarks* remarks);
 
-/// `[a, b, c]` with as many digits as give the same doubles again.
+/// List `[a, b, c]` with as many digits as reproduce the doubles.
 [[nodiscard]] std::string number_list(std::span<const double> values);
 
 namespace detail {
-/// Remarks what every one of these formats lacks; `serials`, `names`: the format lacks those, too.
+/// Adds remarks about data that all these formats lack; `serials`, `names`: the format lacks those,
+/// too.
 void remark_lost(const CalibrationFile& calibration, const char* format, Remarks* remarks);
-/// Checks a calibration for a format that holds one pair of cameras, and adds a remark about
-/// further cameras. InputError: the two cameras differ in model or size.
+/// Checks a calibration for a format with one pair of cameras, and adds a remark about additional
+/// cameras. Throws InputError if the two cameras differ in model or size.
 void check_pair(const CalibrationFile& calibration, const char* format, Remarks* remarks);
 }  // namespace detail
 

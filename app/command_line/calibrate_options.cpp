@@ -48,75 +48,52 @@ ExitCode run_checkerboard_tool(const ProgramArguments& arguments) {
 namespace {
 
 void declare_out(CLI::App& command, CalibrateOptions& o) {
-  command.add_option("--out", o.out, "Calibration file to write")
-      ->required()
-      ->type_name("FILE")
-      ->group("Output");
+  add_option(command, "--out", o.out, "Calibration file to write", "FILE", "Output")->required();
   command.add_flag("--force", o.force, "Overwrite an existing file")->group("Output");
 }
 
 /// The options that `target` and `live` share.
 void declare_board(CLI::App& command, CalibrateOptions& o) {
-  command
-      .add_option("--checkerboard", o.board,
-                  "Inner corners of a checkerboard, columns and rows: 9x6")
-      ->type_name("NxN")
-      ->group("Target");
-  command.add_option("--aprilgrid", o.aprilgrid, "Tags of an AprilGrid (36h11): 6x6")
+  add_option(command, "--checkerboard", o.board,
+             "Inner corners of a checkerboard, columns and rows: 9x6", "NxN", "Target");
+  add_option(command, "--aprilgrid", o.aprilgrid, "Tags of an AprilGrid (36h11): 6x6", "NxN",
+             "Target")
+      ->excludes("--checkerboard");
+  add_option(command, "--charuco", o.charuco, "Squares of a ChArUco target: 11x8", "NxN", "Target")
       ->excludes("--checkerboard")
-      ->type_name("NxN")
-      ->group("Target");
-  command.add_option("--charuco", o.charuco, "Squares of a ChArUco target: 11x8")
-      ->excludes("--checkerboard")
-      ->excludes("--aprilgrid")
-      ->type_name("NxN")
-      ->group("Target");
-  command.add_option("--square", o.square, "Size of a square or tag in metres")
-      ->required()
-      ->type_name("M")
-      ->group("Target");
-  command
-      .add_option("--spacing", o.spacing, "--aprilgrid: gap between tags relative to their size")
-      ->type_name("N")
-      ->capture_default_str()
-      ->group("Target");
-  command.add_option("--marker", o.marker, "--charuco: size of a marker in metres")
-      ->type_name("M")
-      ->group("Target");
-  command.add_option("--dictionary", o.dictionary, "--charuco: OpenCV's name of the dictionary")
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->group("Target");
-  command.add_option("--model", o.model, "Lens model: radtan, or equidistant (fisheye)")
+      ->excludes("--aprilgrid");
+  add_option(command, "--square", o.square, "Size of a square or tag in metres", "M", "Target")
+      ->required();
+  add_option(command, "--spacing", o.spacing,
+             "--aprilgrid: gap between tags relative to their size", "N", "Target")
+      ->capture_default_str();
+  add_option(command, "--marker", o.marker, "--charuco: size of a marker in metres", "M", "Target");
+  add_option(command, "--dictionary", o.dictionary, "--charuco: OpenCV's name of the dictionary",
+             "NAME", "Target")
+      ->capture_default_str();
+  add_option(command, "--model", o.model, "Lens model: radtan, or equidistant (fisheye)", "NAME",
+             "Calibration")
       ->check(one_of({"radtan", "equidistant"}))
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->group("Calibration");
+      ->capture_default_str();
   command.add_flag("--k3", o.sixth_order, "radtan: also estimate k3")->group("Calibration");
-  command.add_option("--baseline", o.baseline, "Measured baseline in metres, for comparison")
-      ->check(CLI::Range(0.001, 100.0))
-      ->type_name("M")
-      ->group("Calibration");
+  add_option(command, "--baseline", o.baseline, "Measured baseline in metres, for comparison", "M",
+             "Calibration")
+      ->check(CLI::Range(0.001, 100.0));
   declare_out(command, o);
   command.add_flag("--json", o.json, "Print JSON instead of tables")->group("Output");
   o.common.declare_quiet(command);
 }
 
 void declare_target(CLI::App& command, CalibrateOptions& o) {
-  command
-      .add_option("--left", o.left,
-                  "Images of the left camera, quoted; alone: one camera's intrinsics")
-      ->required()
-      ->type_name("GLOB")
-      ->group("Input");
-  command.add_option("--right", o.right, "Images of the right camera, paired by number or name")
-      ->type_name("GLOB")
-      ->group("Input");
-  command.add_option("--camera", o.more_cameras, "Images of a third and a fourth camera")
+  add_option(command, "--left", o.left,
+             "Images of the left camera, quoted; alone: one camera's intrinsics", "GLOB", "Input")
+      ->required();
+  add_option(command, "--right", o.right, "Images of the right camera, paired by number or name",
+             "GLOB", "Input");
+  add_option(command, "--camera", o.more_cameras, "Images of a third and a fourth camera", "GLOB",
+             "Input")
       ->needs("--right")
-      ->type_name("GLOB")
-      ->allow_extra_args(false)
-      ->group("Input");
+      ->allow_extra_args(false);
   declare_board(command, o);
   command.footer(
       "Example: vergence calibrate target --left 'l*.png' --right 'r*.png' --checkerboard 9x6 "
@@ -125,13 +102,12 @@ void declare_target(CLI::App& command, CalibrateOptions& o) {
 }
 
 void declare_live(CLI::App& command, CalibrateOptions& o) {
-  command.add_option("CONFIG", o.configuration, "Configuration file (docs/configuration.md)")
-      ->required()
-      ->type_name("FILE");
+  add_option(command, "CONFIG", o.configuration, "Configuration file (docs/configuration.md)",
+             "FILE")
+      ->required();
   declare_board(command, o);
-  command.add_option("--keep-views", o.keep_views, "Save the images of accepted views")
-      ->type_name("DIR")
-      ->group("Output");
+  add_option(command, "--keep-views", o.keep_views, "Save the images of accepted views", "DIR",
+             "Output");
   o.common.declare_set(command);
   command.footer(
       "Example: vergence calibrate live app/config/gige.yaml --checkerboard 9x6 --square 0.025 "
@@ -141,23 +117,18 @@ void declare_live(CLI::App& command, CalibrateOptions& o) {
 }
 
 void declare_sequence(CLI::App& command, CalibrateOptions& o) {
-  command.add_option("DATA", o.data, "Data-set directory, or a .mcap, .db3 or .bag file")
-      ->required()
-      ->type_name("DIR|FILE");
-  command.add_option("--format", o.format, "Format of DATA; the names are those of replay")
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->group("Input");
+  add_option(command, "DATA", o.data, "Data-set directory, or a .mcap, .db3 or .bag file",
+             "DIR|FILE")
+      ->required();
+  add_option(command, "--format", o.format, "Format of DATA; the names are those of replay", "NAME",
+             "Input")
+      ->capture_default_str();
   declare_image_topics(command, &o.left_topic, &o.right_topic);
-  command
-      .add_option("--calibration", o.calibration,
-                  "Initial calibration instead of the data set's (vergence, Kalibr, ROS, OpenCV)")
-      ->type_name("FILE")
-      ->group("Calibration");
-  command
-      .add_option("--baseline", o.baseline, "Baseline length in metres; overrides the calibration")
-      ->type_name("M")
-      ->group("Calibration");
+  add_option(command, "--calibration", o.calibration,
+             "Initial calibration instead of the data set's (vergence, Kalibr, ROS, OpenCV)",
+             "FILE", "Calibration");
+  add_option(command, "--baseline", o.baseline,
+             "Baseline length in metres; overrides the calibration", "M", "Calibration");
   declare_out(command, o);
   o.common.declare(command);
   command.footer(
@@ -167,23 +138,17 @@ void declare_sequence(CLI::App& command, CalibrateOptions& o) {
 }
 
 void declare_convert(CLI::App& command, CalibrateOptions& o) {
-  command
-      .add_option("IN", o.in,
-                  "Calibration to read, its format detected; two files with a comma between")
-      ->required()
-      ->type_name("FILE");
-  command.add_option("OUT", o.out, "File or files to write, or a directory for ROS")
-      ->required()
-      ->type_name("FILE|DIR");
-  command
-      .add_option("--to", o.to, "Format of OUT: vergence, kalibr, ros, opencv [by the name of OUT]")
-      ->check(one_of({"vergence", "kalibr", "ros", "opencv"}))
-      ->type_name("NAME")
-      ->group("Output");
+  add_option(command, "IN", o.in,
+             "Calibration to read, its format detected; two files with a comma between", "FILE")
+      ->required();
+  add_option(command, "OUT", o.out, "File or files to write, or a directory for ROS", "FILE|DIR")
+      ->required();
+  add_option(command, "--to", o.to,
+             "Format of OUT: vergence, kalibr, ros, opencv [by the name of OUT]", "NAME", "Output")
+      ->check(one_of({"vergence", "kalibr", "ros", "opencv"}));
   command.add_flag("--force", o.force, "Overwrite existing files")->group("Output");
-  command.add_option("--size", o.size, "Image size in pixels, if an OpenCV file has none: 640x480")
-      ->type_name("NxN")
-      ->group("Input");
+  add_option(command, "--size", o.size, "Image size in pixels, if an OpenCV file has none: 640x480",
+             "NxN", "Input");
   command.footer(
       "Example: vergence calibrate convert camchain.yaml calibration.yaml\n"
       "Exit codes: 0 success; 2 bad arguments or input.");

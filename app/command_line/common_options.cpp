@@ -22,8 +22,8 @@ CLI::Validator one_of(std::vector<std::string> values) {
 }
 
 void CommonOptions::declare_set(CLI::App& command) {
-  command.add_option("--set", set, "Set a configuration key (docs/configuration.md); repeatable")
-      ->type_name("KEY=VALUE")
+  add_option(command, "--set", set, "Set a configuration key (docs/configuration.md); repeatable",
+             "KEY=VALUE")
       ->allow_extra_args(false)  // one argument each: the next word is not another KEY=VALUE
       ->group("Configuration");
 }
@@ -34,12 +34,10 @@ void CommonOptions::declare_quiet(CLI::App& command) {
 
 void CommonOptions::declare(CLI::App& command) {
   declare_set(command);
-  command.add_option("--threads", threads, "Threads of the estimator, 1 or 2; same poses")
-      ->type_name("N")
-      ->group("Performance");
-  command.add_option("--seed", seed, "Seed of the random sampling; same seed, same poses")
-      ->type_name("N")
-      ->group("Performance");
+  add_option(command, "--threads", threads, "Threads of the estimator, 1 or 2; same poses", "N",
+             "Performance");
+  add_option(command, "--seed", seed, "Seed of the random sampling; same seed, same poses", "N",
+             "Performance");
   declare_quiet(command);
 }
 
@@ -50,12 +48,10 @@ void declare_session_options(CLI::App& command, bool* memory, bool* page) {
 }
 
 void declare_image_topics(CLI::App& command, std::string* left, std::string* right) {
-  command.add_option("--left-topic", *left, "Bag topic of the left images, if ambiguous")
-      ->type_name("TOPIC")
-      ->group("Input");
-  command.add_option("--right-topic", *right, "Bag topic of the right images, if ambiguous")
-      ->type_name("TOPIC")
-      ->group("Input");
+  add_option(command, "--left-topic", *left, "Bag topic of the left images, if ambiguous", "TOPIC",
+             "Input");
+  add_option(command, "--right-topic", *right, "Bag topic of the right images, if ambiguous",
+             "TOPIC", "Input");
 }
 
 Configuration CommonOptions::configuration(const std::optional<std::filesystem::path>& file,

@@ -4,12 +4,11 @@
 #include "app/command_line/program.hpp"
 #include "app/runtime/errors.hpp"
 
-/// Every word of the command line: each function declares its options on `root` and, when its word
-/// was given, runs the command from the subcommand's callback and sets *exit_code. InputError may
-/// leave the callback.
+/// Commands of the program. Each function declares its options on `root`. If its command was given,
+/// the subcommand's callback runs it and sets *exit_code; the callback may throw InputError.
 namespace vergence::app {
 
-/// `arguments`: command line of the checkerboard tool.
+/// `arguments` is the command line for the checkerboard tool.
 void add_calibrate(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code);
 void add_devices(CLI::App& root, ExitCode* exit_code);
 void add_doctor(CLI::App& root, ExitCode* exit_code);
@@ -21,7 +20,7 @@ void add_run(CLI::App& root, ExitCode* exit_code);
 void add_simulate(CLI::App& root, ExitCode* exit_code);
 void add_snap(CLI::App& root, ExitCode* exit_code);
 
-/// All of them: what `vergence` is made of.
+/// Adds all commands of `vergence`.
 void add_all_commands(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code);
 
 }  // namespace vergence::app

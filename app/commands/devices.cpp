@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
 #include "app/devices/inventory_report.hpp"
@@ -64,15 +65,12 @@ void add_devices(CLI::App& root, ExitCode* exit_code) {
                                           "List connected cameras, serial ports and boards as "
                                           "configuration snippets");
   command->add_flag("--json", a->json, "Print JSON (docs/deployment.md)");
-  CLI::Option* rules =
-      command
-          ->add_option("--write-udev", a->rules, "Write udev rules to FILE, or to standard output")
-          ->expected(0, 1)
-          ->default_str("-")
-          ->type_name("[FILE]");
-  command
-      ->add_option("--rig", a->rig, "With --write-udev: only for the devices of this configuration")
-      ->type_name("CONFIG");
+  CLI::Option* rules = add_option(*command, "--write-udev", a->rules,
+                                  "Write udev rules to FILE, or to standard output", "[FILE]")
+                           ->expected(0, 1)
+                           ->default_str("-");
+  add_option(*command, "--rig", a->rig,
+             "With --write-udev: only for the devices of this configuration", "CONFIG");
   command->footer(
       "Example: vergence devices --rig rig.yaml --write-udev | sudo tee "
       "/etc/udev/rules.d/98-vergence-rig.rules\n"

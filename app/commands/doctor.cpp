@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
 #include "app/devices/inventory_report.hpp"
@@ -42,15 +43,11 @@ void add_doctor(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<DoctorArguments>();
   CLI::App* command = root.add_subcommand(
       "doctor", "Check machine and devices against a configuration and print fixes");
-  command
-      ->add_option("CONFIG", a->configuration,
-                   "Configuration to check; without it, check what is connected")
-      ->type_name("FILE");
-  command->add_option("--set", a->set, "Set a configuration key; repeatable")
-      ->type_name("KEY=VALUE")
+  add_option(*command, "CONFIG", a->configuration,
+             "Configuration to check; without it, check what is connected", "FILE");
+  add_option(*command, "--set", a->set, "Set a configuration key; repeatable", "KEY=VALUE")
       ->allow_extra_args(false);
-  command->add_option("--session-dir", a->out, "Check free space in this directory")
-      ->type_name("DIR");
+  add_option(*command, "--session-dir", a->out, "Check free space in this directory", "DIR");
   command->add_flag("--json", a->json, "Print JSON (docs/deployment.md)");
   command->footer(
       "Example: vergence doctor app/config/gige.yaml --session-dir /data\n"

@@ -112,46 +112,35 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<EvaluateArguments>();
   CLI::App* command = root.add_subcommand(
       "evaluate", "Compare a trajectory with ground truth (ATE, segment errors)");
-  command->add_option("ESTIMATE", a->estimate, "Trajectory file, session or data-set directory")
-      ->required()
-      ->type_name("DIR|FILE");
-  command
-      ->add_option("REFERENCE", a->reference,
-                   "Trajectory file, KITTI or EuRoC directory, or ins.csv of a session")
-      ->type_name("DIR|FILE");
+  add_option(*command, "ESTIMATE", a->estimate, "Trajectory file, session or data-set directory",
+             "DIR|FILE")
+      ->required();
+  add_option(*command, "REFERENCE", a->reference,
+             "Trajectory file, KITTI or EuRoC directory, or ins.csv", "DIR|FILE");
   command->add_flag("--json", a->json, "Print JSON");
-  command
-      ->add_option("--lengths", a->lengths,
-                   "Segment lengths in metres [100,200 … 800; shorter on short paths]")
-      ->type_name("M,…");
-  command
-      ->add_option("--step", a->step,
-                   "Start a segment at every Nth pose [10; with short lengths 1]")
-      ->type_name("N");
+  add_option(*command, "--lengths", a->lengths,
+             "Segment lengths in metres [100,200 … 800; shorter on short paths]", "M,…");
+  add_option(*command, "--step", a->step,
+             "Start a segment at every Nth pose [10; with short lengths 1]", "N");
   command->add_option("--associate", a->associate, "How reference poses are associated")
       ->check(one_of({"interpolate", "nearest"}))
       ->capture_default_str();
-  command
-      ->add_option("--max-gap", a->max_gap,
-                   "interpolate: largest reference gap to interpolate across")
-      ->type_name("SECONDS")
+  add_option(*command, "--max-gap", a->max_gap,
+             "interpolate: largest reference gap to interpolate across", "SECONDS")
       ->capture_default_str();
-  command->add_option("--max-difference", a->max_difference, "nearest: maximum stamp difference")
-      ->type_name("SECONDS")
+  add_option(*command, "--max-difference", a->max_difference, "nearest: maximum stamp difference",
+             "SECONDS")
       ->capture_default_str();
   command
       ->add_option("--axes", a->axes,
                    "Body axes: camera (z forward) or flu (x forward, y left, z up)")
       ->check(one_of({"camera", "flu"}))
       ->capture_default_str();
-  command
-      ->add_option("--time-unit", a->unit,
-                   "Time unit of ESTIMATE[,REFERENCE]: s, ms, us, ns [by magnitude, or s]")
-      ->type_name("UNIT");
-  command
-      ->add_option("--quaternion", a->quaternion,
-                   "Quaternion order of ESTIMATE[,REFERENCE]: xyzw, wxyz [by headings, or xyzw]")
-      ->type_name("ORDER");
+  add_option(*command, "--time-unit", a->unit,
+             "Time unit of ESTIMATE[,REFERENCE]: s, ms, us, ns [by magnitude, or s]", "UNIT");
+  add_option(*command, "--quaternion", a->quaternion,
+             "Quaternion order of ESTIMATE[,REFERENCE]: xyzw, wxyz [by headings, or xyzw]",
+             "ORDER");
   command->add_flag("--estimate-ins-extrinsics", a->estimate_ins_extrinsics,
                     "Estimate lever arm and boresight of the INS");
   command->footer(

@@ -9,22 +9,23 @@
 
 namespace vergence::app {
 
-/// `vergence evaluate`.
+/// Arguments of `vergence evaluate`.
 struct EvaluationRequest {
   std::filesystem::path estimate;
-  std::filesystem::path reference;  // empty: the estimate's session has an INS
+  /// Empty if the estimate's session has an INS.
+  std::filesystem::path reference;
   EvaluationOptions options{};
-  bool usual_lengths = true;  // of options.segments the longest that the path is long enough for
+  /// Of options.segments, uses the longest that fit into the path.
+  bool usual_lengths = true;
   bool json = false;
   bool estimate_ins_extrinsics = false;
-  // Requested time units of the estimate's and the reference's file.
+  // Time units of the estimate's and the reference's file.
   std::array<std::optional<TimeUnit>, 2> units{};
   std::array<std::optional<QuaternionOrder>, 2> quaternions{};
 };
 
-/// Compares, and prints the figures on standard output.
-/// → done, not_usable (nothing to compare, no mount)
-/// Errors  InputError: files that are not there or cannot be read.
+/// Compares and prints the results on standard output. Returns done, or not_usable (nothing to
+/// compare, no extrinsics). Throws InputError for missing or unreadable files.
 [[nodiscard]] ExitCode run_evaluation(const EvaluationRequest& request);
 
 }  // namespace vergence::app

@@ -72,22 +72,17 @@ void add_export(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<ExportArguments>();
   CLI::App* command =
       root.add_subcommand("export", "Export a recorded session as EuRoC, KITTI or image folder");
-  command
-      ->add_option("SESSION", a->session,
-                   "Session directory with drive.mcap (docs/session_files.md)")
+  add_option(*command, "SESSION", a->session,
+             "Session directory with drive.mcap (docs/session_files.md)", "DIR")
+      ->required();
+  add_option(*command, "--format", a->format, "Format: euroc, kitti (rectified rigs only), folder",
+             "NAME")
       ->required()
-      ->type_name("DIR");
-  command->add_option("--format", a->format, "Format: euroc, kitti (rectified rigs only), folder")
-      ->required()
-      ->check(one_of({"euroc", "kitti", "folder"}))
-      ->type_name("NAME");
-  command->add_option("--out", a->out, "Directory; must not exist, or be empty")
-      ->required()
-      ->type_name("DIR");
-  command
-      ->add_option("--calibration", a->calibration,
-                   "Calibration to export (default: the initial one)")
-      ->type_name("FILE");
+      ->check(one_of({"euroc", "kitti", "folder"}));
+  add_option(*command, "--out", a->out, "Directory; must not exist, or be empty", "DIR")
+      ->required();
+  add_option(*command, "--calibration", a->calibration,
+             "Calibration to export (default: the initial one)", "FILE");
   command->add_flag("--quiet", a->quiet, "Print only warnings and errors");
   command->footer(
       "Example: vergence export sessions/monday --format euroc --out monday-euroc\n"

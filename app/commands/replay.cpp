@@ -84,57 +84,35 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<ReplayArguments>();
   CLI::App* command =
       root.add_subcommand("replay", "Run odometry on a recorded data set and write a session");
-  command->add_option("DATA", a->data, "Data-set directory, or a .mcap, .db3 or .bag file")
-      ->required()
-      ->type_name("DIR|FILE");
-  command
-      ->add_option("--format", a->format,
-                   "Format of DATA: auto, folder, kitti, kitti-raw, euroc, st-lucia, mcap, db3, "
-                   "rosbag, session")
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->group("Input");
-  command->add_option("--out", a->out, "Session directory; must not exist, or be empty")
-      ->required()
-      ->type_name("DIR")
-      ->group("Output");
+  add_option(*command, "DATA", a->data, "Data-set directory, or a .mcap, .db3 or .bag file",
+             "DIR|FILE")
+      ->required();
+  add_option(*command, "--format", a->format,
+             "Format of DATA: auto, folder, kitti, kitti-raw, euroc, st-lucia, mcap, db3, "
+             "rosbag, session",
+             "NAME", "Input")
+      ->capture_default_str();
+  add_option(*command, "--out", a->out, "Session directory; must not exist, or be empty", "DIR",
+             "Output")
+      ->required();
   declare_image_topics(*command, &a->topics.left, &a->topics.right);
-  command
-      ->add_option("--ins-topic", a->topics.ins, "Bag topic of the INS (NavSatFix), if ambiguous")
-      ->type_name("TOPIC")
-      ->group("Input");
-  command
-      ->add_option("--imu-topic", a->topics.imu,
-                   "Bag topic of sensor_msgs/Imu giving the INS attitude")
-      ->type_name("TOPIC")
-      ->group("Input");
-  command->add_option("--start", a->start, "Index of the first frame")
-      ->type_name("N")
-      ->group("Input");
-  command->add_option("--frames", a->frames, "Maximum number of frames")
-      ->type_name("N")
-      ->group("Input");
-  command
-      ->add_option("--calibration", a->calibration,
-                   "Initial calibration (vergence, Kalibr, ROS, OpenCV …)")
-      ->type_name("FILE")
-      ->group("Calibration");
-  command
-      ->add_option("--baseline", a->baseline,
-                   "Baseline length in metres; overrides the calibration")
-      ->type_name("M")
-      ->group("Calibration");
-  command
-      ->add_option("--focal", a->focal,
-                   "Initial focal length of both cameras in pixels, with --baseline")
-      ->type_name("PX")
-      ->group("Calibration");
-  command
-      ->add_option("--model", a->model, "Lens model for --focal: radtan, or equidistant (fisheye)")
+  add_option(*command, "--ins-topic", a->topics.ins,
+             "Bag topic of the INS (NavSatFix), if ambiguous", "TOPIC", "Input");
+  add_option(*command, "--imu-topic", a->topics.imu,
+             "Bag topic of sensor_msgs/Imu giving the INS attitude", "TOPIC", "Input");
+  add_option(*command, "--start", a->start, "Index of the first frame", "N", "Input");
+  add_option(*command, "--frames", a->frames, "Maximum number of frames", "N", "Input");
+  add_option(*command, "--calibration", a->calibration,
+             "Initial calibration (vergence, Kalibr, ROS, OpenCV …)", "FILE", "Calibration");
+  add_option(*command, "--baseline", a->baseline,
+             "Baseline length in metres; overrides the calibration", "M", "Calibration");
+  add_option(*command, "--focal", a->focal,
+             "Initial focal length of both cameras in pixels, with --baseline", "PX",
+             "Calibration");
+  add_option(*command, "--model", a->model,
+             "Lens model for --focal: radtan, or equidistant (fisheye)", "NAME", "Calibration")
       ->check(one_of({"radtan", "equidistant"}))
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->group("Calibration");
+      ->capture_default_str();
   command
       ->add_flag("--from-scratch", a->from_scratch, "Ignore known extrinsics; estimate them online")
       ->group("Calibration");

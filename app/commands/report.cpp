@@ -11,7 +11,8 @@ namespace {
 void make_report(const std::string& session) {
   const ReportOutcome outcome = write_report(session);
   for (const std::string& message : outcome.missing) std::cerr << "vergence: " << message << '\n';
-  std::cerr << outcome.headline << '\n';
+  std::cerr << report::spaced(outcome.assessment.grade) << ": " << outcome.assessment.message
+            << '\n';
   std::cout << outcome.page.string() << '\n';
 }
 

@@ -45,41 +45,29 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<RunArguments>();
   CLI::App* command = root.add_subcommand(
       "run", "Run live on the cameras, trigger and INS of a configuration, real or simulated");
-  command
-      ->add_option("CONFIG", a->configuration,
-                   "Configuration file (docs/configuration.md), e.g. app/config/mock.yaml")
-      ->required()
-      ->type_name("FILE");
-  command->add_option("--out", a->out, "Session directory; must not exist, or be empty")
-      ->required()
-      ->type_name("DIR")
-      ->group("Output");
+  add_option(*command, "CONFIG", a->configuration,
+             "Configuration file (docs/configuration.md), e.g. app/config/mock.yaml", "FILE")
+      ->required();
+  add_option(*command, "--out", a->out, "Session directory; must not exist, or be empty", "DIR",
+             "Output")
+      ->required();
   command
       ->add_flag("--fast", a->fast, "Simulated rig only: run faster than real time, drop nothing")
       ->group("Simulation");
-  command
-      ->add_option(
-          "--fault", a->faults,
-          "Simulated rig only: inject a fault, e.g. \"knock@42 pitch_deg=0.2\"; repeatable")
-      ->type_name("\"KIND@SECONDS …\"")
-      ->allow_extra_args(false)
-      ->group("Simulation");
-  command->add_option("--duration", a->duration_s, "Stop after this many seconds")
-      ->type_name("SECONDS")
-      ->group("Input");
+  add_option(*command, "--fault", a->faults,
+             "Simulated rig only: inject a fault, e.g. \"knock@42 pitch_deg=0.2\"; repeatable",
+             "\"KIND@SECONDS …\"", "Simulation")
+      ->allow_extra_args(false);
+  add_option(*command, "--duration", a->duration_s, "Stop after this many seconds", "SECONDS",
+             "Input");
   command
       ->add_flag("--from-scratch", a->from_scratch, "Ignore known extrinsics; estimate them online")
       ->group("Calibration");
-  command
-      ->add_option("--calibration", a->calibration,
-                   "Initial calibration (vergence, Kalibr, ROS, OpenCV)")
-      ->type_name("FILE")
-      ->group("Calibration");
-  command
-      ->add_option("--record", a->record,
-                   "Record poses, ins, images or pulses to drive.mcap (docs/session_files.md)")
-      ->type_name("TOPICS")
-      ->group("Output");
+  add_option(*command, "--calibration", a->calibration,
+             "Initial calibration (vergence, Kalibr, ROS, OpenCV)", "FILE", "Calibration");
+  add_option(*command, "--record", a->record,
+             "Record poses, ins, images or pulses to drive.mcap (docs/session_files.md)", "TOPICS",
+             "Output");
   command->footer(
       "Example: vergence run app/config/mock.yaml --fast --out sessions/mock\n"
       "SIGUSR1 requests a recalibration.\n" +

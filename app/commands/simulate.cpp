@@ -12,52 +12,40 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
   CLI::App* command = root.add_subcommand(
       "simulate", "Repeat the calibration experiment on simulated point clouds");
   command->group("Research");
+  command->option_defaults()->always_capture_default();
   SimulationOptions& s = a->simulation;
   command->add_option("--points", s.points, "Number of points of the cloud")
-      ->check(CLI::Range(5, 100000))
-      ->capture_default_str();
-  command->add_option("--radius", s.radius, "Radius of the cloud, m")
-      ->check(CLI::Range(1e-3, 1e4))
-      ->capture_default_str();
+      ->check(CLI::Range(5, 100000));
+  command->add_option("--radius", s.radius, "Radius of the cloud, m")->check(CLI::Range(1e-3, 1e4));
   command
       ->add_option("--shape", a->shape, "ball: points fill a ball; shell: they lie on its surface")
-      ->check(one_of({"ball", "shell"}))
-      ->capture_default_str();
+      ->check(one_of({"ball", "shell"}));
   command->add_option("--noise", a->noise, "Noise levels in pixels per coordinate")
       ->delimiter(',')
-      ->check(CLI::Range(0.0, 100.0))
-      ->capture_default_str();
+      ->check(CLI::Range(0.0, 100.0));
   command->add_option("--runs", a->runs, "Random problems per noise level")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  command->add_option("--seed", a->seed, "Seed of the random problems")->capture_default_str();
+      ->check(CLI::Range(1, 1000000));
+  command->add_option("--seed", a->seed, "Seed of the random problems");
   command
       ->add_option("--generator", a->generator,
                    "ring: rigs at 20 to 25 m; tight: as near as all points stay in view")
-      ->check(one_of({"ring", "tight"}))
-      ->capture_default_str();
+      ->check(one_of({"ring", "tight"}));
   command
       ->add_option("--start-position", s.start_position,
                    "Maximum initial error of the rig positions, m per axis")
-      ->check(CLI::Range(0.0, 1e3))
-      ->capture_default_str();
+      ->check(CLI::Range(0.0, 1e3));
   command
       ->add_option("--start-rotation", s.start_rotation,
                    "Maximum initial error of the stereo rotation, rad per axis")
-      ->check(CLI::Range(0.0, std::numbers::pi))
-      ->capture_default_str();
+      ->check(CLI::Range(0.0, std::numbers::pi));
   command
       ->add_option("--start-translation", s.start_translation,
                    "Maximum initial error of the stereo translation, m per axis")
-      ->check(CLI::Range(0.0, 1e3))
-      ->capture_default_str();
+      ->check(CLI::Range(0.0, 1e3));
   command
       ->add_option("--length", a->length, "exact: baseline length known exactly; measured: to 1 mm")
-      ->check(one_of({"exact", "measured"}))
-      ->capture_default_str();
-  command->add_option("--cameras", s.cameras, "Number of cameras, 2 to 4")
-      ->check(CLI::Range(2, 4))
-      ->capture_default_str();
+      ->check(one_of({"exact", "measured"}));
+  command->add_option("--cameras", s.cameras, "Number of cameras, 2 to 4")->check(CLI::Range(2, 4));
   command->add_option("--json", a->json, "Write JSON to this file, one object per noise level");
   command->footer(
       "Example: vergence simulate --runs 20 --noise 0.1\nExit codes: 0 success; 2 bad arguments.");

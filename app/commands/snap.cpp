@@ -34,20 +34,15 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<SnapArguments>();
   CLI::App* command =
       root.add_subcommand("snap", "Capture synchronised test images and check them");
-  command
-      ->add_option("CONFIG", a->configuration,
-                   "Configuration file; only its cameras and trigger are used")
-      ->required()
-      ->type_name("FILE");
-  command
-      ->add_option("--out", a->out,
-                   "Directory for images and snap.json; must not exist, or be empty")
-      ->required()
-      ->type_name("DIR");
-  command->add_option("--count", a->count, "Number of sets")->type_name("N");
-  command->add_option("--wait", a->wait_s, "Maximum wait for a set")->type_name("SECONDS");
-  command->add_option("--set", a->set, "Set a configuration key; repeatable")
-      ->type_name("KEY=VALUE")
+  add_option(*command, "CONFIG", a->configuration,
+             "Configuration file; only its cameras and trigger are used", "FILE")
+      ->required();
+  add_option(*command, "--out", a->out,
+             "Directory for images and snap.json; must not exist, or be empty", "DIR")
+      ->required();
+  add_option(*command, "--count", a->count, "Number of sets", "N");
+  add_option(*command, "--wait", a->wait_s, "Maximum wait for a set", "SECONDS");
+  add_option(*command, "--set", a->set, "Set a configuration key; repeatable", "KEY=VALUE")
       ->allow_extra_args(false);
   command->footer(
       "Example: vergence snap app/config/gige.yaml --out first\n"

@@ -5,25 +5,26 @@
 #include "app/config/calibration_file.hpp"
 #include "app/config/yaml_file.hpp"
 
-/// The group `covariance` of calibration.yaml: what of a rig's parameters trades against what.
-/// `parameters` names the rows by camera and number (`right.rx`, `left.k1`), `upper` has the upper
-/// triangle row by row. Cameras go by their names, or by their index where names do not say them
-/// apart. Rotation in rad, translation in m, as left perturbations; lenses in px and without unit.
+/// Group `covariance` of calibration.yaml: the joint covariance of a rig's parameters. `parameters`
+/// names the rows by camera and parameter (`right.rx`, `left.k1`), `upper` has the upper triangle
+/// row by row. Cameras are named, or numbered if their names are not unique. Rotations in rad and
+/// translations in m are left perturbations; intrinsics are in px or without unit.
 namespace vergence::app {
 
-/// Empty: nothing is known.
+/// Empty if no covariance is known.
 [[nodiscard]] std::string format_covariance(const CalibrationFile& calibration);
 
-/// Names, lens models and the number of cameras are read already. Errors  InputError.
+/// Reads the group. Names, camera models and the number of cameras must be read before. Throws
+/// InputError.
 void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationFile* calibration);
 
-/// Half a message about why this cannot be a covariance: a number that is not finite, a negative
-/// variance, or not positive semidefinite beyond what nine digits leave.
+/// Message fragment about an invalid covariance: a non-finite number, a negative variance, or not
+/// positive semidefinite beyond the rounding to nine digits.
 [[nodiscard]] std::optional<std::string> find_flaw(const RigCovariance& covariance);
 
-/// Lengths grow by a factor: rows and columns of translations do.
+/// Scales the rows and columns of translations by a factor.
 void scale_lengths(double factor, RigCovariance* covariance);
-/// Removes the extrinsics' covariance and keeps that of the intrinsics.
+/// Removes the covariance of the extrinsics and keeps that of the intrinsics.
 void clear_places(RigCovariance* covariance);
 
 }  // namespace vergence::app

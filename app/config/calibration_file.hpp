@@ -13,67 +13,70 @@
 
 namespace vergence::app {
 
-/// calibration.yaml of a session: the rig's parameters, names and serials.
+/// Content of a session's calibration.yaml: the rig's parameters, names and serial numbers.
 struct CalibrationFile {
   RigCalibration rig{};
   std::string rig_name{};
   std::array<std::string, kMaxCameras> names{"left", "right", "camera2", "camera3"};
-  std::array<std::string, kMaxCameras> serials{};  // empty: not known
-  std::string source{};  // what found it: `given`, `online`, `checkerboard`; empty: not said
-  /// The configuration's values about the rig when the calibration was found, by key
-  /// (calibration_state.hpp); kept in the state file.
+  /// Empty if unknown.
+  std::array<std::string, kMaxCameras> serials{};
+  /// Origin of the calibration: `given`, `online`, `checkerboard`; empty if unknown.
+  std::string source{};
+  /// Configured values of the rig when the calibration was found, by key (calibration_state.hpp).
+  /// Stored in the state file.
   std::optional<std::map<std::string, std::string>> configured{};
 };
 
-/// Selects the parts of a calibration to read.
+/// Parts of a calibration to read.
 struct CalibrationUse {
-  bool length_only = false;  // from scratch: intrinsics and the baseline's length; where the
-                             // cameras sit is not read, nor has to be there
-  double baseline = 0;       // m: instead of the file's; 0: the file's
+  /// Reads only the intrinsics and the baseline's length, for a calibration from scratch;
+  /// extrinsics are ignored and may be missing.
+  bool length_only = false;
+  /// Replaces the file's baseline, in m; 0 keeps the file's.
+  double baseline = 0;
 };
 
-/// Error in a calibration: the field as named in calibration.yaml
-/// (`cameras.1.T_camera_left`) and half a message that begins with it.
+/// Error in a calibration: the field as named in calibration.yaml (`cameras.1.T_camera_left`) and a
+/// message fragment that begins with it.
 struct ValidationError {
   std::string field;
   std::string message;
 };
 
-/// Looks whether a rig can be real: sizes, focal lengths, principal points, distortion, rotations,
-/// baseline, side of camera 1, covariances, finite numbers. The first thing found; nothing when all
-/// is well.
+/// Checks whether a rig is plausible: sizes, focal lengths, principal points, distortion,
+/// rotations, baseline, side of camera 1, covariances, finite numbers. Returns the first problem.
 ///
 /// For calibrations from other files (data sets): `if (auto bad = find_implausible(rig)) throw
-/// InputError(file + ": " + bad->message);` A rotation off by 1e-6 to 1e-3 (largest entry of RᵀR −
-/// I) is replaced by the nearest one; beyond, it is reported.
+/// InputError(file + ": " + bad->message);` A rotation with an error of 1e-6 to 1e-3 (largest
+/// element of RᵀR − I) is replaced by the nearest valid one; a larger error is reported.
 [[nodiscard]] std::optional<ValidationError> find_implausible(RigCalibration* rig);
 
-/// "the baseline is 0.1101 m", for people who know their rig.
+/// Text such as "the baseline is 0.1101 m", for a check by the user.
 [[nodiscard]] std::string baseline_message(const RigCalibration& rig);
-/// Asks for the unit of a length above 2 m or below 2 cm, which few rigs have; empty: it is usual.
+/// Question about the unit of an unusual length, above 2 m or below 2 cm; empty otherwise.
 [[nodiscard]] std::string baseline_warning(const RigCalibration& rig);
 
-/// Errors  InputError with file:line and the field's name: unreadable, unknown key, missing or
-///         malformed field, implausible.
+/// Throws InputError with file:line and the field's name for an unreadable file, an unknown key, a
+/// missing or malformed field, or an implausible value.
 [[nodiscard]] CalibrationFile read_calibration(const std::filesystem::path& path,
                                                const CalibrationUse& use = {});
-/// `name` stands for the file in error messages.
+/// `name` replaces the file in error messages.
 [[nodiscard]] CalibrationFile parse_calibration(std::string_view yaml, const std::string& name,
                                                 const CalibrationUse& use = {});
 
 /// Applies the use to a calibration of another file. With a baseline all lengths are scaled by one
-/// factor; with length_only the cameras become parallel, one baseline apart, and what belonged to
-/// their places (sigmas, when it was found) is gone; what is known of the lenses stays.
+/// factor. With length_only the cameras become parallel, one baseline apart, and the data of the
+/// extrinsics (sigmas, date) are removed; the intrinsics stay.
 void apply_use(const CalibrationUse& use, RigCalibration* rig);
 
-/// Cameras that look the same way, each a baseline to the right of the one before: X_k = X − (k L,
-/// 0, 0).
+/// Makes the cameras parallel, each one baseline to the right of the previous: X_k = X − (k L, 0,
+/// 0).
 void make_parallel(RigCalibration* rig);
 
-/// read(write(c)) has the same doubles. Whole or not at all, see replace_durably(). Errors
-/// InputError when it cannot be written.
+/// Writes atomically, see replace_durably(). Reading gives equal doubles. Throws InputError on
+/// failure.
 void write_calibration(const std::filesystem::path& path, const CalibrationFile& calibration);
-/// Without what the configuration said, which is the state file's.
+/// Omits `configured`, which only the state file contains.
 [[nodiscard]] std::string format_calibration(const CalibrationFile& calibration);
 
 }  // namespace vergence::app

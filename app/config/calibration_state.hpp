@@ -7,38 +7,40 @@
 #include "app/config/calibration_file.hpp"
 #include "app/config/configuration.hpp"
 
-/// The state file: the last calibration that a drive accepted or confirmed, where the
-/// next one begins.
+/// State file: the last calibration that a run accepted or verified, used as the start of the next
+/// run.
 namespace vergence::app {
 
-/// Where the state file of this rig lies: `calibration_state.yaml` in `rig.state_dir`, or in
-/// $XDG_STATE_HOME/vergence/NAME, or in ~/.local/state/vergence/NAME. Nothing: `rig.state_dir` is
-/// `none`, or the user has no home. Characters of the rig's name that a folder's should not have
-/// become `_`; a rig without a name is `rig`.
+/// Path of the rig's state file: `calibration_state.yaml` in `rig.state_dir`, or in
+/// $XDG_STATE_HOME/vergence/NAME, or in ~/.local/state/vergence/NAME. Empty if `rig.state_dir` is
+/// `none` or the user has no home. Unsuitable characters of the rig's name become `_`; without a
+/// name it is `rig`.
 [[nodiscard]] std::optional<std::filesystem::path> state_file(const RigSettings& rig);
 
-/// Keys of a configuration about lenses, read-out regions, transforms and the baseline that are not
-/// at their default, with their values. A calibration found under other ones is of another rig.
+/// Configured keys of intrinsics, image regions, transforms and the baseline that differ from the
+/// defaults, with their values. A calibration found with other values belongs to another rig.
 [[nodiscard]] std::map<std::string, std::string> configured_rig(const Configuration& configuration);
 
-/// Relative: from here on a calibration's baseline and the configuration's are two lengths.
+/// Relative difference at which a calibration's baseline and the configured one count as different
+/// lengths.
 inline constexpr double kOtherLength = 0.02;
 
 /// Result of reading a state file.
 struct CalibrationState {
-  std::optional<CalibrationFile> calibration{};  // fits the rig that is there
+  /// Set if it fits the present rig.
+  std::optional<CalibrationFile> calibration{};
   std::string
-      message{};  // why a file that is there is not used; empty: none is there, or it is used
+      /// Reason why an existing file is not used; empty if there is none, or it is used.
+      message{};
 };
 
-/// Reads the file if there is one. It is used for the rig it was found on: as many cameras of the
-/// same sizes, the same serials in the same order, and a configuration that says what it said then
-/// (configured_rig()) and whose baseline the one found differs from by less than kOtherLength.
-/// Errors  None: a message.
+/// Reads the file if there is one. It is used only for the rig it was found on: equal number and
+/// sizes of cameras, equal serial numbers in the same order, equal configured_rig(), and a baseline
+/// that differs by less than kOtherLength. Does not throw.
 [[nodiscard]] CalibrationState read_state(const std::filesystem::path& file,
                                           const CalibrationFile& expected);
 
-/// Makes the folder if need be and replaces the file durably. Errors  InputError.
+/// Makes the directory if needed and replaces the file durably. Throws InputError.
 void write_state(const std::filesystem::path& file, const CalibrationFile& calibration);
 
 }  // namespace vergence::app

@@ -21,7 +21,7 @@
 
 namespace vergence::app {
 
-/// `rig:` of the configuration.
+/// The group `rig` of the configuration.
 struct RigSettings {
   /// Name of the rig in the calibration.yaml that a session writes.
   std::string name{};
@@ -33,10 +33,10 @@ struct RigSettings {
   std::string state_dir{};
 };
 
-/// Which part of a camera's picture an entry of `cameras:` is.
+/// Part of a camera's image used by an entry of `cameras`.
 enum class ImageHalf : std::uint8_t { whole, left, right };
 
-/// One entry of `cameras:`. Without a driver there is no such camera.
+/// Entry of `cameras`. Without a driver the camera does not exist.
 struct CameraSettings {
   std::string name{}, driver{}, serial{};
   ImageHalf half = ImageHalf::whole;
@@ -65,7 +65,7 @@ struct CameraSettings {
   std::array<double, 12> T_camera_left{};
 };
 
-/// `exposure:` of all cameras.
+/// Exposure of all cameras.
 struct ExposureSettings {
   /// 0: fixed, as configured in cameras[]; 1: automatic.
   int mode = 0;
@@ -80,7 +80,8 @@ struct InsSettings {
   std::string port{};
   /// Baud rate; 0: the device's own.
   int baud = 0;
-  double rate = 120;  // Hz
+  /// In Hz.
+  double rate = 120;
   /// Rate of SyncOut; 0: the device's own; negative: off.
   double sync_out_hz = 0;
   double sync_out_width_ms = 1;
@@ -98,7 +99,8 @@ struct TriggerSettings {
   std::string port{};
   /// Baud rate; 0: detected.
   int baud = 0;
-  double rate = 20;  // Hz
+  /// In Hz.
+  double rate = 20;
   double width_us = 200, dither_us = 0;
   /// Masks with bit k for line k; 0: one line per camera.
   int lines = 0;
@@ -125,19 +127,19 @@ struct ComparisonSettings {
   double scale_tolerance = 0.02;
 };
 
-/// `kitti_raw:` which of its four cameras are taken.
+/// Selection of the four cameras of a KITTI raw sequence.
 struct KittiRawSettings {
   int left = 0, right = 1;
 };
 
-/// Sigmas of the errors in the intrinsics that the estimator receives.
+/// Simulated standard deviations of the errors in the estimator's intrinsics.
 struct IntrinsicsErrorSettings {
   double principal_point_px = 0, focal_percent = 0;
   std::int64_t seed = 1;
 };
 
-/// Errors of the stereo transform that the estimator receives: camera 1 as if it had been knocked,
-/// then all lengths.
+/// Simulated errors in the estimator's stereo transform: camera 1 is moved as by a knock, then all
+/// lengths are scaled.
 struct CalibrationErrorSettings {
   double pitch_deg = 0, yaw_deg = 0, roll_deg = 0;
   double x_m = 0, y_m = 0, z_m = 0;
@@ -161,9 +163,9 @@ struct MockSettings {
   CalibrationErrorSettings calibration_error{};
 };
 
-/// `record:` what goes into drive.mcap of a session (docs/session_files.md).
+/// Topics in drive.mcap of a session (docs/session_files.md).
 struct RecordSettings {
-  /// 1: the topic is recorded.
+  /// 1 records the topic.
   int poses = 0, ins = 0, images = 0, pulses = 0;
   /// Size of a file after which a new one starts; 0: a single file.
   int split_mb = 0;
@@ -171,7 +173,7 @@ struct RecordSettings {
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };
 
-/// `publish:` what others see of a running session (docs/live_interface.md). Empty: nothing.
+/// Interfaces of a running session (docs/live_interface.md). Empty values disable them.
 struct PublishSettings {
   /// unix:///PATH or udp://HOST:PORT.
   std::string pose_stream{};
@@ -181,19 +183,10 @@ struct PublishSettings {
   std::string token_file{};
 };
 
-/// `sessions:` the folders that drives leave side by side.
-struct SessionsSettings {
-  /// Quota of the parent directory; 0: none.
-  int quota_mb = 0;
-};
-
 /// `realtime:` scheduling of the drive's threads (docs/deployment.md).
 struct RealtimeSettings {
   /// SCHED_FIFO priority of the most urgent threads; 0: none.
   int priority = 0;
-  /// Processors of all threads but the solver's, such as `0-1,3`; empty: any.
-  std::string affinity{};
-  std::string solver_affinity{};
   /// 1: call mlockall().
   int lock_memory = 0;
   /// Time budget per frame of a live drive; 0: its frame interval.
@@ -202,8 +195,8 @@ struct RealtimeSettings {
 
 inline constexpr std::size_t kMaxFaults = 16;
 
-/// Everything a user may change, with its defaults. Each member is bound to a row of the schema
-/// (app/config/schema.hpp), which is where its unit, range and meaning stand.
+/// All user settings with their defaults. Each member is bound to a row of the schema
+/// (app/config/schema.hpp), which has its unit, range and meaning.
 struct Configuration {
   RigSettings rig{};
   std::array<CameraSettings, kMaxCameras> cameras{};
@@ -216,7 +209,6 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
-  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   /// `KIND@SECONDS NAME=NUMBER …`; empty: none.
   std::array<std::string, kMaxFaults> faults{};
@@ -234,13 +226,12 @@ struct Configuration {
   std::filesystem::path folder{};
 };
 
-/// Defaults, then the YAML file if one is given, then the `--set` arguments `KEY=VALUE` in order;
-/// the last one wins.
+/// Loads the defaults, then the YAML file if given, then the `--set` arguments `KEY=VALUE` in
+/// order; the last one takes precedence.
 ///
-/// KEY is dotted, with numbers for list items; VALUE is YAML (`0.4`, `text`, `[1, 2]`).
-/// Errors  InputError with file:line (or the --set argument): unreadable file, unknown key (with
-///         the nearest known one), a key that is given twice, wrong type, outside the range, values
-///         that contradict each other.
+/// KEY is dotted, with numbers for list items; VALUE is YAML (`0.4`, `text`, `[1, 2]`). Throws
+/// InputError with file:line (or the --set argument): unreadable file, unknown key (with the
+/// nearest known one), duplicate key, wrong type, out of range, contradicting values.
 [[nodiscard]] Configuration load_configuration(const std::optional<std::filesystem::path>& file,
                                                const std::vector<std::string>& set);
 
@@ -248,23 +239,24 @@ struct Configuration {
 [[nodiscard]] Configuration parse_configuration(std::string_view yaml, const std::string& name,
                                                 const std::vector<std::string>& set);
 
-/// Keys that are not at their default, with their values, in the order of docs/configuration.md.
+/// Keys that differ from their defaults, with their values, in the order of docs/configuration.md.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> changed_settings(
     const Configuration& configuration);
 
-/// Every key and its value, one `key=value` a line, ordered by key, numbers in the shortest form
-/// that reads back the same.
+/// Every key and its value, one `key=value` per line, ordered by key, with numbers in their
+/// shortest exact form.
 [[nodiscard]] std::string canonical_text(const Configuration& configuration);
 
-/// 16 hexadecimal digits (FNV-1a, 64 bit) of canonical_text(): equal for equal configurations,
-/// however they were written.
+/// 16 hexadecimal digits (FNV-1a, 64 bit) of canonical_text(), equal for equal configurations.
 [[nodiscard]] std::string configuration_hash(const Configuration& configuration);
 
-/// One option. Empty: done, or the driver has no options; else half a message about what is wrong.
+/// Sets one option. Returns an empty string on success or if the driver has no options, else a
+/// message fragment about the problem.
 [[nodiscard]] std::string set_camera_option(const std::string& name, const std::string& value,
                                             CameraSettings* camera);
 
-/// All of them, `NAME=VALUE …`: those not named are as they begin. As set_camera_option().
+/// Sets all options from `NAME=VALUE …`; the others get their defaults. Returns as
+/// set_camera_option() does.
 [[nodiscard]] std::string set_camera_options(const std::string& text, CameraSettings* camera);
 
 }  // namespace vergence::app

@@ -9,35 +9,33 @@
 
 namespace vergence::app {
 
-/// One YAML document from outside, and the messages about it.
-///
-/// Errors  InputError with file:line: not readable, larger than kLargestYaml, not YAML, more than
-///         one document.
+/// YAML document from outside, and the error messages about it. Throws InputError with file:line if
+/// it is unreadable, larger than kLargestYaml, not YAML, or more than one document.
 class YamlFile {
  public:
   [[nodiscard]] static YamlFile read(const std::filesystem::path& path);
-  /// `name` stands for the file in error messages.
+  /// `name` replaces the file in error messages.
   [[nodiscard]] static YamlFile parse(std::string_view text, std::string name);
 
-  /// Null for an empty file.
+  /// Null if the file is empty.
   [[nodiscard]] const YAML::Node& root() const noexcept { return root_; }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  /// `file:line` of a node, lines from 1; the file alone where the node has no place.
+  /// Position `file:line` of a node, lines from 1; the file only if the node has no position.
   [[nodiscard]] std::string at(const YAML::Node& node) const;
   /// Throws InputError: `file:line: message`.
   [[noreturn]] void fail(const YAML::Node& node, const std::string& message) const;
 
-  /// Refuses what is no map, a key that is given twice and a key that is not known, naming the
-  /// nearest known one. `what` says whose keys they are: `camera 1`.
+  /// Refuses anything but a map, duplicate keys and unknown keys, naming the nearest known one.
+  /// `what` names the owner of the keys, such as `camera 1`.
   void check_keys(const YAML::Node& map, const std::string& what,
                   const std::vector<std::string>& known) const;
 
-  // The value of a node; `field` names it in the message when it is no such thing.
-  [[nodiscard]] double number(const YAML::Node& node, const std::string& field) const;  // finite
+  // Each returns the value of a node; `field` names it in the error message. Numbers are finite.
+  [[nodiscard]] double number(const YAML::Node& node, const std::string& field) const;
   [[nodiscard]] std::int64_t integer(const YAML::Node& node, const std::string& field,
                                      std::int64_t least, std::int64_t most) const;
   [[nodiscard]] std::string text(const YAML::Node& node, const std::string& field) const;
-  /// A list of finite numbers whose count is in [least, most].
+  /// List of finite numbers whose count is in [least, most].
   [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& field,
                                             std::size_t least, std::size_t most) const;
 
@@ -46,10 +44,10 @@ class YamlFile {
   std::string name_;
 };
 
-inline constexpr std::uintmax_t kLargestYaml =
-    1U << 20;  // bytes: hundreds of times a long configuration
+/// In bytes: hundreds of times a long configuration.
+inline constexpr std::uintmax_t kLargestYaml = 1U << 20;
 
-/// A text in double quotes, whatever is in it.
+/// Encodes any text in double quotes.
 [[nodiscard]] std::string double_quoted(std::string_view text);
 
 }  // namespace vergence::app

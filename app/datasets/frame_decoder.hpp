@@ -15,7 +15,7 @@
 
 namespace vergence::app {
 
-/// One frame of a sequence, decoded or not. A value that goes through a ring.
+/// Frame of a sequence, decoded or not; passed through a ring.
 struct DecodedPair {
   /// Index into the sequence.
   std::uint64_t frame = 0;
@@ -32,40 +32,41 @@ struct DecodedPair {
   std::array<char, 256> issue{};
 };
 
-/// Reads and decodes the images of a sequence ahead of the consumer, the two of a pair
-/// side by side on two threads of its own.
+/// Reads and decodes the images of a sequence ahead of the consumer, the two of a pair in parallel
+/// on two own threads.
 ///
-/// A frame is skipped when an image is missing, unreadable or torn, when its size has changed since
-/// it was checked, or when its stamp does not go forward with those around it
-/// (StereoPair::in_order). Skipped frames come through the ring in their turn, so events stay in
-/// order.
+/// A frame is skipped if an image is missing, unreadable, truncated or of changed size, or if its
+/// stamp does not increase (StereoPair::in_order). Skipped frames pass through the ring too, so
+/// events stay in order.
 ///
-/// Ownership  A decoded pair's slots are the consumer's until release(). Sequence and pool outlive
-///            the decoder.
-/// Threads    next(), release(), one consumer. stop() from any thread; the destructor stops and
-///            joins.
-/// Full       Nothing is dropped: with kAhead pairs waiting, or no slot free, the decoder's thread
+/// Ownership  A decoded pair's slots belong to the consumer until release(). Sequence and pool must
+///            outlive the decoder.
+/// Threads    One consumer calls next() and release(). stop() is thread-safe; the destructor stops
+///            and joins.
+/// Full       Nothing is dropped: with kAhead waiting pairs, or without a free slot, the decoder
 ///            waits.
-/// Errors     The constructor throws std::system_error when no thread can be had; next() and
-///            release() throw nothing.
+/// Errors     The constructor throws std::system_error if there is no thread.
 class FrameDecoder {
  public:
-  static constexpr std::size_t kAhead = 8;  // pairs: evens out a slow disk; more is only memory
-  static constexpr std::size_t kSlots = 2 * (kAhead + 2);  // waiting, being decoded, being consumed
+  /// Pairs that compensate a slow disk; more would only use memory.
+  static constexpr std::size_t kAhead = 8;
+  /// Waiting, being decoded and being consumed.
+  static constexpr std::size_t kSlots = 2 * (kAhead + 2);
 
-  /// Pairs [first, first + count) of the sequence, cut at its end. Precondition: the pool's images
-  /// have the calibration's size; both cameras' are the same.
+  /// Decodes pairs [first, first + count) of the sequence, limited to its end. Precondition: the
+  /// pool's images have the calibration's size, which is equal for both cameras.
   FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count,
                FramePool& pool);
   ~FrameDecoder();
   FrameDecoder(const FrameDecoder&) = delete;
   FrameDecoder& operator=(const FrameDecoder&) = delete;
 
-  /// The next frame, waiting for it. False: the end of the sequence, or stopped; *pair untouched.
+  /// Waits for the next frame. Returns false, with *pair unchanged, at the end of the sequence or
+  /// if stopped.
   [[nodiscard]] bool next(DecodedPair* pair) noexcept;
-  /// Gives the slots of a decoded pair back.
+  /// Releases the slots of a decoded pair.
   void release(const DecodedPair& pair) noexcept;
-  /// Wakes both sides. Twice is harmless.
+  /// Wakes both sides. May be called twice.
   void stop() noexcept;
 
  private:
@@ -73,34 +74,39 @@ class FrameDecoder {
   [[nodiscard]] DecodedPair decode(std::size_t index);
   /// Buffers for decoding one image into a slot.
   struct Workspace {
-    std::vector<std::uint8_t> bytes;  // of the file
-    std::vector<std::uint8_t>
-        mosaic;  // of a raw sequence, rows as the pool's; of one side by side, both images
+    // Content of the file.
+    std::vector<std::uint8_t> bytes;
+    // Mosaic of a raw sequence in the pool's rows, or both images of a side-by-side file.
+    std::vector<std::uint8_t> mosaic;
   };
-  /// A file's, or the store's, image of that size into rows `stride` bytes apart.
+  /// Reads an image of that size from a file or the store into rows `stride` bytes apart.
   [[nodiscard]] ImageFileStatus read(const std::string& name, ImageSize size, std::uint8_t* out,
                                      std::size_t stride, Workspace* work) const;
-  /// One image into the slot. Two at once are fine, each with a workspace of its own.
+  /// Loads an image into the slot. Two calls may run in parallel with separate workspaces.
   [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot, Workspace* work);
-  /// A file with both images side by side, into the two slots in hand.
+  /// Loads a file with both images side by side into the two slots in hand.
   [[nodiscard]] ImageFileStatus load_both(const std::string& name, Workspace* work);
-  /// Waits for a slot. False: stopped.
+  /// Waits for a slot. Returns false if stopped.
   [[nodiscard]] bool wait_for_slot(FrameSlot* slot) noexcept;
-  /// Hands the pair over, waiting for room. False: stopped.
+  /// Waits for room and passes the pair on. Returns false if stopped.
   [[nodiscard]] bool hand_over(const DecodedPair& pair) noexcept;
 
   const StereoSequence& sequence_;
   std::size_t next_index_, end_;
   FramePool& pool_;
   std::array<Workspace, 2> workspaces_;
-  std::array<FrameSlot, 2> own_{};  // slots in hand: those of a skipped pair serve the next one
+  // Slots in hand; those of a skipped pair serve the next one.
+  std::array<FrameSlot, 2> own_{};
   std::size_t own_count_ = 0;
   Stamp newest_{};
-  bool any_ = false;  // newest_ means something
+  // True if newest_ is valid.
+  bool any_ = false;
 
   Ring<DecodedPair, kAhead> ring_;
-  WakeEvent filled_;  // signalled by the decoder: a pair, or the end
-  WakeEvent freed_;   // signalled by the consumer: room in the ring, slots in the pool
+  // Signalled by the decoder for a pair or the end.
+  WakeEvent filled_;
+  // Signalled by the consumer for room in the ring or free slots.
+  WakeEvent freed_;
   std::atomic<bool> stop_{false};
   std::atomic<bool> finished_{false};
   ThreadRunner both_{BackgroundThread::Role::reader};

@@ -5,8 +5,8 @@
 
 namespace vergence::app {
 
-/// An 8-bit grey PNG, quickly rather than small: images come several times a second. Neither image
-/// nor file is changed by another program meanwhile. InputError: it cannot be written.
+/// Writes an 8-bit grey PNG, optimised for speed, because several images per second are written.
+/// Throws InputError on failure.
 void write_png(const std::filesystem::path& file, const ImageView& image);
 
 }  // namespace vergence::app

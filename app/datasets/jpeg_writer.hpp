@@ -5,8 +5,8 @@
 
 namespace vergence::app {
 
-/// A grey JPEG in memory, quickly: what a live view shows. `quality`: 1 to 100. Empty: the library
-/// refuses it (no pixels, no memory).
+/// Encodes a grey JPEG in memory for the live view, optimised for speed. `quality` is 1 to 100.
+/// Empty if the library fails (no pixels, no memory).
 [[nodiscard]] std::string grey_jpeg(const ImageView& image, int quality);
 
 }  // namespace vergence::app

@@ -10,29 +10,31 @@
 #include "core/types/ins_sample.hpp"
 #include "drivers/ins.hpp"
 
-/// The INS that was recorded with a drive, whatever the data set's own form: what a replay compares
-/// its poses with.
+/// INS data recorded with a sequence, in a common form for all data sets; a replay compares its
+/// poses with it.
 namespace vergence::app {
 
 struct RecordedIns {
-  std::vector<InsRecord> readings{};      // stamps strictly ascending, on the clock of the images
-  std::optional<Transform> T_ins_left{};  // p_ins = T_ins_left · p_left as published with the data
-                                          // set; nothing: it is not
-  std::string mount_source{};             // the files that say so
-  std::vector<std::string> remarks{};     // what was left out or taken on trust: a message each
+  /// Samples with strictly increasing stamps, on the clock of the images.
+  std::vector<InsRecord> readings{};
+  /// Extrinsics p_ins = T_ins_left · p_left published with the data set; empty if there are none.
+  std::optional<Transform> T_ins_left{};
+  /// Files that contain them.
+  std::string mount_source{};
+  /// Messages about skipped or assumed data.
+  std::vector<std::string> remarks{};
 };
 
-/// The INS of the drive that open_sequence() opens with the same arguments, where it has files of
-/// its own; that of a bag is StereoSequence::ins. No readings: the data set has none, or none lie
-/// with the drive.
-/// `mount_wanted`: the published mount is read, where the data set publishes one; else the user
-/// gives it.
-/// Memory  Some 250 bytes a reading, at most kMaxReadings.  InputError  As the data set's reader
-/// says: files that are not there or no such files, no reading that is whole.
+/// Reads the INS of the sequence that open_sequence() opens with the same arguments, if it has
+/// separate files; that of a bag is StereoSequence::ins. Without data, or data outside the
+/// sequence, there are no samples. `mount_wanted` reads the published extrinsics, if any. Uses some
+/// 250 bytes per sample, at most kMaxReadings. Throws InputError for missing or invalid files, or
+/// without a complete sample.
 [[nodiscard]] RecordedIns read_recorded_ins(SequenceFormat format,
                                             const std::filesystem::path& folder,
                                             const std::array<int, 2>& cameras, bool mount_wanted);
 
-inline constexpr std::size_t kMaxReadings = 2'000'000;  // five hours at 100 Hz
+/// Five hours at 100 Hz.
+inline constexpr std::size_t kMaxReadings = 2'000'000;
 
 }  // namespace vergence::app

@@ -11,24 +11,28 @@
 #include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
 
-/// Recorded session, as written by `record:`: everything the estimator was given, in its order.
+/// Session recorded by `record`: all input of the estimator in its order.
 namespace vergence::app {
 
-/// Where the pixels of an image are, 8-bit grey without padding.
+/// Position of an image's pixels, 8-bit grey without padding.
 struct RecordedImage {
-  std::uint32_t file = 0;    // of the recording's files
-  std::uint64_t offset = 0;  // in the file; 0: there is no such image
+  /// Index of the recording's file.
+  std::uint32_t file = 0;
+  /// Offset in the file; 0 if there is no such image.
+  std::uint64_t offset = 0;
   int width = 0, height = 0;
 };
 
 struct RecordedFrame {
-  FrameRecord given{};  // image_crc: of the images below
+  /// Its image_crc is that of the images below.
+  FrameRecord given{};
   std::array<RecordedImage, kMaxCameras> images{};
-  std::size_t readings = 0;  // of the INS, that came before this frame
+  /// Number of INS samples before this frame.
+  std::size_t readings = 0;
 };
 
-/// A recording, opened. Memory  Some 400 bytes a frame and 250 a reading; pixels stay in the files.
-/// Threads  read(): any number at once.
+/// Open recording. Uses some 400 bytes per frame and 250 per sample; pixels stay in the files.
+/// read() is thread-safe.
 ///
 ///     const RecordedSession session = RecordedSession::open("sessions/monday");
 ///     for (const RecordedFrame& frame : session.frames()) {
@@ -37,8 +41,8 @@ struct RecordedFrame {
 ///     }
 class RecordedSession {
  public:
-  /// The recording in a session's folder, or in a folder of its files alone. InputError: no
-  /// recording, one of another program or version, without frames.
+  /// Opens the recording in a session's directory, or a directory with only its files. Throws
+  /// InputError without a recording or frames, or for another program or version.
   [[nodiscard]] static RecordedSession open(const std::filesystem::path& folder);
   RecordedSession(RecordedSession&&) noexcept;
   ~RecordedSession();
@@ -47,13 +51,13 @@ class RecordedSession {
   [[nodiscard]] const std::vector<RecordedFrame>& frames() const noexcept { return frames_; }
   [[nodiscard]] const std::vector<InsRecord>& readings() const noexcept { return readings_; }
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
-  /// All images that the estimator had are here, and no frame is missing between two.
+  /// True if all images of the estimator are here, and no frame is missing in between.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
-  /// Pixels of a frame's image of camera `camera`, rows `stride` bytes apart. False: they cannot be
-  /// read, or are not those that were recorded.
+  /// Reads the pixels of a frame's image in rows `stride` bytes apart. Returns false if they cannot
+  /// be read or differ from the recorded ones.
   [[nodiscard]] bool read(const RecordedFrame& frame, std::size_t camera, std::uint8_t* out,
                           std::size_t stride) const noexcept;
-  /// Gives back what frames() and readings() take, and they are empty; all else stays.
+  /// Frees the memory of frames() and readings(), which are then empty.
   void clear_frames() noexcept {
     frames_ = std::vector<RecordedFrame>();
     readings_ = std::vector<InsRecord>();
@@ -72,7 +76,7 @@ class RecordedSession {
   std::unique_ptr<Files> files_;
 };
 
-/// There is a recording of a session in that folder, by the names of its files and of its poses.
+/// True if the directory has a recording, by the names of its files and of its poses.
 [[nodiscard]] bool holds_recorded_session(const std::filesystem::path& folder);
 
 }  // namespace vergence::app

@@ -8,19 +8,17 @@
 
 namespace vergence::app {
 
-/// A reference trajectory asked for the pose at a time. Stamps ascend (precondition, the readers
-/// see to it).
-///
-/// Ownership  The poses outlive it.  Threads  Const.  Memory  None: callable on a sealed thread.
-/// O(log n).
+/// Interpolates a reference trajectory. Precondition: stamps increase, which the readers ensure.
+/// The poses must outlive it. Does not allocate; O(log n).
 class ReferenceTrack {
  public:
-  /// `max_gap`: the widest hole that is bridged; the same as vergence evaluate's.
+  /// `max_gap` is the longest gap that is bridged, as in `vergence evaluate`.
   explicit ReferenceTrack(std::span<const StampedPose> poses,
                           Duration max_gap = Duration::milliseconds(200)) noexcept
       : poses_(poses), max_gap_(max_gap) {}
 
-  /// Position linear, rotation along the shorter arc. Nothing outside the trajectory and in holes.
+  /// Interpolates the position linearly and the rotation along the shorter arc. Empty outside the
+  /// trajectory and in gaps.
   [[nodiscard]] std::optional<Transform> at(Stamp stamp) const noexcept {
     const auto after = std::lower_bound(poses_.begin(), poses_.end(), stamp,
                                         [](const StampedPose& p, Stamp s) { return p.stamp < s; });

@@ -6,10 +6,11 @@
 
 namespace vergence::app {
 
-/// A word of --format, or with `auto` what `folder` holds. InputError: none that is known.
+/// Format by a value of --format or, with `auto`, by the content of `folder`. Throws InputError if
+/// unknown.
 [[nodiscard]] SequenceFormat sequence_format(const std::string& word,
                                              const std::filesystem::path& folder);
-/// InputError: topics are named, and the format is none of a bag.
+/// Throws InputError if topics are named but the format is not a bag.
 void check_topics(SequenceFormat format, const BagTopics& topics);
 
 }  // namespace vergence::app

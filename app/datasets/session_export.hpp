@@ -11,33 +11,38 @@
 
 namespace vergence::app {
 
-/// Layouts that a recorded session is written in for other programs.
+/// Layouts for exporting a recorded session to other programs.
 enum class ExportFormat : std::uint8_t { folder, euroc, kitti };
 
 struct ExportRequest {
   ExportFormat format = ExportFormat::folder;
-  std::filesystem::path out;    // is empty, or is made
-  CalibrationFile calibration;  // that goes with the images
-  Trajectory truth;             // of the left camera; empty: none
+  /// Must be empty or not exist.
+  std::filesystem::path out;
+  /// Calibration of the images.
+  CalibrationFile calibration;
+  /// Trajectory of the left camera; empty without ground truth.
+  Trajectory truth;
 };
 
 struct ExportResult {
   std::size_t frames = 0;
-  std::size_t left_out = 0;            // without a left or right image that reads back
-  std::vector<std::string> remarks{};  // messages
+  /// Number of frames without a readable left or right image.
+  std::size_t left_out = 0;
+  /// Messages.
+  std::vector<std::string> remarks{};
 };
 
-/// Left and right images as PNG, stamps, calibration and truth:
+/// Writes left and right images as PNG, stamps, calibration and ground truth:
 ///   folder  left/, right/NNNNNN.png, times.txt (ns), calibration.yaml, truth.tum
-///   euroc   mav0/cam0, cam1 with data.csv and sensor.yaml, truth in
+///   euroc   mav0/cam0, cam1 with data.csv and sensor.yaml, ground truth in
 ///           mav0/state_groundtruth_estimate0 (positions and attitudes of cam0)
-///   kitti   image_0, image_1, times.txt, calib.txt; poses.txt where there is truth for every
-///   frame.
-///           KITTI has rectified images: lenses with distortion and turned cameras are refused.
-/// A frame up to 1 ms beyond the truth's end has its motion carried on.
-/// The first two cameras of a rig with more. `progress` is called with the frames done.
-/// InputError: a disk that takes no more; before anything is written, a calibration of images of
-/// another size, a rig that the format cannot hold, no pair at all.
+///   kitti   image_0, image_1, times.txt, calib.txt; poses.txt if every frame has ground truth.
+///           KITTI has rectified images: distortion and rotated cameras are refused.
+///
+/// Frames up to 1 ms beyond the end of the ground truth are extrapolated. Only the first two
+/// cameras are exported. `progress` is called with the number of frames done. Throws InputError if
+/// the disk refuses data and, before writing, for a calibration of another image size, a rig that
+/// the format cannot hold, or without a pair.
 ExportResult export_session(const RecordedSession& session, ExportRequest request,
                             const std::function<void(std::size_t)>& progress);
 

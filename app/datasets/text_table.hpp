@@ -9,26 +9,24 @@
 /// Tables of numbers as programs write them.
 namespace vergence::app {
 
-/// The rows of a text, one after the other. Between fields stand commas, semicolons or blanks and
-/// tabs, whichever the first row has; fields may be in double quotes; a separator at a row's end
-/// ends no further field. What stands before the first row may be headings. Views into `text`,
-/// which must outlive it.
+/// Iterates over the rows of a text. The first row determines the separator: commas, semicolons, or
+/// blanks and tabs. Fields may be in double quotes; a separator at a row's end adds no field. A
+/// line before the first row may have headings. Returns views of `text`, which must outlive it.
 class TextTable {
  public:
   explicit TextTable(std::string_view text);
 
-  /// False at the end. Empty lines and comments (`#`, `%`, `//`) are passed over.
+  /// Returns false at the end. Empty lines and comments (`#`, `%`, `//`) are skipped.
   [[nodiscard]] bool next();
   [[nodiscard]] const std::vector<std::string_view>& fields() const noexcept { return fields_; }
   /// Number of the last row, from 1.
   [[nodiscard]] std::size_t line() const noexcept { return number_; }
-  /// The row last given is the text's last and has no end of line: its writer may have stopped in
-  /// it.
+  /// True if the last row ends the text without an end of line, so that it may be incomplete.
   [[nodiscard]] bool unfinished() const noexcept { return unfinished_; }
 
-  /// ',', ';' or ' '.
+  /// One of ',', ';' and ' '.
   [[nodiscard]] char separator() const noexcept { return separator_; }
-  /// The headings of the line before the first row, also where that is a comment.
+  /// Headings in the line before the first row, even if it is a comment.
   [[nodiscard]] const std::vector<std::string_view>& names() const noexcept { return names_; }
 
  private:
@@ -42,7 +40,7 @@ class TextTable {
   std::vector<std::string_view> names_, fields_;
 };
 
-/// Tables of some languages have semicolons between numbers like 0,25: the commas become points.
+/// Replaces decimal commas by points in tables with semicolons between numbers.
 void put_decimal_points(std::string* text);
 
 }  // namespace vergence::app

@@ -10,26 +10,32 @@
 
 #include "app/datasets/stamp_text.hpp"
 
-/// Lists of times, with or without the images that they are of.
+/// Lists of times, with or without their images.
 namespace vergence::app {
 
 struct TimesLine {
   Stamp stamp{};
-  std::array<std::string, 2> name{};  // of the image, or of the left and the right one; empty: the
-                                      // file names none. Without the folder before it
+  /// Name of the image, or of the left and right one, without its directory; empty if the file has
+  /// none.
+  std::array<std::string, 2> name{};
 };
 
 struct TimesFile {
-  std::vector<TimesLine> lines{};      // at least one, in the file's order
-  std::vector<std::string> remarks{};  // what was assumed: a phrase each
+  /// At least one, in the file's order.
+  std::vector<TimesLine> lines{};
+  /// A phrase for each assumption.
+  std::vector<std::string> remarks{};
 };
 
-/// Where in the rows of a table the time stands.
+/// Columns of the time in a table.
 struct TimeColumns {
   std::size_t time = 0;
-  std::optional<std::size_t> nanoseconds{};  // beside whole seconds
-  std::optional<std::size_t> time_of_day{};  // beside a date
-  bool counted = false;                      // a column before it counts the rows
+  /// Nanoseconds next to whole seconds.
+  std::optional<std::size_t> nanoseconds{};
+  /// Time of day next to a date.
+  std::optional<std::size_t> time_of_day{};
+  /// True if a preceding column counts the rows.
+  bool counted = false;
   [[nodiscard]] std::size_t last() const {
     return std::max({time, nanoseconds.value_or(0), time_of_day.value_or(0)});
   }
@@ -39,16 +45,16 @@ struct TimeColumns {
 /// Precondition: there is a row with a field.
 [[nodiscard]] TimeColumns find_time_columns(std::span<const std::vector<std::string_view>> rows);
 
-/// The time of a row; nothing: it has none of this form.
+/// Time of a row; empty if it has none of this format.
 [[nodiscard]] std::optional<Stamp> read_time(std::span<const std::string_view> fields,
                                              const TimeColumns& columns, const TimeForm& form);
 
-/// A line is `[index] time [name [right name]]`, between them blanks, tabs, commas or semicolons,
-/// or its names stand first; headings may stand before. A time is a number in the unit that its
-/// magnitude tells, two whole numbers (seconds and nanoseconds), or a date with a time of day.
-/// `relative`: the unit of times that do not count from 1970; nothing: whole numbers are
-/// nanoseconds, others seconds. InputError with file:line: no times, a field that is none, a name
-/// that leads out of its folder, some lines with names and some without.
+/// Reads lines `[index] time [name [right name]]`, separated by blanks, tabs, commas or semicolons,
+/// or with names first; headings may precede. A time is a number whose magnitude tells the unit,
+/// two whole numbers (seconds and nanoseconds), or a date with a time of day. `relative` is the
+/// unit of times that do not count from 1970; if empty, whole numbers are nanoseconds, others
+/// seconds. Throws InputError with file:line without times, or for an invalid time, a name outside
+/// its directory, or names in some lines only.
 [[nodiscard]] TimesFile read_times_file(const std::filesystem::path& file,
                                         std::optional<TimeUnit> relative = std::nullopt);
 

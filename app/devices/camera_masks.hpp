@@ -9,19 +9,18 @@
 
 namespace vergence::app {
 
-/// The masks of a rig's cameras, `cameras.N.mask`: what of the vehicle or of dirt stands in the
-/// picture.
+/// Masks of a rig's cameras (`cameras.N.mask`), which hide parts of the vehicle or dirt in the
+/// image.
 ///
-/// A relative path begins at the configuration file's folder; is there nothing, or is there no such
-/// file, at the working directory.
-/// Ownership  Owns the pixels of views(). Threads: one caller.
-/// Errors     InputError names key and file: one that is missing, damaged, of another size than the
-///            camera's images, or hides all of them.
+/// A relative path refers to the configuration file's directory or, if missing there or without
+/// such a file, to the working directory. Owns the pixels of views(). One caller. Throws InputError
+/// with key and file for a mask that is missing, damaged, of another size than the images, or hides
+/// everything.
 class CameraMasks {
  public:
   CameraMasks(const Configuration& configuration, const RigCalibration& rig);
 
-  /// By camera: 0 where nothing is to be looked for. Empty: the camera has none.
+  /// Masks by camera: pixels of value 0 are not used. Empty if the camera has no mask.
   [[nodiscard]] std::array<ImageView, kMaxCameras> views() const noexcept;
 
  private:

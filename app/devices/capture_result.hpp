@@ -27,34 +27,34 @@ struct ImageStatistics {
 /// Precondition: not empty. Images of one row or column have no sharpness.
 [[nodiscard]] ImageStatistics image_statistics(const ImageView& image) noexcept;
 
-/// A visible defect of an image.
+/// Visible defect of an image.
 struct ImageIssue {
   /// True if the images are unusable, false if they could be better.
   bool unusable = false;
   std::string message;
 };
 
-/// Exposure of each image, and sharpness of each relative to the sharpest.
+/// Evaluates the exposure of each image, and its sharpness relative to the sharpest.
 [[nodiscard]] std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
                                                       std::span<const ImageStatistics> statistics);
 
-/// Returns true if two images are the same pixel for pixel, as one camera's would be if it were
-/// opened twice. Flat ones (a lens cap) are not called that.
+/// True if all pixels of two images are equal, as from one camera that was opened twice. Flat
+/// images (a lens cap) do not count.
 [[nodiscard]] bool are_identical(const ImageView& a, const ImageView& b) noexcept;
 
-/// The configuration of a capture, for which of the devices only the cameras and what triggers them
-/// are used: images need no position and the INS may be elsewhere, so it is left out, unless its
-/// SyncOut makes the pulses.
+/// Configuration for capturing images, which needs only the cameras and their trigger. The INS may
+/// be absent, so it is removed unless its SyncOut makes the pulses.
 [[nodiscard]] Configuration capture_configuration(const Configuration& configuration);
 
 /// Names of the cameras for files and messages: those of the configuration (letters, digits, `_`
-/// and `-`, everything else becomes `_`), `camera0` … where there is none, each once.
+/// and `-`, everything else becomes `_`), or `camera0` …; each is unique.
 [[nodiscard]] std::vector<std::string> camera_names(const Configuration& configuration,
                                                     int cameras);
 
-/// One synchronised set, while its images are there.
+/// Synchronised set, valid while its images are.
 struct CapturedSet {
-  int index = 0;  // 0, 1, …
+  /// Counts from 0.
+  int index = 0;
   Stamp stamp{};
   Duration stamp_error{}, spread{};
   SyncProof proof = SyncProof::counted;
@@ -75,18 +75,15 @@ struct CaptureResult {
 
 struct CaptureOptions {
   int count = 1;
-  int skip = 0;  // complete sets passed over first: the first exposures after a start may be
-                 // another's, or dark
+  /// Complete sets to skip first, because the first exposures after a start may have old settings.
+  int skip = 0;
   /// Time limit for the first set, and between two sets.
   Duration limit = Duration::seconds(5);
 };
 
-/// Starts the devices and hands on complete sets. The devices are stopped when it returns.
-///
-/// Uses only the pulses of the INS, if it makes them.
-/// Threads  `use` on the caller's. Time: `limit` a set, and what starting and stopping take.
-///          Errors: InputError as start_acquisition(), and
-/// what `use` throws.
+/// Starts the devices, passes complete sets to `use` on the caller's thread, and stops the devices.
+/// Uses only the pulses of the INS, if it makes them. Takes `limit` per set, plus starting and
+/// stopping. Throws as start_acquisition() does (InputError), and what `use` throws.
 [[nodiscard]] CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
                                          const SignalGuard& signals,
                                          const std::function<void(const CapturedSet&)>& use);

@@ -7,44 +7,45 @@
 #include "app/config/configuration.hpp"
 #include "app/devices/inventory.hpp"
 
-/// The checks of `vergence doctor`. Each is a function of the context and of the machine's files.
+/// The checks of `vergence doctor`.
 namespace vergence::app {
 
 enum class FindingState : std::uint8_t {
   ok,
-  advice,   // works, and could be better or surer
-  problem,  // a drive would fail, or lose images
+  /// Works, but could be better or safer.
+  advice,
+  /// A run would fail or lose images.
+  problem,
 };
 [[nodiscard]] const char* to_string(FindingState) noexcept;
 
 struct Finding {
-  std::string check;  // name, as in docs/deployment.md
+  /// Name, as in docs/deployment.md.
+  std::string check;
   FindingState state = FindingState::ok;
   std::string message;
-  std::vector<std::string> fix;  // commands as they are typed, the lasting one last
+  /// Commands to type, the permanent one last.
+  std::vector<std::string> fix;
 };
 
-/// Returns true if a driver talks to a device: it is neither empty nor `none` nor `mock`.
+/// True if a driver accesses a device: not empty, `none` or `mock`.
 [[nodiscard]] bool is_real_driver(const std::string& driver);
 
 struct CheckContext {
   const Machine& machine;
   const Inventory& inventory;
-  const Configuration* drive = nullptr;  // null: only what is plugged in is checked
-  std::filesystem::path out = ".";       // where sessions go
+  /// Null checks only what is plugged in.
+  const Configuration* drive = nullptr;
+  /// Parent directory of sessions.
+  std::filesystem::path out = ".";
 
-  /// Requirements where no configuration is given: no cameras, no INS, no trigger.
+  /// Requirements; without a configuration no cameras, INS or trigger.
   [[nodiscard]] const Configuration& needs() const;
 };
 
-/// All checks; those about devices that are neither there nor asked for have no finding. Problems
+/// Runs all checks. Devices that are neither present nor required cause no finding. Problems come
 /// first, then advice.
 [[nodiscard]] std::vector<Finding> run_checks(const CheckContext& context);
-
-// The checks by topic; each appends its findings in any order.
-void check_devices(const CheckContext& context, std::vector<Finding>* findings);
-void check_network(const CheckContext& context, std::vector<Finding>* findings);  // GigE Vision
-void check_system(const CheckContext& context, std::vector<Finding>* findings);
 
 /// The found camera that a configuration means: by serial or place; an empty serial is the next
 /// that no other entry names. Null: none. One for each camera of the configuration.

@@ -15,39 +15,37 @@
 
 namespace vergence::app {
 
-/// The devices of a drive, configured and ready to start: a mock's rig, or cameras that exist.
-///
-/// Ownership  Cameras, INS and trigger live in it and outlive the Acquisition that uses them.
-///            Threads: one caller.
+/// Devices of a run, configured and ready to start: a simulated rig, or real ones. Owns cameras,
+/// INS and trigger; must outlive the Acquisition that uses them. One caller.
 class DriveDevices {
  public:
-  /// InputError names the key, or the device and what it offers; DeviceError a device that is not
-  /// there or does not answer. `fast`: virtual time, mock only.
+  /// Throws InputError with the key, or the device and what it supports; DeviceError if a device is
+  /// missing or does not respond. `fast` selects virtual time, for the mock only.
   DriveDevices(const Configuration& configuration, const std::vector<std::string>& faults,
                bool fast, std::optional<double> duration_s);
 
   [[nodiscard]] const std::vector<CameraDevice*>& cameras() const noexcept { return cameras_; }
-  /// Real cameras with what they made of their configuration; empty: a mock's.
+  /// Real cameras with their applied configurations; empty for a mock.
   [[nodiscard]] const std::vector<OpenedCamera>& opened() const noexcept { return opened_; }
-  [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }  // null: none
-  [[nodiscard]] TriggerDevice* trigger() const noexcept {
-    return trigger_;
-  }  // null: pulses come from elsewhere, or none
+  /// Null if there is no INS.
+  [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }
+  /// Null if there are no pulses, or they come from elsewhere.
+  [[nodiscard]] TriggerDevice* trigger() const noexcept { return trigger_; }
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
-  /// Options of an acquisition of these devices; the rest are defaults.
+  /// Options of an acquisition of these devices; the others have defaults.
   [[nodiscard]] Acquisition::Options acquisition_options() const;
-  /// The driver of a board on a line; null: there is none.
+  /// Driver of a trigger board on a serial link; null if there is none.
   [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_.get(); }
-  /// Sentences about what works, but not as well as it should.
+  /// Messages about limitations.
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
 
-  /// Null: the devices are real.
+  /// Null for real devices.
   [[nodiscard]] const mock::MockRig* mock() const noexcept { return mock_.rig.get(); }
-  /// Scheduled in the mock.
+  /// Faults scheduled in the mock.
   [[nodiscard]] std::span<const mock::Fault> faults() const noexcept;
-  /// When the drive begins; in real time the simulated rig sets it at the start.
+  /// Start of the run; in real time the simulated rig sets it when started.
   [[nodiscard]] HostStamp start() const noexcept;
-  /// Rig frames of the whole drive; 0 if unknown.
+  /// Number of rig frames of the whole run; 0 if unknown.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   /// Image memory of simulated cameras; unknown for real ones.
   [[nodiscard]] std::size_t image_bytes() const noexcept {
@@ -66,13 +64,14 @@ class DriveDevices {
   InsDevice* ins_ = nullptr;
   TriggerDevice* trigger_ = nullptr;
   SyncOptions sync_;
-  bool fast_ = false;  // virtual time
+  // True for virtual time.
+  bool fast_ = false;
   std::vector<std::string> remarks_;
   std::uint64_t frames_ = 0;
   HostStamp start_{};
 };
 
-/// Acquisition::start(); refuse_device() names the device that cannot be started.
+/// Calls Acquisition::start(); throws as refuse_device() for a device that fails to start.
 void start_acquisition(Acquisition* acquisition, PulseObserver* observer = nullptr);
 
 }  // namespace vergence::app

@@ -12,18 +12,14 @@
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger.hpp"
 
-/// From the configuration to how pulses are made and images paired. All of it throws InputError
-/// naming the key and what to do.
+/// Configuration of pulses and pairing. All functions throw InputError with the key and the fix.
 namespace vergence::app {
 
-/// A trigger board made of software: asks every camera for an exposure at the rate, one after the
-/// other.
+/// Trigger by software: commands an exposure of every camera, one after the other, at the rate.
 ///
-/// The cameras expose as far apart as a command takes; their stamps tell. A camera that is gone is
-/// passed over.
-/// Ownership  The cameras outlive it and are started before it. Threads: one of its own between
-///            start() and stop().
-/// Errors     start(): failed, when no thread can be had.
+/// The exposures differ by the duration of a command, as their stamps show. Disconnected cameras
+/// are skipped. The cameras must outlive it and be started first. Runs an own thread between
+/// start() and stop(). start() returns `failed` without a thread.
 class SoftwareTrigger final : public TriggerDevice {
  public:
   explicit SoftwareTrigger(std::vector<CameraDevice*> cameras) : cameras_(std::move(cameras)) {}
@@ -51,23 +47,25 @@ class SoftwareTrigger final : public TriggerDevice {
   double rate_ = 0;
   std::mutex mutex_;
   std::condition_variable changed_;
-  bool stop_ = false;          // under mutex_
-  Notifier* ready_ = nullptr;  // under mutex_
+  // Guarded by mutex_.
+  bool stop_ = false;
+  // Guarded by mutex_.
+  Notifier* ready_ = nullptr;
   Ring<Pulse, 64> ring_;
   std::atomic<bool> running_{false};
   std::atomic<std::uint64_t> pulses_{0}, overruns_{0}, starts_{0};
   std::thread thread_;
 };
 
-/// Returns the pairing options. Checks that the devices of the configuration can do what
-/// `sync.mode` needs.
+/// Returns the pairing options. Checks that the configured devices support `sync.mode`.
 [[nodiscard]] SyncOptions sync_options(const Configuration& configuration, int cameras);
 
-/// Adapts the options to the properties of real devices. `trigger`: pulses are started by us.
+/// Adapts the options to the properties of real devices. `trigger` is set if this program starts
+/// the pulses.
 void fit_to_devices(const Configuration& configuration, const std::vector<DeviceTiming>& cameras,
                     bool trigger, SyncOptions* options);
 
-/// The INS can make pulses of trigger.rate, and tells of each.
+/// Checks that the INS can make pulses at trigger.rate and reports each.
 void check_sync_out(const Configuration& configuration, const DeviceInfo& ins);
 
 /// Requested configuration of the trigger board.

@@ -17,28 +17,31 @@ namespace vergence::app {
 
 /// Counters of a run; exact after the last frame and settle().
 struct ExposureCounters {
-  std::uint64_t changes = 0;  // asked of the cameras
-  std::uint64_t refused = 0;  // by a camera that was gone, or could not
-  std::uint64_t unequal = 0;  // the cameras took different ones
-  std::uint64_t again = 0;    // asked once more: a camera had another than it was given
-  bool unsupported =
-      false;  // a camera cannot be asked while it streams: nothing is changed any more
-  ExposureSetting newest{};  // wanted last
+  /// Number of changes requested.
+  std::uint64_t changes = 0;
+  /// Refusals by a camera that was disconnected or failed.
+  std::uint64_t refused = 0;
+  /// Changes for which the cameras applied different values.
+  std::uint64_t unequal = 0;
+  /// Repeated requests, because a camera had another setting.
+  std::uint64_t again = 0;
+  /// True if a camera cannot be changed while streaming; the exposure then stays fixed.
+  bool unsupported = false;
+  /// Last requested setting.
+  ExposureSetting newest{};
 };
 
-/// Exposure and gain of all cameras of a rig from how bright camera 0's images are; the same for
-/// all, so that their mid-exposures agree.
+/// Controls exposure and gain of all cameras by the brightness of camera 0. The setting is common,
+/// so that mid-exposures agree.
 ///
-/// Each image of camera 0 is measured when the acquisition takes it, some 10 µs; what is to change
-/// is asked of the cameras by a thread of its own, because a device may take seconds to answer.
-/// That thread would come at another image on every run: in virtual time the cameras are asked at
-/// once.
-/// Ownership  The cameras outlive it. Threads: on_frame(), one caller; a thread of its own.
-/// Memory     At construction; none in on_frame(). Errors: counted.
+/// Each image of camera 0 is measured when it is taken, in some 10 µs. An own thread changes the
+/// cameras, because a device may take seconds. Since that thread acts at a different image on every
+/// run, in virtual time the cameras are changed immediately. The cameras must outlive it. One
+/// caller of on_frame(), which does not allocate. Errors are counted.
 class ExposureControl final : public FrameObserver {
  public:
-  /// `mask` of camera 0, read here only; it has the images' size or is empty. Preconditions: valid
-  /// options, at least one camera, all of them configured with `start` and `width` x `height`.
+  /// `mask` is that of camera 0, empty or of the images' size; used only here. Preconditions: valid
+  /// options, at least one camera, all configured with `start` and `width` x `height`.
   ExposureControl(std::vector<CameraDevice*> cameras, int width, int height, const ImageView& mask,
                   const exposure::ExposureOptions& options, const ExposureSetting& start,
                   bool at_once);
@@ -47,7 +50,7 @@ class ExposureControl final : public FrameObserver {
   ExposureControl& operator=(const ExposureControl&) = delete;
 
   void on_frame(std::size_t k, const Frame& frame) noexcept override;
-  /// Ends the thread. Owner, after the last frame; twice is harmless.
+  /// Ends the thread. Called by the owner after the last frame; may be called twice.
   void settle() noexcept;
   [[nodiscard]] ExposureCounters counters() const noexcept;
 
@@ -64,11 +67,15 @@ class ExposureControl final : public FrameObserver {
   const bool at_once_;
 
   // Used by the thread that waits for frames.
-  bool asked_ = false;                             // and not yet seen as done
-  std::array<int, kMaxCameras> frames_without_{};  // in a row
 
-  std::array<ExposureSetting, kMaxCameras>
-      applied_{};  // as each camera rounded; of who asks, of the others while nothing is under way
+  // True while a requested change is not yet visible.
+  bool asked_ = false;
+  // Consecutive frames without the setting.
+  std::array<int, kMaxCameras> frames_without_{};
+
+  // Values applied by each camera. Used by the changing thread, and by others while no change is
+  // pending.
+  std::array<ExposureSetting, kMaxCameras> applied_{};
   Ring<ExposureSetting, 4> requests_;
   std::atomic<bool> under_way_{false}, stop_{false}, unsupported_{false};
   std::atomic<std::uint64_t> changes_{0}, refused_{0}, unequal_{0}, again_{0};

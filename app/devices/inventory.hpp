@@ -13,7 +13,7 @@
 
 namespace vergence::app {
 
-/// An IPv4 address of a network interface, in the host's byte order.
+/// IPv4 address of a network interface, in host byte order.
 struct InterfaceAddress {
   std::string name;
   std::uint32_t address = 0, mask = 0;
@@ -28,20 +28,19 @@ struct DiskRoom {
   bool may_write = true;
 };
 
-/// A machine as its own files describe it, and what this process may do on it. The checks read
-/// everything through this, so that a folder of small files stands for any machine in tests.
+/// Machine as described by its files, and the rights of this process. All checks use this
+/// interface, so tests can replace a machine by a directory.
 ///
-/// Threads  here() and group_of: one at a time. Other const calls: any. Memory: ordinary.
-/// Errors   Nothing throws. A file that is missing, refuses to be read, is no regular file or holds
-///          something else is `nullopt`.
+/// here() and group_of are not thread-safe, other const calls are. Nothing throws. A file that is
+/// missing, unreadable, not regular or malformed gives `nullopt`.
 struct Machine {
-  /// Bytes that are read of a file: those under /sys hold a page.
+  /// Maximum number of bytes read of a file; those under /sys have a page.
   static constexpr std::size_t kMaxText = 4096;
   static constexpr std::size_t kMaxNames = 8192;
 
   /// Directory with /sys, /proc, /dev and /etc.
   std::filesystem::path root = "/";
-  /// User name for the commands that are printed.
+  /// User name for printed commands.
   std::string user = "$USER";
   /// Groups of this process, by name.
   std::vector<std::string> groups;
@@ -50,42 +49,39 @@ struct Machine {
   std::function<bool(const std::string& node)> may_use;
   /// Group of a node; empty if unknown.
   std::function<std::string(const std::string& node)> group_of;
-  /// For this user; of a folder that does not exist yet, where it would be made.
+  /// Free space for this user; of a directory that does not exist yet, that of its future parent.
   std::function<std::optional<DiskRoom>(const std::filesystem::path& folder)> room_at;
-  /// State that the kernel reports.
-  std::optional<bool> clock_synchronised;
 
-  /// The machine that this process runs on.
+  /// Machine of this process.
   [[nodiscard]] static Machine here();
 
-  /// First line without blanks at its ends; what is not printable becomes `?`.
+  /// First line without surrounding blanks; unprintable characters become `?`.
   [[nodiscard]] std::optional<std::string> line(const std::string& path) const;
-  /// The whole file, at most kMaxText bytes.
+  /// Whole file, at most kMaxText bytes.
   [[nodiscard]] std::optional<std::string> text(const std::string& path) const;
-  /// The first line, which is a number of that base and nothing else.
+  /// First line, if it is just a number of that base.
   [[nodiscard]] std::optional<std::int64_t> number(const std::string& path, int base = 10) const;
-  /// Names in a folder, sorted; at most kMaxNames.
+  /// Names in a directory, sorted; at most kMaxNames.
   [[nodiscard]] std::vector<std::string> names(const std::string& path) const;
   [[nodiscard]] bool exists(const std::string& path) const;
-  /// The path with links followed: `/dev/ttyUSB0`. The path itself where nothing is there, or where
-  /// it leads out of this machine.
+  /// Path with links resolved, such as `/dev/ttyUSB0`. Unchanged if nothing is there, or it leads
+  /// out of `root`.
   [[nodiscard]] std::string target(const std::string& path) const;
 
   /// Capability `bit` of this process (linux/capability.h).
   [[nodiscard]] bool has_capability(unsigned bit) const;
-  /// Soft limit of this process by its name in /proc/self/limits; -1: unlimited.
-  [[nodiscard]] std::optional<std::int64_t> limit(const std::string& name) const;
   [[nodiscard]] bool in_group(const std::string& group) const;
 
  private:
   [[nodiscard]] std::filesystem::path at(const std::string& path) const;
 };
 
-constexpr std::uint16_t kPointGreyVendor = 0x1E10;  // USB vendor id of the IIDC cameras
+/// USB vendor id of the IIDC cameras.
+constexpr std::uint16_t kPointGreyVendor = 0x1E10;
 
-/// A device on USB as the kernel lists it; nothing is opened.
+/// USB device as listed by the kernel; it is not opened.
 struct UsbDevice {
-  /// `1-2.3`: bus and ports along the path; constant as long as the cable stays.
+  /// Bus and ports along the path, such as `1-2.3`; constant while the cable stays.
   std::string port;
   std::uint16_t vendor = 0, product = 0;
   /// The title is manufacturer and product; either may be empty.
@@ -95,10 +91,11 @@ struct UsbDevice {
   /// Nodes of its interfaces: video0, …
   std::vector<std::string> video;
 
-  [[nodiscard]] std::string node() const;  // /dev/bus/usb/001/004
+  /// Path such as /dev/bus/usb/001/004.
+  [[nodiscard]] std::string node() const;
 };
 
-/// Every device but root hubs, in the order of their ports.
+/// All devices except root hubs, ordered by port.
 [[nodiscard]] std::vector<UsbDevice> list_usb_devices(const Machine& machine);
 
 /// Likely device at a serial port, by the USB ids of what carries it. The port is not
@@ -117,27 +114,27 @@ enum class SerialKind : std::uint8_t {
   unknown,
 };
 [[nodiscard]] const char* to_string(SerialKind) noexcept;
-/// Vendor 0: not on USB.
+/// Vendor 0 means a port that is not on USB.
 [[nodiscard]] SerialKind serial_kind(std::uint16_t vendor, std::uint16_t product) noexcept;
-/// Returns true for an FTDI chip under whatever vendor id: it has a latency timer.
+/// True for an FTDI chip under any vendor id; it has a latency timer.
 [[nodiscard]] bool is_ftdi(std::uint16_t vendor, std::uint16_t product) noexcept;
 
 struct FoundPort {
   SerialPortInfo info;
-  /// Link that stays when ports are renumbered; empty: none.
+  /// Link that is stable when ports are renumbered; empty if there is none.
   std::string by_id;
   SerialKind kind = SerialKind::unknown;
-  /// Line for the configuration; empty: unknown.
+  /// Line for the configuration; empty if unknown.
   std::string configuration;
 
-  /// The name for a configuration.
+  /// Name for a configuration.
   [[nodiscard]] const std::string& name() const noexcept {
     return by_id.empty() ? info.port : by_id;
   }
 };
 
-/// Returns true if a configuration's `port` means this port: by its name, any link to it, or its
-/// adapter's serial number. An empty key means every port on USB.
+/// True if a configuration's `port` matches this port: by name, any link to it, or the adapter's
+/// serial number. An empty key matches every port on USB.
 [[nodiscard]] bool names_port(const Machine& machine, const std::string& key,
                               const FoundPort& port);
 
@@ -160,17 +157,16 @@ struct Inventory {
 };
 
 struct InventoryOptions {
-  /// Names of camera drivers; empty: all.
+  /// Names of camera drivers; empty for all.
   std::vector<std::string> drivers;
-  /// For each driver of cameras; they search at the same time. The longest search is GigE's, 1 s.
+  /// Time limit of each driver's search; searches run in parallel. The longest is GigE's, 1 s.
   Duration limit = Duration::seconds(8);
 };
 
-/// Looks for everything. One thread a driver; one that does not come back within the limit is
-/// abandoned.
+/// Searches for all devices with one thread per driver; a search beyond the limit is abandoned.
 [[nodiscard]] Inventory make_inventory(const Machine& machine, const InventoryOptions& options);
 
-/// `{driver: gige, serial: "15021234"}`, as an item of `cameras:`.
+/// Item of `cameras`, such as `{driver: gige, serial: "15021234"}`.
 [[nodiscard]] std::string camera_line(const DeviceInfo& info);
 
 }  // namespace vergence::app

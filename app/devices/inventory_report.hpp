@@ -6,30 +6,29 @@
 #include "app/devices/inventory.hpp"
 #include "app/runtime/terminal_text.hpp"
 
-/// Output of `vergence devices` and `vergence doctor`; the keys of the JSON are in
-/// docs/deployment.md and docs/deployment.md.
+/// Output of `vergence devices` and `vergence doctor`; docs/deployment.md has the keys of the JSON.
 namespace vergence::app {
 
-/// A file for /etc/udev/rules.d about the devices that are plugged in: who may open them (groups
-/// dialout and video), names under /dev/vergence that stay, ModemManager kept away, the latency
-/// timer that docs/ins.md recommends, no autosuspend of cameras.
+/// File for /etc/udev/rules.d for the plugged-in devices: access by the groups dialout and video,
+/// stable names under /dev/vergence, no ModemManager, the latency timer recommended in docs/ins.md,
+/// no autosuspend of cameras.
 ///
-/// Texts of devices are untrusted: of a serial number only letters, digits and `._-` are written,
-/// everything else matches any one character and is no part of a name. A pure function.
+/// Texts of devices are untrusted: of a serial number only letters, digits and `._-` are written;
+/// other characters match any one and are not part of a name.
 [[nodiscard]] std::string udev_rules(const Inventory& inventory);
 
-/// The ports that the configuration means, as its INS and its trigger board; cameras unchanged.
-/// Where it names no port, the ones on USB that carry such a device by their ids are meant.
+/// Keeps the ports that the configuration uses for INS and trigger board; cameras are unchanged. If
+/// it names no port, those on USB with matching ids are used.
 [[nodiscard]] Inventory ports_of_rig(Inventory inventory, const Configuration& drive,
                                      const Machine& machine);
 
-/// Cameras, serial ports, what to paste into a configuration, and a line for each driver that found
-/// nothing.
+/// Text with cameras, serial ports, lines for a configuration, and a line per driver without a
+/// device.
 [[nodiscard]] std::string devices_text(const Inventory& inventory, const Terminal& terminal);
-/// `rules`: of --write-udev; empty where they were not asked for.
+/// `rules` is the file of --write-udev; empty if not requested.
 [[nodiscard]] std::string devices_json(const Inventory& inventory, const std::string& rules);
 
-/// `given`: there is a configuration; without one the last line asks for it.
+/// `given` is set if there is a configuration; otherwise the last line asks for one.
 [[nodiscard]] std::string doctor_text(const std::vector<Finding>& findings, bool given,
                                       const Terminal& terminal);
 [[nodiscard]] std::string doctor_json(const std::vector<Finding>& findings);

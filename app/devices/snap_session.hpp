@@ -8,20 +8,21 @@ namespace vergence::app {
 
 struct SnapRequest {
   Configuration configuration;
-  std::filesystem::path out;  // folder; must not exist or be empty
-  int count = 1;              // sets
-  double wait_s = 5;          // for a set
+  /// Directory that must not exist or be empty.
+  std::filesystem::path out;
+  /// Number of sets.
+  int count = 1;
+  /// Time limit per set.
+  double wait_s = 5;
 };
 
-/// Opens the configured cameras, takes `count` synchronised sets, writes their pictures and
-/// snap.json into the folder, a table to standard output and what strikes the eye to standard
-/// error.
+/// Captures `count` synchronised sets of the configured cameras. Writes images and snap.json to the
+/// directory, a table to standard output and visible image defects to standard error.
 ///
-/// Cameras that wait for a pulse which does not come are asked by command, and where they have no
-/// such command run freely; it says so.
-/// → done, not_usable (pictures are there and no good), device_failed (a camera sent nothing),
-///   interrupted, terminated
-/// Errors  InputError: configuration, folder; DeviceError: devices that are not there.
+/// Cameras whose trigger pulse is missing are triggered by command or, if unsupported, run freely,
+/// which is reported. Returns done, not_usable (the images are unusable), device_failed (a camera
+/// sent nothing), interrupted or terminated. Throws InputError (configuration, directory) and
+/// DeviceError (missing devices).
 [[nodiscard]] ExitCode capture_images(const SnapRequest& request);
 
 }  // namespace vergence::app

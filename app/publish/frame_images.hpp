@@ -11,34 +11,34 @@
 
 namespace vergence::app {
 
-/// Hands copies of one frame's left and right images from the estimator's thread to one reader,
-/// only when the reader has asked for them.
+/// Passes copies of one frame's left and right images from the estimator's thread to one reader, on
+/// request only.
 ///
-/// Threads  copy(), copying(), finish(): the estimator's, sealed; a memcpy of two images when a
-///          frame is wanted, one load of a flag when not. The rest: the reader's. A flag says whose
-///          the memory is; neither thread waits.
-/// Memory   Two images, taken by the first want().
+/// Threads  The estimator's thread, which is sealed, calls copy(), copying() and finish(): a memcpy
+///          of two images if a frame is requested, else one atomic load. The reader makes the other
+///          calls. A flag states the owner of the memory; no thread waits.
+/// Memory   Two images, allocated by the first want().
 class FrameImages {
  public:
-  /// Copies the images if they are wanted. True: finish() hands them over, now or later.
+  /// Copies the images if requested. If true, finish() must follow, now or later.
   bool copy(const RigFrame& frame) noexcept;
-  /// A copy waits for finish().
+  /// True while a copy waits for finish().
   [[nodiscard]] bool copying() const noexcept {
     return owner_.load(std::memory_order_relaxed) == Owner::copy;
   }
   void finish() noexcept { owner_.store(Owner::reader, std::memory_order_release); }
 
-  /// Asks for the next frame, if none is asked for or here. `image_bytes`: of the largest camera;
-  /// larger images are left out.
+  /// Requests the next frame unless one is requested or available. `image_bytes` is the size of the
+  /// largest camera; larger images are skipped.
   void want(std::size_t image_bytes);
-  /// A frame is here and stays until done().
+  /// True if a frame is available; it stays until done().
   [[nodiscard]] bool ready() const noexcept {
     return owner_.load(std::memory_order_acquire) == Owner::reader;
   }
   void done() noexcept { owner_.store(Owner::none, std::memory_order_release); }
   [[nodiscard]] std::uint64_t frame() const noexcept { return frame_; }
   [[nodiscard]] Stamp stamp() const noexcept { return stamp_; }
-  /// Without padding; empty where the camera gave none.
+  /// Image without padding; empty if the camera had none.
   [[nodiscard]] ImageView image(std::size_t camera) const noexcept { return images_[camera]; }
 
   static constexpr std::size_t kImages = 2;
@@ -50,7 +50,8 @@ class FrameImages {
   std::uint64_t frame_ = 0;
   Stamp stamp_{};
   std::array<std::vector<std::uint8_t>, kImages> pixels_{};
-  std::array<ImageView, kImages> images_{};  // of pixels_
+  // Views of pixels_.
+  std::array<ImageView, kImages> images_{};
 };
 
 }  // namespace vergence::app

@@ -15,24 +15,26 @@ struct MHD_Daemon;
 
 namespace vergence::app {
 
-/// Fields of a request's head that the live page uses.
+/// Fields of a request that the live page uses.
 struct HttpRequest {
-  /// The path has no query.
+  /// `path` excludes the query.
   std::string_view method{}, path{};
   /// Value of the header X-Vergence-Token or of the query `token=`.
   std::string_view token{};
   std::string_view host{}, origin{};
   bool token_in_header = false;
   bool has_body = false;
-  // A request for /state names what the viewer already has (LivePage).
+  // Data that the viewer already has, in a request for /state (LivePage).
   std::string_view epoch{}, after{}, image{};
 };
 
-/// Whom the live page answers.
+/// Access rules of the live page.
 struct HttpPolicy {
   std::string token{};
-  bool token_to_read = false;  // bound beyond this machine
-  std::string host{};          // of the configuration; a Host header may name it
+  /// Set if bound to an address beyond this machine.
+  bool token_to_read = false;
+  /// Configured host, which a Host header may name.
+  std::string host{};
 };
 
 enum class HttpRoute : std::uint8_t { refuse, page, state, recalibrate, mark, stop_recording };
@@ -40,39 +42,41 @@ enum class HttpRoute : std::uint8_t { refuse, page, state, recalibrate, mark, st
 struct HttpDecision {
   HttpRoute route = HttpRoute::refuse;
   unsigned status = 200;
-  const char* message = "";  // of a refusal
+  /// Reason for a refusal.
+  const char* message = "";
 };
 
-/// The page itself holds nothing of the session and is for everyone; the state needs the token
-/// where the policy says so; actions always, in a header that no other site's page can send, from
-/// no other origin. On this machine the Host header must name it: a name that another host lets
-/// point here does not (DNS rebinding).
+/// The page has no session data and is public. The state needs the token if the policy requires it.
+/// Actions always need it, in a header that pages of other origins cannot send. On this machine the
+/// Host header must name it, because another host's name may resolve to it (DNS rebinding).
 [[nodiscard]] HttpDecision decide(const HttpRequest& request, const HttpPolicy& policy) noexcept;
 
-/// One page, one state that viewers ask for again and again, a few actions, by libmicrohttpd.
+/// Serves one page, one state that viewers poll, and a few actions, by libmicrohttpd.
 ///
 ///     HttpServer server(address, policy, page, [&](HttpRoute route, const HttpRequest& request) {
 ///       return route == HttpRoute::state ? state_json(request) : act(route);
 ///     });
 ///     while (!ended) server.step(std::chrono::milliseconds(100));
 ///
-/// Threads  One calls everything, and is called by step(). Nothing waits but step(), for its
+/// Threads  One thread makes all calls; step() calls the handler. Only step() waits, for its
 ///          timeout.
-/// Memory   kConnections connections of kRequestBytes and a response each. A client that sends no
-///          request, or does not read, is dropped after a few seconds.
-/// Errors   The constructor throws InputError: the port is in use, the address is not this
-///          machine's. Afterwards whatever a client does ends its connection.
+/// Memory   kConnections connections of kRequestBytes with a response each. A client that sends no
+///          request or does not read is dropped after a few seconds.
+/// Errors   The constructor throws InputError if the port is in use or the address is not this
+///          machine's. Later errors end the client's connection.
 class HttpServer {
  public:
   static constexpr unsigned kConnections = 64;
-  static constexpr std::size_t kAsking = 24;  // connections without a request; the oldest goes
-  static constexpr std::size_t kRequestBytes = std::size_t{8} << 10U;  // browsers send some 600
+  /// Maximum number of connections without a request; the oldest is closed.
+  static constexpr std::size_t kAsking = 24;
+  /// Browsers send some 600 bytes.
+  static constexpr std::size_t kRequestBytes = std::size_t{8} << 10U;
 
-  /// Carries out an admitted request. Returns the state as JSON, empty: there is none yet; of an
-  /// action nothing.
+  /// Handles an admitted request. Returns the state as JSON, empty if there is none yet; actions
+  /// return nothing.
   using Handler = std::function<std::string(HttpRoute route, const HttpRequest& request)>;
 
-  /// `page`: the HTML, outlives it.
+  /// `page` is the HTML, which must outlive the server.
   HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page, Handler handler);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
@@ -85,15 +89,18 @@ class HttpServer {
   struct StopDaemon {
     void operator()(MHD_Daemon* daemon) const noexcept;
   };
-  struct Callbacks;  // of the library
+  // Callbacks of the library.
+  struct Callbacks;
 
   [[nodiscard]] bool answer(MHD_Connection* connection, const HttpRequest& request);
 
   const HttpPolicy policy_;
   const std::string_view page_;
   const Handler handler_;
-  std::list<MHD_Connection*> asking_;  // that have sent no request yet, the oldest first
-  std::unique_ptr<MHD_Daemon, StopDaemon> daemon_;  // last: it uses the others
+  // Connections without a request yet, oldest first.
+  std::list<MHD_Connection*> asking_;
+  // Last member, because it uses the others.
+  std::unique_ptr<MHD_Daemon, StopDaemon> daemon_;
 };
 
 }  // namespace vergence::app

@@ -19,23 +19,22 @@
 
 namespace vergence::app {
 
-/// `publish.pose_stream`: the pose stream to robots and bridges (docs/live_interface.md). A line
-/// per frame, the calibration and the alignment when a reader connects and when they change, a
-/// status per second; images on the connections that request them.
+/// Publishes the pose stream to robots and bridges (docs/live_interface.md): a line per frame,
+/// calibration and alignment when a reader connects and when they change, a status per second, and
+/// images on request.
 ///
-/// Threads  on_…(): the estimator's, which pushes into rings, copies two images where a reader is
-///          due, and wakes; no lock, no system call but the wake. Formatting, sending and requests:
-///          a thread of its own, made by the constructor.
-/// Memory   Fixed for the estimator's part; from the first request for images on, two pairs of them
-///          and one for each reader that requested them. Ring full: that line is left out and
-///          counted.
-/// Errors   The constructor throws std::system_error when no thread can be had.
+/// Threads  on_…() run on the estimator's thread: they fill rings, copy two images if a reader is
+///          due, and wake, without a lock or another system call. The constructor starts a thread
+///          for formatting, sending and requests.
+/// Memory   Fixed for the estimator's part. After the first request for images two pairs, and one
+///          per requesting reader. If a ring is full, the line is dropped and counted.
+/// Errors   The constructor throws std::system_error if there is no thread.
 class LinePublisher final : public SessionObserver {
  public:
-  /// `requests` outlives it. `options`: what a calibration is rated by.
+  /// `requests` must outlive it. `options` rate a calibration.
   LinePublisher(std::unique_ptr<LineSocket> socket, SessionRequests* requests,
                 const calibration::CalibrationOptions& options);
-  /// Sends what waits, then ends the thread.
+  /// Sends the remaining lines, then ends the thread.
   ~LinePublisher() override;
   LinePublisher(const LinePublisher&) = delete;
   LinePublisher& operator=(const LinePublisher&) = delete;
@@ -49,9 +48,10 @@ class LinePublisher final : public SessionObserver {
   void on_reading(const InsRecord& reading) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
-  /// Sends what waits first: to be called when no more poses come.
+  /// Sends the remaining lines first; call when no more poses follow.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
-  /// From mid-exposure to the line, ms, 99th percentile so far; negative: not known. Any thread.
+  /// 99th percentile of the time from mid-exposure to the line, in ms; negative if unknown.
+  /// Thread-safe.
   [[nodiscard]] double age_p99_ms() const noexcept {
     return age_p99_ms_.load(std::memory_order_relaxed);
   }
@@ -69,30 +69,34 @@ class LinePublisher final : public SessionObserver {
   std::unique_ptr<LineSocket> socket_;
   SessionRequests* requests_;
   calibration::CalibrationOptions options_;
-  FileDescriptor wake_;   // an eventfd
-  SessionStart start_{};  // published by started_
+  // Descriptor of an eventfd.
+  FileDescriptor wake_;
+  // Published by started_.
+  SessionStart start_{};
   std::atomic<bool> started_{false}, stop_{false};
 
-  // From the estimator's thread to the publisher's.
+  // Passed from the estimator's thread to the publisher's.
   Ring<FrameReport, 64> reports_;
   Ring<PublishedEnuAlignment, 8> alignments_;
   Ring<CalibrationRecord, 4> calibrations_;
   FrameImages images_;
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<bool> verified_{false};
-  std::atomic<std::int64_t> sample_ns_{0};  // arrival of the newest INS sample; 0: none
+  // Arrival of the newest INS sample; 0 if none.
+  std::atomic<std::int64_t> sample_ns_{0};
   std::atomic<FixStatus> fix_{FixStatus::none};
 
   std::atomic<double> age_p99_ms_{-1};
 
-  // Used by the publisher's thread only.
+  // Used only by the publisher's thread.
   std::optional<PublishedEnuAlignment> alignment_{};
   std::optional<FrameReport> newest_{};
   std::string calibration_line_{}, alignment_line_{};
   HostStamp status_due_{};
   std::string line_, image_bytes_;
   std::uint64_t lines_ = 0;
-  TimeHistogram age_, behind_pose_;  // ms
+  // In ms.
+  TimeHistogram age_, behind_pose_;
   std::thread thread_;
 };
 

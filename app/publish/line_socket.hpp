@@ -10,73 +10,81 @@
 
 namespace vergence::app {
 
-/// HOST:PORT of the configuration; an IPv6 address stands in brackets.
+/// HOST:PORT of the configuration; an IPv6 address is in brackets.
 struct HostPort {
   std::string host{};
   std::uint16_t port = 0;
 
-  /// Reachable from this machine alone: 127.0.0.0/8, ::1, localhost.
+  /// True if reachable only from this machine: 127.0.0.0/8, ::1, localhost.
   [[nodiscard]] bool loopback() const;
-  /// As it stands in a URL: brackets around an IPv6 address.
+  /// Form used in a URL, with brackets around an IPv6 address.
   [[nodiscard]] std::string text() const;
   /// Address for viewers: the machine's name if the host is every address (0.0.0.0, ::).
   [[nodiscard]] HostPort link() const;
 };
 
-/// Where the lines go.
+/// Destination of the lines.
 struct LineAddress {
   enum class Kind : std::uint8_t { unix_socket, udp } kind = Kind::unix_socket;
-  std::string path{};  // of the socket file
+  /// Path of the socket file.
+  std::string path{};
   HostPort udp{};
 };
 
-/// `127.0.0.1:8080`, `[::1]:8080`, `0.0.0.0:8080`, `name:8080`. InputError: a message that begins
-/// with `key`.
+/// Parses `127.0.0.1:8080`, `[::1]:8080`, `0.0.0.0:8080` or `name:8080`. Throws InputError with a
+/// message that begins with `key`.
 [[nodiscard]] HostPort parse_host_port(std::string_view text, std::string_view key);
 
-/// `unix:///run/vergence/pose.sock`, `udp://HOST:PORT`. InputError: a message that begins with
-/// `key`.
+/// Parses `unix:///run/vergence/pose.sock` or `udp://HOST:PORT`. Throws InputError with a message
+/// that begins with `key`.
 [[nodiscard]] LineAddress parse_line_address(std::string_view text, std::string_view key);
 
-/// Counters of the lines at the socket.
+/// Counters of the socket.
 struct LineSocketCounters {
-  std::uint64_t sent = 0;     // lines that a reader was given, each reader counted
-  std::uint64_t refused = 0;  // lines that a reader had no room for, or that had no reader (UDP)
-  std::uint64_t readers = 0;  // connections that were accepted
-  std::uint64_t closed = 0;   // … and closed because the reader did not read
-  std::uint64_t turned_away = 0;  // … and closed because there were too many
-  std::uint64_t images = 0;       // pairs of images that a reader was given, each reader counted
+  /// Lines delivered, counted per reader.
+  std::uint64_t sent = 0;
+  /// Lines for which a reader had no room, or UDP had no reader.
+  std::uint64_t refused = 0;
+  /// Accepted connections.
+  std::uint64_t readers = 0;
+  /// Connections closed because the reader did not read.
+  std::uint64_t closed = 0;
+  /// Connections closed because there were too many.
+  std::uint64_t turned_away = 0;
+  /// Pairs of images delivered, counted per reader.
+  std::uint64_t images = 0;
 };
 
 /// Response to a request.
 struct LineResponse {
-  std::string line{};  // line feed included
-  /// Positive: the reader gets images from now on, one pair per interval on average and never two
-  /// within half of it, and no more lines.
+  /// Includes the line feed.
+  std::string line{};
+  /// If positive, the reader gets images instead of lines from now on, one pair per interval on
+  /// average and at least half of it apart.
   Duration image_interval{};
 };
 
-/// Where lines go: a Unix stream socket with a few readers, or datagrams to one address.
+/// Destination of lines: a Unix stream socket with a few readers, or datagrams to one address.
 ///
-/// Not thread-safe. Sending never waits: a reader without room loses whole lines, never a part
-///          of one, and is disconnected when it does not read for a while.
-/// Errors   The constructors throw InputError: what, where, what to do. Afterwards counters.
+/// Sending never blocks: a reader without room loses whole lines and is disconnected if it does not
+/// read for a while. Not thread-safe. The constructors throw InputError with the problem, its place
+/// and the fix; later errors are counted.
 class LineSocket {
  public:
-  /// `request`: without its line feed.
+  /// `request` has no line feed.
   using Answer = std::function<LineResponse(std::string_view request)>;
 
   virtual ~LineSocket() = default;
   virtual void send(std::string_view line) noexcept = 0;
-  /// Lines that every reader is given now, and readers that connect later are given first. They are
-  /// never lost: a reader without room gets them as soon as it has.
+  /// Sets lines that every reader gets now and later readers get first. They are never lost: a
+  /// reader without room gets them when it has some.
   virtual void greet(std::string lines) noexcept = 0;
-  /// Returns when `wake`, an eventfd, was written to, which is then reset, or after `timeout`, or
-  /// earlier. Readers are accepted and their requests answered meanwhile; datagrams bring none.
+  /// Waits until the eventfd `wake` was written, which resets it, or at most for `timeout`.
+  /// Meanwhile accepts readers and answers their requests; datagrams have none.
   virtual void wait(int wake, Duration timeout, const Answer& answer) noexcept = 0;
   /// True while a reader has room for images and its interval has passed.
   [[nodiscard]] virtual bool wants_images() const noexcept { return false; }
-  /// Gives them to those readers. `bytes`: a frame's images (docs/live_interface.md).
+  /// Sends to those readers. `bytes` has a frame's images (docs/live_interface.md).
   virtual void send_images(std::string_view /*bytes*/) noexcept {}
   [[nodiscard]] virtual LineSocketCounters counters() const noexcept = 0;
 };

@@ -5,17 +5,27 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <exception>
-#include <string>
-#include <string_view>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "app/datasets/jpeg_writer.hpp"
+#include "app/publish/frame_images.hpp"
+#include "app/publish/live_state.hpp"
 #include "app/publish/page_parts.hpp"  // made by CMake from app/publish/page/
 #include "app/report/style.hpp"
+#include "core/memory/fixed_vector.hpp"
+#include "core/memory/ring.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -53,161 +63,6 @@ std::string base64(std::string_view bytes) {
   return out;
 }
 
-namespace {
-
-using std::chrono::milliseconds;
-
-constexpr milliseconds kBetweenImages{100};
-constexpr milliseconds kFarewell{500};  // for viewers to learn of the session's end
-constexpr int kNiceness = 5;            // beside the estimator's threads
-
-}  // namespace
-
-LivePage::LivePage(const Options& options, SessionRequests* requests,
-                   std::function<double()> line_age_ms)
-    : requests_(requests),
-      line_age_ms_(std::move(line_age_ms)),
-      epoch_(std::to_string(monotonic_now().ns())),
-      server_(
-          options.address, options.policy, page_html(),
-          [this](HttpRoute route, const HttpRequest& request) { return handle(route, request); }),
-      thread_([this] {
-        try {
-          work();
-        } catch (const std::exception& e) {  // no memory: viewers lose the page, not the session
-          fmt::print(stderr, "vergence: the live page has ended ({}); the run continues\n",
-                     e.what());
-        }
-      }) {}
-
-LivePage::~LivePage() {
-  stop_.store(true, std::memory_order_release);
-  thread_.join();
-}
-
-// ---- the session's threads
-
-void LivePage::on_start(const SessionStart& start) noexcept {
-  start_ = start;
-  started_.store(true, std::memory_order_release);
-}
-
-void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
-  if (!images_.copying()) return;
-  points_.clear();
-  if (!tracks.empty() && tracks.frame(tracks.size() - 1).number == images_.frame())
-    for (const calibration::LoggedObservation& o : tracks.frame(tracks.size() - 1).observations) {
-      if (!o.by(0)) continue;
-      LivePoint point{{o.raw[0].x(), o.raw[0].y()}, {}, o.by(1)};
-      if (point.both) point.right = {o.raw[1].x(), o.raw[1].y()};
-      if (!points_.push(point)) break;
-    }
-  images_.finish();
-}
-
-void LivePage::on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
-  push(&alignments_, {alignment, origin});
-}
-
-void LivePage::on_pose(const FrameReport& report) noexcept { push(&poses_, report); }
-void LivePage::on_report(const FrameReport& report) noexcept { push(&reports_, report); }
-void LivePage::on_event(const EventRecord& event) noexcept { push(&events_, event); }
-void LivePage::on_calibration(const CalibrationRecord& calibration) noexcept {
-  push(&calibrations_, calibration);
-}
-
-std::vector<std::pair<std::string, std::uint64_t>> LivePage::counters() {
-  ended_.store(true, std::memory_order_release);
-  return {{"page_updates", counts_.updates.load(std::memory_order_relaxed)},
-          {"page_dropped", counts_.dropped.load(std::memory_order_relaxed)}};
-}
-
-// ---- the page's thread
-
-void LivePage::work() {
-  (void)pthread_setname_np(pthread_self(), "vergence-page");
-  // On Linux a thread has a niceness of its own.
-  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
-  while (!stop_.load(std::memory_order_acquire)) {
-    server_.step(milliseconds(100));
-    drain();
-  }
-  const Clock::time_point end = Clock::now() + kFarewell;
-  if (asked_ + kFarewell > Clock::now())
-    while (Clock::now() < end) server_.step(milliseconds(20));
-}
-
-void LivePage::drain() {
-  if (!begun_ && started_.load(std::memory_order_acquire)) {
-    state_.begin(start_);
-    begun_ = true;
-  }
-  // Before the rings: what is in them by then is all of the drive.
-  const bool ended = ended_.load(std::memory_order_acquire);
-  for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
-  for (PublishedEnuAlignment alignment; alignments_.pop(&alignment);) state_.add(alignment);
-  for (FrameReport pose; poses_.pop(&pose);) state_.add_pose(pose);
-  for (FrameReport report; reports_.pop(&report);) state_.add_report(report);
-  for (EventRecord event; events_.pop(&event);) state_.add(event);
-  if (ended) state_.end();
-}
-
-std::string LivePage::handle(HttpRoute route, const HttpRequest& request) {
-  constexpr auto kOrder = std::memory_order_relaxed;
-  if (route == HttpRoute::state) return state_since(request);
-  if (route == HttpRoute::recalibrate) requests_->recalibrate.store(true, kOrder);
-  if (route == HttpRoute::mark) requests_->mark.store(true, kOrder);
-  if (route == HttpRoute::stop_recording) requests_->stop_recording.store(true, kOrder);
-  return "";
-}
-
-std::string LivePage::state_since(const HttpRequest& request) {
-  asked_ = Clock::now();
-  drain();
-  if (!begun_) return "";  // the simulated world takes its time; viewers wait for the session
-  counts_.updates.fetch_add(1, std::memory_order_relaxed);
-  const bool known = request.epoch == epoch_;
-  std::uint64_t version = 0;
-  if (known)
-    (void)std::from_chars(request.after.data(), request.after.data() + request.after.size(),
-                          version);
-  nlohmann::json out = state_.since(version, monotonic_now(), line_age_ms_());
-  out["epoch"] = epoch_;
-  if (images_.ready()) {
-    newest_images_ = images_json();
-    newest_image_ = std::to_string(images_.frame());
-    images_.done();
-  }
-  if (!newest_image_.empty() && !(known && request.image == newest_image_))
-    out["images"] = newest_images_;
-  if (asked_ >= wanted_ + kBetweenImages) {
-    wanted_ = asked_;
-    images_.want(start_.image_bytes);
-  }
-  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-nlohmann::json LivePage::images_json() const {
-  nlohmann::json out{{"frame", images_.frame()}, {"images", nlohmann::json::array()}};
-  for (std::size_t k = 0; k < FrameImages::kImages; ++k) {
-    const ImageView image = images_.image(k);
-    out["images"].push_back(
-        {{"width", image.width}, {"height", image.height}, {"jpeg", base64(thumbnail(image))}});
-  }
-  auto& points = out["points"] = nlohmann::json::array();
-  // Tenths of pixels, as integers: half the bytes.
-  const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
-  for (const LivePoint& p : points_) {
-    nlohmann::json point{tenths(p.left[0]), tenths(p.left[1])};
-    if (p.both) {
-      point.push_back(tenths(p.right[0]));
-      point.push_back(tenths(p.right[1]));
-    }
-    points.push_back(std::move(point));
-  }
-  return out;
-}
-
 std::string_view page_html() {
   static const std::string page =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
@@ -216,6 +71,227 @@ std::string_view page_html() {
       report::palette() + kPageCss + "</style></head>" + kPageBody + "<script>" + kPageScript +
       "</script></html>\n";
   return page;
+}
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kBetweenImages{100};
+constexpr milliseconds kFarewell{500};  // for viewers to learn of the session's end
+constexpr int kNiceness = 5;            // beside the estimator's threads
+
+/// A point that the left camera followed, raw pixels, and where the right one saw it.
+struct LivePoint {
+  std::array<float, 2> left{}, right{};
+  bool both = false;
+};
+
+/// A report before its comparison with the INS.
+struct Posed {
+  FrameReport report{};
+};
+
+/// `publish.http`: the live page (docs/live_interface.md).
+///
+/// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
+///          picture, copies two images; no lock, no system call. Everything else: a thread
+///          of its own, made by the constructor, that yields to the estimator's where a core is
+///          short.
+/// Memory   Rings fixed; the images' memory with the first viewer. Ring full: frames are left out,
+///          totals stay true.
+/// Errors   The constructor throws InputError (HttpServer), std::system_error.
+class LivePage final : public SessionObserver {
+ public:
+  /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
+  LivePage(const LivePageOptions& options, SessionRequests* requests,
+           std::function<double()> line_age_ms)
+      : requests_(requests),
+        line_age_ms_(std::move(line_age_ms)),
+        epoch_(std::to_string(monotonic_now().ns())),
+        server_(
+            options.address, options.policy, page_html(),
+            [this](HttpRoute route, const HttpRequest& request) { return handle(route, request); }),
+        thread_([this] {
+          try {
+            work();
+          } catch (const std::exception& e) {  // no memory: viewers lose the page, not the session
+            fmt::print(stderr, "vergence: the live page has ended ({}); the run continues\n",
+                       e.what());
+          }
+        }) {}
+
+  ~LivePage() override {
+    stop_.store(true, std::memory_order_release);
+    thread_.join();
+  }
+
+  LivePage(const LivePage&) = delete;
+  LivePage& operator=(const LivePage&) = delete;
+
+  void on_start(const SessionStart& start) noexcept override {
+    start_ = start;
+    started_.store(true, std::memory_order_release);
+  }
+
+  void on_frame(const RigFrame& frame) noexcept override { (void)images_.copy(frame); }
+  void on_tracks(const calibration::TrackLog& tracks) noexcept override {
+    if (!images_.copying()) return;
+    points_.clear();
+    if (!tracks.empty() && tracks.frame(tracks.size() - 1).number == images_.frame())
+      for (const calibration::LoggedObservation& o : tracks.frame(tracks.size() - 1).observations) {
+        if (!o.by(0)) continue;
+        LivePoint point{{o.raw[0].x(), o.raw[0].y()}, {}, o.by(1)};
+        if (point.both) point.right = {o.raw[1].x(), o.raw[1].y()};
+        if (!points_.push(point)) break;
+      }
+    images_.finish();
+  }
+
+  void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override {
+    push(PublishedEnuAlignment{alignment, origin});
+  }
+
+  void on_pose(const FrameReport& report) noexcept override { push(Posed{report}); }
+
+  void on_report(const FrameReport& report) noexcept override { push(report); }
+
+  void on_event(const EventRecord& event) noexcept override { push(event); }
+
+  void on_calibration(const CalibrationRecord& calibration) noexcept override { push(calibration); }
+
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override {
+    ended_.store(true, std::memory_order_release);
+    return {{"page_updates", counts_.updates.load(std::memory_order_relaxed)},
+            {"page_dropped", counts_.dropped.load(std::memory_order_relaxed)}};
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  using Item =
+      std::variant<Posed, FrameReport, EventRecord, CalibrationRecord, PublishedEnuAlignment>;
+
+  void push(const Item& item) noexcept {
+    if (!items_.push(item)) counts_.dropped.fetch_add(1, std::memory_order_relaxed);
+  }
+  void add(const Posed& posed) { state_.add_pose(posed.report); }
+  void add(const FrameReport& report) { state_.add_report(report); }
+  template <class Record>
+  void add(const Record& record) {
+    state_.add(record);
+  }
+  void work() {
+    (void)pthread_setname_np(pthread_self(), "vergence-page");
+    // On Linux a thread has a niceness of its own.
+    (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
+    while (!stop_.load(std::memory_order_acquire)) {
+      server_.step(milliseconds(100));
+      drain();
+    }
+    const Clock::time_point end = Clock::now() + kFarewell;
+    if (asked_ + kFarewell > Clock::now())
+      while (Clock::now() < end) server_.step(milliseconds(20));
+  }
+
+  void drain() {
+    if (!begun_ && started_.load(std::memory_order_acquire)) {
+      state_.begin(start_);
+      begun_ = true;
+    }
+    // Before the rings: what is in them by then is all of the drive.
+    const bool ended = ended_.load(std::memory_order_acquire);
+    for (Item item; items_.pop(&item);)
+      std::visit([this](const auto& record) { add(record); }, item);
+    if (ended) state_.end();
+  }
+
+  [[nodiscard]] std::string handle(HttpRoute route, const HttpRequest& request) {
+    constexpr auto kOrder = std::memory_order_relaxed;
+    if (route == HttpRoute::state) return state_since(request);
+    if (route == HttpRoute::recalibrate) requests_->recalibrate.store(true, kOrder);
+    if (route == HttpRoute::mark) requests_->mark.store(true, kOrder);
+    if (route == HttpRoute::stop_recording) requests_->stop_recording.store(true, kOrder);
+    return "";
+  }
+
+  [[nodiscard]] std::string state_since(const HttpRequest& request) {
+    asked_ = Clock::now();
+    drain();
+    if (!begun_) return "";  // the simulated world takes its time; viewers wait for the session
+    counts_.updates.fetch_add(1, std::memory_order_relaxed);
+    const bool known = request.epoch == epoch_;
+    std::uint64_t version = 0;
+    if (known)
+      (void)std::from_chars(request.after.data(), request.after.data() + request.after.size(),
+                            version);
+    nlohmann::json out = state_.since(version, monotonic_now(), line_age_ms_());
+    out["epoch"] = epoch_;
+    if (images_.ready()) {
+      newest_images_ = images_json();
+      newest_image_ = std::to_string(images_.frame());
+      images_.done();
+    }
+    if (!newest_image_.empty() && !(known && request.image == newest_image_))
+      out["images"] = newest_images_;
+    if (asked_ >= wanted_ + kBetweenImages) {
+      wanted_ = asked_;
+      images_.want(start_.image_bytes);
+    }
+    return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  }
+
+  [[nodiscard]] nlohmann::json images_json() const {
+    nlohmann::json out{{"frame", images_.frame()}, {"images", nlohmann::json::array()}};
+    for (std::size_t k = 0; k < FrameImages::kImages; ++k) {
+      const ImageView image = images_.image(k);
+      out["images"].push_back(
+          {{"width", image.width}, {"height", image.height}, {"jpeg", base64(thumbnail(image))}});
+    }
+    auto& points = out["points"] = nlohmann::json::array();
+    // Tenths of pixels, as integers: half the bytes.
+    const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
+    for (const LivePoint& p : points_) {
+      nlohmann::json point{tenths(p.left[0]), tenths(p.left[1])};
+      if (p.both) {
+        point.push_back(tenths(p.right[0]));
+        point.push_back(tenths(p.right[1]));
+      }
+      points.push_back(std::move(point));
+    }
+    return out;
+  }
+
+  SessionRequests* requests_;
+  std::function<double()> line_age_ms_;
+
+  // From the estimator's thread to the page's.
+  Ring<Item, 256> items_;
+  struct Counts {
+    std::atomic<std::uint64_t> updates{0}, dropped{0};
+  } counts_;
+  FrameImages images_;
+  FixedVector<LivePoint, 600> points_;  // of images_: as many as a page can show
+  std::atomic<bool> started_{false}, ended_{false}, stop_{false};
+  SessionStart start_{};  // published by started_
+
+  // Used by the page's thread only.
+  LiveState state_;
+  bool begun_ = false;
+  const std::string epoch_;  // tells a viewer that the program was started again
+  nlohmann::json newest_images_{};
+  std::string newest_image_{};            // number of their frame
+  Clock::time_point asked_{}, wanted_{};  // for the state, for images
+  HttpServer server_;
+  std::thread thread_;
+};
+
+}  // namespace
+
+std::unique_ptr<SessionObserver> make_live_page(const LivePageOptions& options,
+                                                SessionRequests* requests,
+                                                std::function<double()> line_age_ms) {
+  return std::make_unique<LivePage>(options, requests, std::move(line_age_ms));
 }
 
 }  // namespace vergence::app

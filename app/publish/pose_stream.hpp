@@ -11,58 +11,64 @@
 #include "core/comparison/enu_alignment.hpp"
 #include "drivers/ins.hpp"
 
-/// Lines of the pose stream: JSON objects, each with a `type` and followed by a line feed.
-/// docs/live_interface.md is their schema.
+/// Lines of the pose stream: JSON objects with a `type`, each followed by a line feed. Their schema
+/// is in docs/live_interface.md.
 namespace vergence::app {
 
 inline constexpr int kPoseStreamVersion = 2;
 
-/// Where the odometry's world lies on the earth.
+/// Pose of the odometry's world on the earth.
 struct PublishedEnuAlignment {
   EnuAlignment alignment{};
-  Geodetic origin{};  // of enu
+  /// Origin of enu.
+  Geodetic origin{};
 
   [[nodiscard]] EnuPose of(const Transform& T_world_left) const;
 };
 
-/// `assumed`, `verified`, `contradicted`.
+/// Name such as `assumed`, `verified` or `contradicted`.
 [[nodiscard]] const char* pairing_name(Pairing pairing) noexcept;
 
-/// `type: pose`. `age_ms`: from mid-exposure to now, where stamps are tied to this machine's clock.
-/// `dropped`: frames without a line since the start. Replaces *line, whose memory is used again.
+/// Writes `type: pose`. `age_ms` is the time from mid-exposure to now, if stamps are mapped to this
+/// machine's clock. `dropped` is the number of frames without a line since the start. Replaces
+/// *line and reuses its memory.
 void write_pose_line(const PoseSample& pose, const std::optional<EnuPose>& earth,
                      std::optional<double> age_ms, std::uint64_t dropped, std::string* line);
 
-/// `type: calibration`, of one that is in use. `names`: of the cameras.
+/// Line `type: calibration` of the calibration in use. `names` are those of the cameras.
 [[nodiscard]] std::string calibration_line(const CalibrationRecord& calibration,
                                            std::span<const std::string> names,
                                            const calibration::CalibrationOptions& options);
 
-/// `type: alignment`.
+/// Line `type: alignment`.
 [[nodiscard]] std::string alignment_line(const PublishedEnuAlignment& alignment);
 
 /// Status of odometry and devices, once per second.
 struct StreamStatus {
   struct Ins {
     FixStatus fix = FixStatus::none;
-    double silent_s = 0;  // since the last sample
+    /// Time since the last sample.
+    double silent_s = 0;
   };
 
-  std::string session{};  // name of the session folder
+  /// Name of the session directory.
+  std::string session{};
   std::optional<FrameReport> frame{};
-  double silent_s = 0;  // since the last frame
+  /// Time since the last frame.
+  double silent_s = 0;
   bool calibrated = false, verified = false, aligned = false;
-  std::uint64_t dropped = 0;  // as in a pose line
+  /// Same as in a pose line.
+  std::uint64_t dropped = 0;
   std::optional<Ins> ins{};
 };
-/// `type: status`.
+/// Line `type: status`.
 [[nodiscard]] std::string status_line(const StreamStatus& status);
 
-/// `type: image`, in front of the image's pixels, which follow row by row without padding.
+/// Line `type: image`, followed by the image's pixels, row by row without padding.
 [[nodiscard]] std::string image_line(std::uint64_t frame, Stamp stamp, int camera,
                                      std::string_view name, const ImageView& image);
 
-/// `type: response`, to the reader that sent the request.
+/// Line `type: response`, to the reader that sent the request.
 [[nodiscard]] std::string response_line(std::string_view request, bool accepted,
                                         std::string_view message);
 

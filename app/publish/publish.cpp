@@ -69,7 +69,7 @@ Publishing::Publishing(const Configuration& configuration) {
 
 void Publishing::open_page(const Configuration& configuration) {
   const PublishSettings& settings = configuration.publish;
-  LivePage::Options options;
+  LivePageOptions options;
   options.address = parse_host_port(settings.http, "publish.http");
   options.policy.host = options.address.host;
   options.policy.token_to_read = !options.address.loopback();
@@ -77,8 +77,8 @@ void Publishing::open_page(const Configuration& configuration) {
                              ? new_token()
                              : read_token(configuration.folder / settings.token_file);
   try {
-    page_ = std::make_unique<LivePage>(
-        options, &requests_, [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
+    page_ = make_live_page(options, &requests_,
+                           [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
     // Behind a # it is not part of a request, so it appears in no log.
     link_ = settings.token_file.empty()
                 ? fmt::format("http://{}/#{}", options.address.link().text(), options.policy.token)

@@ -9,17 +9,17 @@
 
 namespace vergence::app {
 
-/// `publish:` of the configuration: what others see of a running session (docs/live_interface.md).
+/// Interfaces of a running session, configured by `publish` (docs/live_interface.md).
 ///
-/// Ownership  Outlives the session that its observers are given to.
-/// Threads    One each for lines and page, begun here. Memory: theirs, taken here.
-/// Errors     Addresses that are none: InputError. What this machine refuses (a port in use, a
-///            folder that is not there): a message on stderr, and the session goes without.
+/// Must outlive the session that gets its observers. Starts one thread each for lines and page.
+/// Throws InputError for invalid addresses. If the machine refuses one (port in use, missing
+/// directory), a message goes to stderr and the session runs without it.
 class Publishing {
  public:
   explicit Publishing(const Configuration& configuration);
 
-  /// Its observers and what viewers ask for; says on stderr where the page is.
+  /// Adds its observers and viewers' requests to the session, and prints the page's address on
+  /// stderr.
   void attach(SessionOptions* session);
 
  private:
@@ -27,11 +27,11 @@ class Publishing {
 
   SessionRequests requests_;
   std::unique_ptr<LinePublisher> lines_;  // outlives the page, which shows its latency
-  std::unique_ptr<LivePage> page_;
+  std::unique_ptr<SessionObserver> page_;
   std::string link_{};  // to the page, for a person to open
 };
 
-/// `--live-page`: the live page on this machine, where the configuration names no address.
+/// Enables the live page on this machine (`--live-page`) if no address is configured.
 void page_by_default(Configuration* configuration);
 
 }  // namespace vergence::app

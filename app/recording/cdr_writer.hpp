@@ -13,9 +13,8 @@
 
 namespace vergence::app {
 
-/// Little-endian values one after the other into a caller's buffer, as MCAP requires. Once
-/// something finds no room, ok() is false and nothing more is written.
-/// Memory  None.
+/// Writes little-endian values into a caller's buffer, as MCAP requires. Once a value does not fit,
+/// ok() is false and nothing more is written. Does not allocate.
 class ByteWriter {
  public:
   explicit ByteWriter(std::span<std::uint8_t> room) noexcept : room_(room) {}
@@ -34,12 +33,12 @@ class ByteWriter {
     if (size > 0) std::memcpy(room_.data() + at_, data, size);
     at_ += size;
   }
-  /// A length of four bytes and so many bytes.
+  /// Writes a length of four bytes and the text.
   void text(std::string_view s) noexcept {
     put(static_cast<std::uint32_t>(s.size()));
     bytes(s.data(), s.size());
   }
-  /// Over a value that was put at `at`.
+  /// Overwrites a value at offset `at`.
   template <class T>
   void overwrite(std::size_t at, T value) noexcept {
     if (at + sizeof value <= at_) std::memcpy(room_.data() + at, &value, sizeof value);
@@ -54,12 +53,11 @@ class ByteWriter {
   bool ok_ = true;
 };
 
-/// A ROS 2 message as CDR (XCDR1, little endian) into a caller's buffer. Values are aligned to
-/// their size, counted from behind the four bytes of the encapsulation.
+/// Writes a ROS 2 message as CDR (XCDR1, little endian) into a caller's buffer. Values are aligned
+/// to their size, relative to the end of the four encapsulation bytes.
 ///
-/// Not Fast CDR's: that reports missing room by an exception, takes texts and sequences as
-/// containers only, and leaves what was in the padding before.
-/// Memory  None.  Errors  As ByteWriter.
+/// Replaces Fast CDR, which reports missing room by an exception, requires containers for texts and
+/// sequences, and leaves padding uninitialised. Does not allocate; errors as in ByteWriter.
 class CdrWriter {
  public:
   explicit CdrWriter(std::span<std::uint8_t> room) noexcept : out_(room) {
@@ -74,14 +72,14 @@ class CdrWriter {
     return *this;
   }
   CdrWriter& boolean(bool value) noexcept { return put(static_cast<std::uint8_t>(value)); }
-  /// Length with the 0 at the end, the text, the 0.
+  /// Writes the length including the final 0, the text and the 0.
   CdrWriter& text(std::string_view s) noexcept {
     put(static_cast<std::uint32_t>(s.size() + 1));
     out_.bytes(s.data(), s.size());
     out_.put(std::uint8_t{0});
     return *this;
   }
-  /// Items of an array of fixed length.
+  /// Writes the items of an array of fixed length.
   template <class T, std::size_t N>
   CdrWriter& items(const std::array<T, N>& values) noexcept {
     for (const T& v : values) put(v);
@@ -93,8 +91,8 @@ class CdrWriter {
     out_.bytes(bytes.data(), bytes.size());
     return *this;
   }
-  /// builtin_interfaces/Time: whole seconds downwards, so that times before 1970 are right, too.
-  /// Seconds are of 32 bits: beyond 2038 the nearest that there is.
+  /// Writes a builtin_interfaces/Time. Seconds are rounded down, so times before 1970 are correct,
+  /// and clamped to 32 bits (2038).
   CdrWriter& time(Stamp stamp) noexcept {
     constexpr std::int64_t kSecond = 1'000'000'000;
     std::int64_t seconds = stamp.ns() / kSecond, ns = stamp.ns() % kSecond;
@@ -102,7 +100,7 @@ class CdrWriter {
     put(static_cast<std::int32_t>(std::clamp<std::int64_t>(seconds, INT32_MIN, INT32_MAX)));
     return put(static_cast<std::uint32_t>(ns));
   }
-  /// std_msgs/Header.
+  /// Writes a std_msgs/Header.
   CdrWriter& header(Stamp stamp, std::string_view frame) noexcept {
     return time(stamp).text(frame);
   }
@@ -120,6 +118,7 @@ class CdrWriter {
   ByteWriter out_;
 };
 
+/// The code copies values in host byte order.
 static_assert(std::endian::native == std::endian::little, "values are copied as they are");
 
 }  // namespace vergence::app

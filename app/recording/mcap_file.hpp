@@ -14,38 +14,37 @@
 
 namespace vergence::app {
 
-/// File-system interface of a recording; tests put a full, missing or slow disk in its
-/// place.
-///
-/// Not thread-safe. Does not allocate. Errors  Negative errno values; nothing throws.
+/// File-system interface of a recording; tests simulate a full, missing or slow disk. Not
+/// thread-safe. Does not allocate. Returns negative errno values on errors.
 class Disk {
  public:
   virtual ~Disk() = default;
-  /// A new, empty file for writing; one of that name is refused (EEXIST). → descriptor
+  /// Creates an empty file for writing; an existing one is refused (EEXIST). Returns the
+  /// descriptor.
   [[nodiscard]] virtual int create(const char* path) noexcept = 0;
-  /// Some of the pieces at `offset` of the file. → bytes written, more than 0
+  /// Writes pieces at `offset`. Returns the number of bytes written, more than 0.
   [[nodiscard]] virtual std::int64_t write(int fd, const iovec* pieces, int count,
                                            std::uint64_t offset) noexcept = 0;
   [[nodiscard]] virtual int truncate(int fd, std::uint64_t size) noexcept = 0;
-  /// Bytes of the file begin their way to the disk.
+  /// Starts writing the bytes to the disk.
   virtual void start_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept = 0;
-  /// Waits until bytes are with the disk, and lets the system drop them from its cache: pages that
-  /// are not read do not evict pages in use, and never more wait than the disk can absorb. The
-  /// system tells a descriptor of a failed writeback once: synchronise() does not repeat it. → 0
+  /// Waits for writeback and then drops the pages from the page cache, so that recording neither
+  /// evicts other data nor accumulates more dirty pages than the disk can absorb. The kernel
+  /// reports a writeback error only once per descriptor, so synchronise() does not repeat it.
+  /// Returns 0 or -errno.
   [[nodiscard]] virtual int finish_writeback(int fd, std::uint64_t offset,
                                              std::uint64_t size) noexcept = 0;
-  /// Contents and length are on the disk.
+  /// Waits until contents and length are on the disk.
   [[nodiscard]] virtual int synchronise(int fd) noexcept = 0;
   virtual void close(int fd) noexcept = 0;
   [[nodiscard]] virtual int rename(const char* from, const char* to) noexcept = 0;
   virtual void remove(const char* path) noexcept = 0;
 };
 
-/// The system's.
+/// Disk of the system.
 [[nodiscard]] Disk& system_disk() noexcept;
 
-/// Type of messages: a Schema and a Channel record, the ids of both its place in the list
-/// plus 1.
+/// Topic of messages: a Schema and a Channel record, both with the index in the list plus 1 as id.
 struct McapTopic {
   std::string topic;
   /// Such as sensor_msgs/msg/Image.
@@ -56,75 +55,80 @@ struct McapTopic {
   std::string qos;
 };
 
-/// The head of a Message record, as it stands in a queue and in a chunk.
+/// Head of a Message record in a queue and in a chunk.
 struct McapMessageHead {
-  static constexpr std::size_t kSize = 31;  // opcode u8, length u64, channel u16, sequence u32, log
-                                            // and publish time u64; the content follows
+  /// Bytes of opcode u8, length u64, channel u16, sequence u32, log and publish time u64; the
+  /// content follows.
+  static constexpr std::size_t kSize = 31;
   std::uint16_t channel = 0;
   std::uint32_t sequence = 0;
-  std::uint64_t log_time = 0;  // ns
-  std::uint64_t content = 0;   // bytes
+  /// In ns.
+  std::uint64_t log_time = 0;
+  /// Size of the content in bytes.
+  std::uint64_t content = 0;
 
   void write(std::span<std::uint8_t, kSize> out) const noexcept;
-  /// Reads the head of a record that write() began.
+  /// Reads the head that write() wrote.
   [[nodiscard]] static McapMessageHead read(std::span<const std::uint8_t, kSize> in) noexcept;
   [[nodiscard]] std::size_t record_size() const noexcept {
     return kSize + static_cast<std::size_t>(content);
   }
 };
 
-/// One MCAP file (mcap.dev, version 0, profile ros2) that grows by whole chunks: schemas and
-/// channels first, chunks that are not packed with their check sum and index, a summary at the end.
+/// MCAP file (mcap.dev, version 0, profile ros2) that grows by complete chunks: schemas and
+/// channels first, uncompressed chunks with checksum and index, a summary at the end.
 ///
 ///     McapFile file(disk, topics, "vergence");
 ///     if (const int error = file.create("drive.mcap")) return;  // -ENOSPC …
 ///     McapMessageHead head{.channel = 1, .log_time = 1700000000000000000, .content = body.size()};
 ///     head.write(std::span(record).first<McapMessageHead::kSize>());
-///     if (file.write_chunk(parts) == 0) use(file.size());  // good up to here, whatever happens
+///     if (file.write_chunk(parts) == 0) use(file.size());  // valid up to here, whatever happens
 ///     if (file.finish() != 0) return;
 ///
-/// A chunk is one write, at an offset that only moves when all of it was taken; what a failed write
-/// left behind is cut off and written over. So the file is always good up to the last chunk, also
-/// without its end.
-/// Not thread-safe. Memory  Some 180 bytes for each of kMaxChunks, at construction; none after.
-/// Errors   Negative errno values.
+/// A chunk is one write. The offset advances only after a complete write; the rest of a failed one
+/// is cut off and overwritten. So the file is always valid up to the last chunk, also without a
+/// summary. Allocates some 180 bytes per chunk (kMaxChunks) at construction only. Not thread-safe.
+/// Returns negative errno values.
 class McapFile {
  public:
-  static constexpr std::size_t kMaxChunks = 65536;  // in a file: 109 minutes of 100 ms
+  /// Chunks per file: 109 minutes of 100 ms.
+  static constexpr std::size_t kMaxChunks = 65536;
   static constexpr std::size_t kMaxChannels = 32;
-  static constexpr std::size_t kMaxMessages = 4096;  // in a chunk
+  /// Messages per chunk.
+  static constexpr std::size_t kMaxMessages = 4096;
   static constexpr std::size_t kMaxParts = 8;
 
-  /// Precondition: at most kMaxChannels. Topics and disk outlive it.
+  /// Precondition: at most kMaxChannels. Topics and disk must outlive it.
   McapFile(Disk& disk, std::span<const McapTopic> topics, std::string library);
   ~McapFile();
   McapFile(const McapFile&) = delete;
   McapFile& operator=(const McapFile&) = delete;
 
-  /// A new file with its head. Precondition: none is open. → 0
+  /// Creates a new file with its head. Precondition: none is open. Returns 0 on success.
   [[nodiscard]] int create(const char* path) noexcept;
-  /// Message records, of at most kMaxMessages, in pieces that are whole records. Precondition:
-  /// open, not full(). → 0, and then all of it is with the system
+  /// Writes at most kMaxMessages records, in pieces of complete records. Precondition: open, not
+  /// full(). Returns 0 once the system has all data.
   [[nodiscard]] int write_chunk(std::span<const std::span<const std::uint8_t>> parts) noexcept;
-  /// Index and summary; the file is closed whatever comes of them. → 0, and then the disk has all
-  /// but what pop_unwritten() names
+  /// Writes index and summary, and closes the file in any case. Returns 0 if the disk has
+  /// everything except what pop_unwritten() reports.
   [[nodiscard]] int finish() noexcept;
-  /// Closed as it is: without an end.
+  /// Closes the file without a summary.
   void abandon() noexcept;
 
   [[nodiscard]] bool open() const noexcept { return fd_ >= 0; }
-  /// The index has no room for another chunk.
+  /// True if the index has no room for another chunk.
   [[nodiscard]] bool full() const noexcept { return chunks_.size() == kMaxChunks; }
-  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }  // bytes that are good
+  /// Number of valid bytes.
+  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }
 
-  /// Data accepted by the system and then not written to the disk.
+  /// Data accepted by the system but not written to the disk.
   struct Unwritten {
     /// First negative errno; 0: nothing is missing.
     int error = 0;
     /// Messages of the chunks that the failure may have affected.
     std::uint64_t messages = 0;
   };
-  /// Since the last call, of files that are closed meanwhile, too.
+  /// Failures since the last call, including those of closed files.
   [[nodiscard]] Unwritten pop_unwritten() noexcept { return std::exchange(unwritten_, {}); }
 
  private:
@@ -134,11 +138,12 @@ class McapFile {
     std::uint64_t log_time = 0, offset = 0;
   };
   struct ChunkIndex {
-    std::uint64_t start = 0, end = 0;  // ns
+    // In ns.
+    std::uint64_t start = 0, end = 0;
     std::uint64_t offset = 0, length = 0, records = 0;
     std::uint32_t index_length = 0;
-    std::array<std::uint32_t, kMaxChannels> index{};  // of each channel's MessageIndex, from the
-                                                      // chunk's end; kNone
+    // Position of each channel's MessageIndex relative to the chunk's end; kNone if there is none.
+    std::array<std::uint32_t, kMaxChannels> index{};
   };
   class Appender;
 
@@ -157,12 +162,16 @@ class McapFile {
   std::string library_;
   int fd_ = -1;
   std::uint64_t end_ = 0, first_ = 0, last_ = 0;
-  std::uint64_t writeback_ = 0;  // offset up to which finish_writeback() was asked for
-  std::uint64_t waiting_ = 0;    // messages behind it
+  // Offset up to which finish_writeback() was called.
+  std::uint64_t writeback_ = 0;
+  // Number of messages behind that offset.
+  std::uint64_t waiting_ = 0;
   Unwritten unwritten_{};
-  std::vector<Entry> entries_;  // of the chunk at hand
+  // Entries of the current chunk.
+  std::vector<Entry> entries_;
   std::vector<ChunkIndex> chunks_;
-  std::array<std::uint64_t, kMaxChannels> counts_{};  // messages of each channel
+  // Number of messages by channel.
+  std::array<std::uint64_t, kMaxChannels> counts_{};
   std::vector<std::uint8_t> scratch_;
 };
 

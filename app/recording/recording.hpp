@@ -21,14 +21,15 @@
 
 namespace vergence::app {
 
-/// Bounded queue of byte records between one producer thread and one consumer thread.
+/// Bounded queue of byte records between one producer and one consumer thread.
 ///
-/// The memory is mapped twice in a row, so every record, and everything that waits, lies in one
-/// piece: the consumer writes it to a file as it is, without a copy.
-/// Threads  begin(), commit(): producer. waiting(), release(): consumer. fill(): any, a guess.
-/// Memory   All at construction, present; no heap, no lock and no system call after.
-/// Full     begin() refuses. A record may be asked to leave `spare` bytes free, so that large ones
-///          never push out small ones.
+/// The memory is mapped twice in a row, so all waiting records are contiguous and the consumer
+/// writes them without a copy.
+/// Threads  The producer calls begin() and commit(), the consumer waiting() and release(). fill()
+///          is thread-safe but approximate.
+/// Memory   Allocated and resident at construction; no heap, lock or system call afterwards.
+/// Full     begin() refuses. A record can leave `spare` bytes free, so that large ones do not
+///          displace small ones.
 /// Errors   The constructor throws std::system_error.
 class RecordRing {
  public:
@@ -38,15 +39,15 @@ class RecordRing {
   RecordRing(const RecordRing&) = delete;
   RecordRing& operator=(const RecordRing&) = delete;
 
-  /// Where a record of `size` bytes is to be written; empty: there is no room. Gone with the next
-  /// begin() unless committed.
+  /// Memory for a record of `size` bytes; empty if there is no room. Invalid after the next begin()
+  /// unless committed.
   [[nodiscard]] std::span<std::uint8_t> begin(std::size_t size, std::size_t spare) noexcept;
-  /// The first `size` bytes of what begin() gave are a record.
+  /// Makes the first `size` bytes of begin() a record.
   void commit(std::size_t size) noexcept;
 
-  /// Everything committed and not yet released, oldest first.
+  /// All committed and unreleased records, oldest first.
   [[nodiscard]] std::span<const std::uint8_t> waiting() const noexcept;
-  /// The first `size` bytes of waiting() are not needed any more.
+  /// Releases the first `size` bytes of waiting().
   void release(std::size_t size) noexcept;
 
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
@@ -54,7 +55,7 @@ class RecordRing {
     return static_cast<std::size_t>(tail_.load(std::memory_order_acquire) -
                                     head_.load(std::memory_order_acquire));
   }
-  /// Most bytes that ever waited; exact for the producer.
+  /// Maximum number of waiting bytes; exact for the producer.
   [[nodiscard]] std::size_t high_water() const noexcept {
     return high_water_.load(std::memory_order_relaxed);
   }
@@ -62,15 +63,17 @@ class RecordRing {
  private:
   std::size_t capacity_ = 0;
   std::uint8_t* memory_ = nullptr;
-  // 64 bits on every machine: the place in the ring is the count modulo a capacity that is no power
-  // of two, which jumps where a count wraps.
+  // 64 bits on every machine: the position is the count modulo a capacity that is no power of two,
+  // which would jump when a count wraps.
   using Count = std::uint64_t;
   [[nodiscard]] std::uint8_t* place(Count count) const noexcept {
     return memory_ + static_cast<std::size_t>(count % capacity_);
   }
   static_assert(std::atomic<Count>::is_always_lock_free);
-  alignas(kCacheLine) std::atomic<Count> head_{0};  // bytes released since the start
-  alignas(kCacheLine) std::atomic<Count> tail_{0};  // bytes committed since the start
+  // Number of bytes released since the start.
+  alignas(kCacheLine) std::atomic<Count> head_{0};
+  // Number of bytes committed since the start.
+  alignas(kCacheLine) std::atomic<Count> tail_{0};
   std::atomic<std::size_t> high_water_{0};
 };
 
@@ -86,30 +89,32 @@ struct RecordingCounters {
   /// Messages that waited for a failing disk until the queue was full, or that the disk accepted
   /// and lost.
   std::uint64_t lost = 0;
-  /// Capacity of all queues, and the sum of the maxima that waited in each.
+  /// Capacity of all queues, and the sum of their maximum fills.
   std::size_t queue_bytes = 0, queue_high_water = 0;
 };
 
-/// Messages into MCAP files `drive.mcap` on a thread of its own: who posts never waits for a disk.
+/// Writes messages to MCAP files `drive.mcap` on its own thread, so that producers never wait for a
+/// disk.
 ///
 ///     Recording recording("sessions/monday", options);
 ///     if (const auto room = recording.begin(0, kPose, stamp, 500); !room.empty())
-///       recording.commit(0, encode(sample, room));  // bytes written; 0: none after all
+///       recording.commit(0, encode(sample, room));  // bytes written; 0 cancels
 ///     recording.close();
 ///
-/// Queues     One for each producer thread. What is posted lies there as it will lie in the file;
-///            the thread takes all that waits every 20 ms and writes it as a chunk when its oldest
-///            message has waited 40 ms. So a process that is killed loses the last 100 ms at most.
-/// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, the next
-///            is drive_1.mcap. Every file begins with all schemas, channels and the preamble.
-/// Threads    begin(), commit(): one thread a queue. pop_errors(), counters(): any, counters exact
-///            after close(). close(): the owner's, after the last commit().
-/// Memory     All at construction; the writer's thread is sealed.
-/// Full       drop: begin() refuses, counted; large messages leave room for the rest. wait: begin()
-///            waits for room (virtual time, replay).
-/// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). When
-///            a write fails the data wait in their queue while there is room and the same file is
-///            tried again every RecordingFiles::kRetry; messages by pop_errors().
+/// Queues     One per producer thread, in the format of the file. Every 20 ms the thread looks for
+///            data, and writes a chunk once the oldest message is 40 ms old. A killed process thus
+///            loses at most the last 100 ms.
+/// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, followed
+///            by drive_1.mcap. Every file begins with all schemas, channels and the preamble.
+/// Threads    One thread per queue calls begin() and commit(), the owner close() after the last
+///            commit(). pop_errors() and counters() are thread-safe; counters are exact after
+///            close().
+/// Memory     Allocated at construction; the writer's thread is sealed.
+/// Full       drop: begin() refuses and counts; large messages leave room for small ones. wait:
+///            begin() waits for room (virtual time, replay).
+/// Errors     The constructor throws InputError (directory, disk) and std::system_error (memory).
+///            After a failed write the data wait in their queue while there is room, and the file
+///            is retried every RecordingFiles::kRetry; pop_errors() has the messages.
 class Recording {
  public:
   struct Options {
@@ -121,49 +126,52 @@ class Recording {
     WhenFull when_full = WhenFull::drop;
   };
 
-  /// `folder` exists.
+  /// `folder` must exist.
   Recording(const std::filesystem::path& folder, const Options& options);
   ~Recording();
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  /// Where a message of at most `most` bytes is to be written; empty: dropped and counted. `bulky`:
-  /// an image, which leaves room for a thousand small messages.
+  /// Memory for a message of at most `most` bytes; empty if it is dropped, which is counted.
+  /// `bulky` marks an image, which leaves room for a thousand small messages.
   [[nodiscard]] std::span<std::uint8_t> begin(std::size_t queue, std::size_t topic, Stamp stamp,
                                               std::size_t most, bool bulky = false) noexcept;
-  /// The first `size` bytes of what begin() gave are the message. 0: there is none after all.
+  /// Makes the first `size` bytes of begin() the message; 0 cancels it.
   void commit(std::size_t queue, std::size_t size) noexcept;
 
-  /// Sentences about the disk since the last call.
+  /// Messages about the disk since the last call.
   [[nodiscard]] std::vector<std::string> pop_errors() { return files_.pop_errors(); }
   [[nodiscard]] RecordingCounters counters() const noexcept;
-  /// Writes what waits, ends the file. Once.
+  /// Writes the remaining messages and ends the file. Call once.
   void close() noexcept;
 
  private:
-  /// A producer's: only its thread touches what is no ring.
+  /// Queue of a producer; only its thread uses members other than the ring.
   struct Queue {
     explicit Queue(std::size_t bytes) : ring(bytes) {}
     RecordRing ring;
     McapMessageHead head{};
-    std::span<std::uint8_t> open{};  // head and content
+    // Head and content.
+    std::span<std::uint8_t> open{};
   };
   /// Pending messages, up to the size of a chunk.
   struct Batch {
     std::array<std::span<const std::uint8_t>, McapFile::kMaxParts> parts{};
     std::size_t messages = 0, bytes = 0;
-    std::uint64_t first = 0;  // time of the first one, ns
-    bool filled = false;      // there is more than a chunk takes
+    // Time of the first message, in ns.
+    std::uint64_t first = 0;
+    // True if there is more than a chunk holds.
+    bool filled = false;
   };
 
-  /// RecordingCounters as they grow.
+  /// Live values of RecordingCounters.
   struct Counts {
     std::atomic<std::uint64_t> messages{0}, bytes{0}, chunks{0};
     std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0};
   };
 
   void work() noexcept;
-  /// at_once: however young what waits is. last: what cannot be stored now is lost.
+  /// With `at_once` even new data are written. With `last` data that cannot be stored are lost.
   void drain(bool at_once, bool last) noexcept;
   [[nodiscard]] Batch gather() const noexcept;
   [[nodiscard]] bool due(const Batch& batch) noexcept;
@@ -173,13 +181,16 @@ class Recording {
   [[nodiscard]] bool store(const Batch& batch) noexcept;
 
   const Options options_;
-  std::vector<std::uint32_t> sequences_;  // by topic; of its producer
+  // Sequence numbers by topic, used by its producer.
+  std::vector<std::uint32_t> sequences_;
   std::vector<std::unique_ptr<Queue>> queues_;
   RecordingFiles files_;
-  std::int64_t waiting_since_ns_ = 0;  // monotonic; of the writer's thread
+  // Monotonic time, used by the writer's thread.
+  std::int64_t waiting_since_ns_ = 0;
 
   Counts counts_;
-  std::mutex mutex_;  // with stop_ and hurry_, for the writer that sleeps
+  // Guards stop_ and hurry_ while the writer sleeps.
+  std::mutex mutex_;
   std::condition_variable wake_;
   bool stop_ = false, hurry_ = false;
   WakeEvent freed_;

@@ -14,60 +14,62 @@
 
 namespace vergence::app {
 
-/// One topic of a recording. Its number is its place in the list.
+/// Topic of a recording. Its number is its index in the list.
 struct RecordedTopic {
   std::string name;
   RosType type = RosType::text;
-  /// Late subscribers receive the last message (tf_static).
+  /// If true, late subscribers receive the last message (tf_static).
   bool latched = false;
 };
 
-/// A message at the beginning of every file.
+/// Message at the beginning of every file.
 struct RecordingPreamble {
   std::size_t topic = 0;
-  std::vector<std::uint8_t> message{};  // CDR
+  /// Encoded as CDR.
+  std::vector<std::uint8_t> message{};
 };
 
-/// The files of a recording, one after the other, and how their disk is: `drive.mcap`, or once
-/// there is a second one `drive_0.mcap`, `drive_1.mcap`, …
+/// Files of a recording and the state of their disk: `drive.mcap`, or from the second file on
+/// `drive_0.mcap`, `drive_1.mcap`, …
 ///
-/// Threads  append(), roll(), finish(), resting(): the writer's. Sentences and counters: any.
-/// Memory   All at construction.
-/// Errors   A write that fails is tried again in the same file with the same data, every
-///          kRetry: see resting(). Messages for the user: pop_errors().
+/// Threads  The writer calls append(), roll(), finish() and resting(). Messages and counters are
+///          thread-safe.
+/// Memory   Allocated at construction.
+/// Errors   A failed write is retried in the same file with the same data every kRetry; see
+///          resting(). pop_errors() has the messages for the user.
 class RecordingFiles {
  public:
   static constexpr Duration kRetry = Duration::seconds(3);
   struct Options {
     std::vector<RecordedTopic> topics;
     std::vector<RecordingPreamble> preamble{};
-    /// A file is ended at this size; 0: never.
+    /// A file is ended at this size; 0 disables this.
     std::uint64_t roll_bytes = 0;
-    /// Null: the disk of the system.
+    /// Null selects the disk of the system.
     Disk* disk = nullptr;
   };
   using Parts = std::span<const std::span<const std::uint8_t>>;
 
-  /// `folder` exists. Throws InputError: no file can be made there.
+  /// `folder` must exist. Throws InputError if no file can be made there.
   RecordingFiles(const std::filesystem::path& folder, const Options& options);
 
-  /// As McapFile::write_chunk(), in a new file where none is open. `first`: time of its first
-  /// message, ns; `lost`: messages, so far, because of the disk. → bytes that the file grew by; 0:
-  /// failed
+  /// Same as McapFile::write_chunk(), in a new file if none is open. `first` is the time of the
+  /// first message in ns, `lost` the number of messages lost so far because of the disk. Returns
+  /// the growth of the file in bytes; 0 on failure.
   [[nodiscard]] std::uint64_t append(Parts parts, std::uint64_t first, std::uint64_t lost) noexcept;
-  /// Ends the file where it is full; the next append() begins another.
+  /// Ends a full file; the next append() begins another.
   void roll() noexcept;
-  /// Ends the last one. `time`: of a preamble that nothing followed, ns.
+  /// Ends the last file. `time` is that of a preamble without messages, in ns.
   void finish(std::uint64_t time) noexcept;
-  /// The disk failed a moment ago, and is not to be asked again yet.
+  /// True shortly after a failure, when the disk should not be used yet.
   [[nodiscard]] bool resting() const noexcept;
 
-  /// Sentences about the disk since the last call.
+  /// Messages about the disk since the last call.
   [[nodiscard]] std::vector<std::string> pop_errors();
   [[nodiscard]] std::uint64_t files() const noexcept {
     return files_.load(std::memory_order_relaxed);
   }
-  /// Messages that append() had taken and the disk then did not.
+  /// Number of messages accepted by append() but not written to the disk.
   [[nodiscard]] std::uint64_t unwritten() const noexcept {
     return unwritten_.load(std::memory_order_relaxed);
   }
@@ -75,12 +77,14 @@ class RecordingFiles {
  private:
   struct Notice {
     enum class Kind : std::uint8_t { good_again, failed, unfinished, unwritten } kind{};
-    int error = 0;           // errno
-    std::uint64_t lost = 0;  // messages, so far
+    // Value of errno.
+    int error = 0;
+    // Number of lost messages so far.
+    std::uint64_t lost = 0;
     int file = 0;
   };
 
-  /// → errno; 0: open
+  /// Opens a file. Returns 0 or errno.
   [[nodiscard]] int open() noexcept;
   [[nodiscard]] int write_preamble(std::uint64_t time) noexcept;
   void fail(int error) noexcept;
@@ -93,21 +97,30 @@ class RecordingFiles {
   const std::string folder_;
   const std::uint64_t roll_bytes_;
   const std::vector<McapTopic> topics_;
-  std::vector<std::uint8_t> preamble_;  // Message records
+  // Contains Message records.
+  std::vector<std::uint8_t> preamble_;
   Disk& disk_;
   McapFile file_;
 
   // Used by the writer's thread only.
-  int number_ = 0;             // of the file at hand
-  bool several_ = false;       // files have numbers
-  bool preamble_due_ = false;  // of the file at hand
-  bool failing_ = false;       // the last write failed
-  std::int64_t retry_ns_ = 0;  // monotonic
+
+  // Number of the current file.
+  int number_ = 0;
+  // True if file names are numbered.
+  bool several_ = false;
+  // True if the current file lacks its preamble.
+  bool preamble_due_ = false;
+  // True if the last write failed.
+  bool failing_ = false;
+  // Monotonic time of the next attempt.
+  std::int64_t retry_ns_ = 0;
   std::vector<char> path_, other_path_;
 
   std::atomic<std::uint64_t> files_{0}, unwritten_{0};
-  Ring<Notice, 64> notices_;  // writer to pop_errors()
-  std::mutex errors_mutex_;   // of those who take
+  // Passed from the writer to pop_errors().
+  Ring<Notice, 64> notices_;
+  // Guards concurrent calls of pop_errors().
+  std::mutex errors_mutex_;
 };
 
 }  // namespace vergence::app

@@ -7,26 +7,34 @@
 
 namespace vergence::app {
 
-/// Session data that a replay needs before its first frame: at the beginning of every file
-/// of a recording, JSON in a std_msgs/String.
+/// Session data that a replay needs before its first frame: JSON in a std_msgs/String at the
+/// beginning of every file of a recording.
 struct SessionDescription {
   static constexpr int kVersion = 1;
   static constexpr const char* kTopic = "/vergence/session";
 
-  std::string program{};      // version of the program that recorded
-  std::string calibration{};  // calibration.yaml of what the drive began with
-  std::string nominal{};      // the same of what its gates compare with
+  /// Version of the recording program.
+  std::string program{};
+  /// Content of calibration.yaml at the start of the run.
+  std::string calibration{};
+  /// Calibration that the plausibility gates compare with, in the same format.
+  std::string nominal{};
   CalibrationTrust trust = CalibrationTrust::given;
-  std::string cause{}, source{};  // as StartingCalibration has them
+  /// As in StartingCalibration.
+  std::string cause{}, source{};
   Adoption adoption = Adoption::after_fixed_frames;
-  bool ins = false;                     // readings are compared
-  std::string mount_source{};           // where the mount of the INS is from
-  std::vector<std::string> settings{};  // KEY=VALUE where they are not the defaults
-  std::vector<std::string> cameras{};   // topics of their images
+  /// True if INS samples are compared.
+  bool ins = false;
+  /// Origin of the INS extrinsics.
+  std::string mount_source{};
+  /// Settings that differ from the defaults, as KEY=VALUE.
+  std::vector<std::string> settings{};
+  /// Image topics by camera.
+  std::vector<std::string> cameras{};
 };
 
 [[nodiscard]] std::string to_json(const SessionDescription& description);
-/// InputError, beginning with `name`: it is none, or of another version.
+/// Throws InputError, beginning with `name`, for invalid content or another version.
 [[nodiscard]] SessionDescription parse_session_description(std::string_view json,
                                                            const std::string& name);
 

@@ -91,19 +91,16 @@ void count_frames(const Session& s, Analysis* a) {
   a->by_reason.assign(s.reasons.size(), 0);
   a->read = s.frames.size();
   for (const Frame& f : s.frames) {
-    if (!f.status)
-      ++a->unknown;
-    else
-      ++(*f.status == PoseStatus::ok         ? a->ok
-         : *f.status == PoseStatus::degraded ? a->degraded
-                                             : a->lost);
-    if (f.status && *f.status != PoseStatus::ok) ++a->by_reason[f.reason];
+    ++(f.status == PoseStatus::ok         ? a->ok
+       : f.status == PoseStatus::degraded ? a->degraded
+                                          : a->lost);
+    if (f.status != PoseStatus::ok) ++a->by_reason[f.reason];
   }
   a->skipped = s.summary.is_object()
                    ? static_cast<std::size_t>(std::clamp(
                          number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12))
                    : missing_frames(s, *a);
-  if (a->read > a->unknown)
+  if (a->read > 0)
     a->ok_share = static_cast<double>(a->ok) / static_cast<double>(a->read + a->skipped);
 }
 

@@ -18,13 +18,13 @@ enum class ErrorSource : std::uint8_t {
   reference,
 };
 
-/// Curves and counts of a session, one value a frame; kNone where there is none.
+/// Curves and counts of a session, one value per frame; kNone if there is none.
 struct Analysis {
   /// Time since the first frame.
   std::vector<double> time_s;
   /// Distance travelled up to the frame.
   std::vector<double> distance_m;
-  /// Frames are missing before this one: no line may be drawn across.
+  /// Not 0 if frames are missing before this one, so that no line is drawn across.
   std::vector<std::uint8_t> breaks;
   /// Median interval between frames; 0 with fewer than two frames.
   double interval_s = 0;
@@ -33,7 +33,7 @@ struct Analysis {
   ErrorSource source = ErrorSource::none;
   /// Describes the reference and its alignment.
   std::string source_message;
-  /// There was an INS, and the trajectory was never aligned with it.
+  /// True if there was an INS, but the trajectory was never aligned with it.
   bool ins_unplaced = false;
   std::vector<double> horizontal_m, vertical_m, heading_deg;
   struct Spread {
@@ -43,20 +43,21 @@ struct Analysis {
 
   /// Times of the ENU alignments.
   std::vector<double> placed_s;
-  /// This frame is the first one with another alignment.
+  /// Not 0 for the first frame with another alignment.
   std::vector<std::uint8_t> placed_anew;
-  /// The map has east to the right and north up.
+  /// True if the map's axes are east and north.
   bool map_is_enu = false;
-  std::vector<double> ours_x, ours_y, theirs_x, theirs_y;  // m
+  /// In m.
+  std::vector<double> ours_x, ours_y, theirs_x, theirs_y;
 
   /// Numbers of frames.
-  std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0;
+  std::size_t read = 0, ok = 0, degraded = 0, lost = 0;
   /// Skipped frames; without a summary, those missing by their numbers.
   std::size_t skipped = 0;
   /// Frames that were not ok, by Session::reasons.
   std::vector<std::size_t> by_reason;
-  // Degraded frames, also counted in by_reason, whose only fault was that the run had not yet
-  // found or confirmed its calibration. A drive is not judged by that wait.
+  // Degraded frames, also counted in by_reason, whose only problem was a calibration not yet found
+  // or verified. They do not affect the assessment.
   std::size_t waited = 0;
   std::vector<std::size_t> waited_by_reason;
   /// Time of the first verification of the calibration in use, since the first frame.
@@ -74,8 +75,7 @@ struct Analysis {
   std::optional<double> scale, ate_m, rotation_deg_per_m, end_error;
 };
 
-/// Seconds from one stamp to a later one; exact to the nanosecond for drives of days, whatever the
-/// stamps.
+/// Seconds from one stamp to a later one, exact to the nanosecond for days.
 [[nodiscard]] double seconds_between(Stamp from, Stamp to) noexcept;
 
 [[nodiscard]] Analysis analyse(const Session& session);

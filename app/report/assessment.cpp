@@ -118,19 +118,6 @@ std::string_view advice_for(std::string_view word) noexcept {
 
 namespace {
 
-/// Returns true if a session has a usable pose.
-enum class Use : std::uint8_t {
-  ok,          // at least one frame is ok, or statuses are not known
-  unverified,  // none is, because the drive ended before it could confirm its calibration
-  nothing,     // none is, for other reasons, or for so long
-};
-
-struct Usability {
-  Use use = Use::ok;
-  std::string reason;  // half a message with counts; empty: ok
-  std::string advice;  // what to do about the main reason; may be empty
-};
-
 /// A drive of so many moving frames can confirm its calibration: 36 with a calibration given, 54
 /// from scratch (docs/calibration.md).
 inline constexpr std::size_t kFramesToVerify = 60;
@@ -146,75 +133,6 @@ struct Main {
   std::string_view word;
   std::size_t frames = 0;
 };
-
-/// The reason of most frames that are not ok; one that is no waiting goes before, where it is that
-/// of a quarter of them or more. Of frames that were not read, the kind of most events.
-Main main_reason(const Session& s, const Analysis& a) {
-  std::array<Main, 2> most{};  // of those that do not wait, of those that do
-  for (std::size_t i = 0; i < std::min(s.reasons.size(), a.by_reason.size()); ++i) {
-    Main& main = most[is_waiting(s.reasons[i]) ? 1 : 0];
-    if (!s.reasons[i].empty() && a.by_reason[i] > main.frames)
-      main = {s.reasons[i], a.by_reason[i]};
-  }
-  Main main = 4 * most[0].frames >= a.read      ? most[0]
-              : most[0].frames > most[1].frames ? most[0]
-                                                : most[1];
-  for (const Advice& skip : skip_advice()) {
-    const auto count = static_cast<std::size_t>(std::count_if(
-        s.events.begin(), s.events.end(), [&skip](const Event& e) { return e.kind == skip.word; }));
-    if (count > main.frames) main = {skip.word, count};
-  }
-  return main;
-}
-
-/// Frames that a calibration can be confirmed from: those that moved. A vehicle that stands tells
-/// nothing of its rig.
-std::size_t moving_frames(const Session& s, const Analysis& a) {
-  constexpr double kStep = 0.1;  // of the baseline; EuRoC's excerpt moves by 0.12 a frame
-  const double least = kStep * number_at(s.summary, "calibration.baseline_m").value_or(0);
-  if (!(least > 0)) return a.read;
-  std::size_t count = 0;
-  for (std::size_t i = 1; i < a.distance_m.size(); ++i)
-    if (a.distance_m[i] - a.distance_m[i - 1] >= least) ++count;
-  return count;
-}
-
-/// Why no calibration was taken, where the drive sought one in vain.
-std::string_view rejection(const Session& s) {
-  std::string_view why;
-  for (const CalibrationRow& row : s.calibrations) {
-    if (row.accepted) return {};
-    if (!row.kept && !row.reason.empty()) why = row.reason;
-  }
-  return why;
-}
-
-Usability assess_usability(const Session& s, const Analysis& a) {
-  if (!a.ok_share || a.ok > 0) return {};
-  std::size_t waiting = 0;
-  for (const Frame& f : s.frames)
-    if (f.status == PoseStatus::degraded && is_waiting(s.reasons[f.reason])) ++waiting;
-  const std::string_view rejected = rejection(s);
-  if (waiting > 0 && waiting == a.degraded && moving_frames(s, a) < kFramesToVerify &&
-      a.lost <= a.read / 10 && a.skipped <= a.read)
-    return {Use::unverified,
-            fmt::format("unverified: the run ended after {} frames; verifying the calibration "
-                        "takes about {} frames in motion",
-                        a.read, kFramesToVerify),
-            std::string(rejected)};
-  const Main main = main_reason(s, a);
-  const bool posed = a.degraded > 0;
-  Usability u{Use::nothing, "", std::string(advice_for(main.word))};
-  u.reason =
-      posed ? fmt::format("none of {} frames is ok", a.read + a.skipped) : "no frame has a pose";
-  if (main.frames > 0)
-    u.reason += fmt::format(": {} ({} of {} frames)", main.word, main.frames, a.read + a.skipped);
-  if (!rejected.empty()) {
-    u.reason += fmt::format("; no calibration was found: {}", rejected);
-    u.advice = "";
-  }
-  return u;
-}
 
 constexpr double kLong = 2.0;  // s: the motion across a shorter hole is carried on
 constexpr double kLag = 1.0;   // s: frames that are under way when a device goes
@@ -234,11 +152,6 @@ std::string device_name(const Event& e) {
   const bool named = e.message.starts_with(kCamera) && e.message.size() > kCamera.size() &&
                      std::isdigit(static_cast<unsigned char>(e.message[kCamera.size()])) != 0;
   return named ? e.message.substr(0, kCamera.size() + 1) : "a camera";
-}
-
-std::string since_start(const Session& s, Stamp stamp) {
-  const Stamp first = s.frames.empty() ? stamp : s.frames.front().stamp;
-  return duration_text(seconds_between(first, std::max(first, stamp)), 0.1);
 }
 
 /// By device, from the events camera_disconnected, camera_reconnected, trigger_board_disconnected
@@ -263,186 +176,11 @@ std::map<std::string, Outages> outages_of(std::span<const Event> events) {
   return all;
 }
 
-/// A device that never came back.
-void assess_open_outage(const std::string& device, Stamp from, const Session& s, Findings* j) {
-  // Frames that were left out may be later.
-  const bool last = s.left_out.empty() && (s.frames.empty() || s.frames.back().stamp <= from ||
-                                           seconds_between(from, s.frames.back().stamp) <= kLag);
-  if (s.frames.empty())
-    j->find(Grade::bad, "no frame was received: " + device + " was disconnected");
-  else if (last)
-    j->find(Grade::bad, "no frame after " + since_start(s, std::max(from, s.frames.back().stamp)) +
-                            ": " + device + " was disconnected");
-  else
-    j->find(Grade::care, device + " was disconnected from " + since_start(s, from) + " to the end");
-}
-
-/// Adds the findings about outages, with one piece of advice per device. Returns true if poses are
-/// missing within a long outage, so that the path's length is no measure of the rig.
-bool assess_outages(const std::map<std::string, Outages>& outages, const Session& s,
-                    const Analysis& a, Findings* j) {
-  const bool holes =
-      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return !f.posed; }) ||
-      std::find(a.breaks.begin(), a.breaks.end(), 1) != a.breaks.end();
-  bool broken = false;
-  for (const auto& [device, o] : outages) {
-    if (o.open) assess_open_outage(device, *o.open, s, j);
-    if (holes && o.longest_s > kLong)
-      j->find(Grade::care, device + " was disconnected for " + duration_text(o.longest_s, 0.1));
-    broken = broken || (holes && (o.open || o.longest_s > kLong));
-    std::string text = device + " was disconnected";
-    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-    if (o.count > 1) text += fmt::format(" {} times", o.count);
-    if (o.seconds > 0) text += " for " + duration_text(o.seconds, 0.1);
-    if (!s.frames.empty()) text += " from " + since_start(s, o.first) + " on";
-    j->advise(text + (o.open ? ", to the end" : "") + ": check its cable and power.");
-  }
-  return broken;
-}
-
 /// Rejected because the one in use is as good: no reason for doubt.
 bool fits_as_well(const CalibrationRow& rejected) {
   constexpr double kBetter = 0.9;  // of the held-out error before: clearly better
   return rejected.held_out_before_px > 0 &&
          rejected.held_out_after_px > kBetter * rejected.held_out_before_px;
-}
-
-/// Advice for the causes of accepted calibrations.
-void advise_on_causes(const Session& s, Findings* j) {
-  constexpr std::array kCauses{
-      Advice{"knock",
-             "The rig was knocked and recalibrated: check the camera mount before the next run."},
-      Advice{
-          "collapse",
-          "The rig was knocked hard and recalibrated: check the camera mount before the next run."},
-      Advice{"drift",
-             "The extrinsics drifted and were followed: check for a mount that warms up or works "
-             "loose."}};
-  for (const Advice& advice : kCauses)
-    if (std::any_of(
-            s.calibrations.begin(), s.calibrations.end(),
-            [&advice](const CalibrationRow& c) { return c.accepted && c.cause == advice.word; }))
-      j->advise(advice.message);
-}
-
-/// The last measurement by which the drive confirmed its calibration at the depth where a rig of
-/// that baseline is judged, if it is known well there.
-const CalibrationRow* known_well_near(const Session& s) {
-  constexpr double kKnown = 2.0;  // %, the word `good`
-  constexpr double kFar = 20;     // m, where the word is found
-  const auto last =
-      std::find_if(s.calibrations.rbegin(), s.calibrations.rend(), [](const CalibrationRow& c) {
-        return (c.accepted || c.kept) && std::isfinite(c.reference_depth_m);
-      });
-  if (last == s.calibrations.rend() || !(last->reference_depth_m < kFar) ||
-      !(last->depth_sigma_percent <= kKnown))
-    return nullptr;
-  return &*last;
-}
-
-/// A focal length that the drive itself measures to be another: all distances are off by as much.
-void assess_focal_length(const Session& s, Findings* j) {
-  if (flag_at(s.summary, "calibration.focal_length.contradicted") != true) return;
-  const auto metric = [&](const char* key) {
-    return number_at(s.summary, std::string("calibration.focal_length.") + key).value_or(0);
-  };
-  const double sigma = metric("sigma_px");
-  const std::string measured =
-      sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", metric("measured_px"), sigma)
-                : fmt::format("{:.0f} px or even further off", metric("measured_px"));
-  const std::string reason = fmt::format(
-      "the configured focal length, {:.0f} px, is contradicted by the images, which give {}; "
-      "distances are wrong by the same ratio",
-      metric("configured_px"), measured);
-  constexpr const char* kAdvice =
-      "Set the focal length in pixels of these images (cameras.N.intrinsics or --focal); resizing, "
-      "cropping or rectification changes it.";
-  j->find(Grade::bad, reason);
-  j->advise(kAdvice);
-  j->give_up(reason, kAdvice);
-}
-
-/// Evaluates its uncertainty and the last attempt.
-void assess_calibration(const Session& s, const Usability& use, Findings* j) {
-  const std::string rating = text_at(s.summary, "calibration.rating");
-  if (const CalibrationRow* near = known_well_near(s); near != nullptr && rating == "poor") {
-    j->find(
-        Grade::care,
-        fmt::format(
-            "the baseline is short: depths are accurate to {:.1f} % at {:.1f} m, but not at 20 m",
-            near->depth_sigma_percent, near->reference_depth_m));
-  } else if (rating == "poor") {
-    j->find(Grade::bad, "the calibration is too uncertain (rating: poor)");
-    j->advise(text_at(s.summary, "calibration.limited_by") == "intrinsics"
-                  ? "The calibration is limited by focal lengths or principal points: calibrate "
-                    "the intrinsics with a target; driving on does not help."
-                  : "The calibration is weak: drive turns with near and far structure in view, or "
-                    "calibrate with a target.");
-  } else if (rating == "fair") {
-    j->find(Grade::care, "the calibration is only fair");
-  }
-  // A drive that begins with a calibration has a row of it; a session of another make has no count.
-  if (s.calibrations.empty() && !number_at(s.summary, "calibration.accepted")) return;
-  if (std::none_of(s.calibrations.begin(), s.calibrations.end(),
-                   [](const CalibrationRow& c) { return c.accepted; })) {
-    if (use.use == Use::ok) j->find(Grade::care, "no calibration was found");
-    j->advise(
-        "No calibration was found: drive past objects near and far; calibrations.csv has the "
-        "reason of each attempt.");
-  } else {
-    // Online measurements are no attempts to replace the calibration in use.
-    const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
-                                   [](const CalibrationRow& c) { return !c.kept; });
-    if (last != s.calibrations.rend() && !last->accepted && !fits_as_well(*last)) {
-      j->find(Grade::care, "the last calibration was rejected");
-      if (!last->reason.empty())
-        j->advise("The last calibration was rejected: " + last->reason + ".");
-    }
-  }
-  advise_on_causes(s, j);
-}
-
-/// Evaluates whether the calibration was verified.
-void assess_verification(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
-  if (std::none_of(s.calibrations.begin(), s.calibrations.end(),
-                   [](const CalibrationRow& c) { return c.accepted; }))
-    return;
-  const std::optional<bool> verified = flag_at(s.summary, "calibration.verified");
-  const bool waited_in_vain = !s.summary.is_object() && a.waited > 0 &&
-                              !a.verified_s;  // the summary of a torn session says nothing
-  if (verified.value_or(!waited_in_vain)) return;
-  if (flag_at(s.summary, "calibration.online") == false) {
-    j->find(Grade::care, "the calibration is not verified (calibration.online: off)");
-    j->advise(
-        "The rig was not monitored: set calibration.online: on to verify the calibration while "
-        "driving.");
-    return;
-  }
-  if (use.use != Use::unverified)
-    j->find(Grade::care, a.verified_s ? "the calibration in use at the end is not verified"
-                                      : "the calibration was never verified");
-  j->advise(
-      "The calibration was not verified: drive turns past near objects, and check whether image "
-      "corners have no tracks (dirt, bonnet, sky).");
-}
-
-/// Advice for events about calibrations and lengths.
-void advise_on_events(const Session& s, Findings* j) {
-  const auto first = [&s](std::string_view kind) {
-    return std::find_if(s.events.begin(), s.events.end(),
-                        [kind](const Event& e) { return e.kind == kind; });
-  };
-  if (const auto event = first("calibration_save_failed"); event != s.events.end())
-    j->advise("A calibration was not saved: " + event->message + ".");
-  if (const auto event = first("calibration_contradicted"); event != s.events.end()) {
-    j->find(Grade::care, "the initial calibration does not fit the rig");
-    j->advise("Event calibration_contradicted: " + event->message +
-              ". Use the calibration.yaml of this session if it is verified.");
-  }
-  if (const auto event = first("scale_disagrees"); event != s.events.end()) {
-    j->find(Grade::care, "lengths disagree with the INS");
-    j->advise("Event scale_disagrees: " + event->message + ".");
-  }
 }
 
 // Limits of drift, the same as those of the calibration rating: up to 2 % is good, beyond 5 %
@@ -461,141 +199,397 @@ std::string percent(double share) {
   return fmt::format("{:.{}f} %", share * kPercent, share < 0.0995 ? 1 : 0);
 }
 
-void assess_frames(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
-  const bool posed =
-      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.posed; });
-  if (!posed && (!a.ok_share || a.ok > 0)) return j->find(Grade::bad, "no frame has a pose");
-  if (!a.ok_share) return j->find(Grade::care, "the status of the frames is not known");
-  if (use.use != Use::ok) {
-    j->find(use.use == Use::unverified ? Grade::care : Grade::bad, use.reason);
-    if (use.use == Use::nothing) return j->give_up(use.reason, use.advice);
-  }
-  const auto all = static_cast<double>(a.read + a.skipped);
-  const double lost = static_cast<double>(a.lost + a.skipped) / all,
-               degraded = static_cast<double>(a.degraded - a.waited) / all;
-  if (lost > kFewLost)
-    j->find(lost > kManyLost ? Grade::bad : Grade::care,
-            fmt::format("{} of the frames have no pose", percent(lost)));
-  if (use.use == Use::ok && degraded > kFewDegraded)
-    j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
+bool accepted(const CalibrationRow& row) { return row.accepted; }
+
+std::string capitalised(std::string text) {
+  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  return text;
 }
 
-/// `broken`: outages broke the way.
-void assess_drift(const Session& s, const Analysis& a, bool broken, Findings* j) {
-  if (a.ins_unplaced) {
-    j->find(Grade::care, "drift unknown: no ENU alignment with the INS");
-    j->advise(
-        "The alignment needs comparison.alignment_distance_m (100 m) with a valid fix: drive "
-        "further, or set it lower.");
-    return;
-  }
-  if (a.source == ErrorSource::none) {
-    j->find(Grade::care, "drift unknown: no reference");
-    // Two cameras alone cannot tell a wrong unit: everything is too long or too short alike.
-    if (s.calibration)
-      if (const std::string warning = baseline_warning(s.calibration->rig); !warning.empty()) {
-        j->find(Grade::care, warning);
-        j->advise(
-            "Measure the baseline of the rig: all lengths are wrong by the same ratio as the "
-            "baseline.");
-      }
-    j->advise(
-        "To measure drift, record with an INS, or compare with ground truth: vergence evaluate "
-        "SESSION REFERENCE.");
-    return;
-  }
-  if (!a.drift)
-    j->find(Grade::care, "the path is too short to measure drift");
-  else if (*a.drift > kGoodDrift)
-    j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care,
-            fmt::format("drift is {} of the distance travelled{}{}", percent(*a.drift),
-                        a.source == ErrorSource::ins ? " against the INS" : "",
-                        broken ? ", across outages" : ""));
-  const double off = a.scale ? std::abs(*a.scale - 1) : 0;
-  if (off > kGoodScale && !broken) {
-    j->find(off > kWorstScale ? Grade::bad : Grade::care,
-            fmt::format("lengths are {} too {}", percent(off), *a.scale < 1 ? "long" : "short"));
-    j->advise(
-        "Lengths disagree with the reference: measure the baseline again, then calibrate again.");
-  }
-}
+/// Causes of accepted calibrations.
+constexpr std::array kCauses{
+    Advice{"knock",
+           "The rig was knocked and recalibrated: check the camera mount before the next run."},
+    Advice{"collapse",
+           "The rig was knocked hard and recalibrated: check the camera mount before the next "
+           "run."},
+    Advice{"drift",
+           "The extrinsics drifted and were followed: check for a mount that warms up or works "
+           "loose."}};
 
-void assess_session(const Session& s, const Analysis& a, Findings* j) {
-  if (!s.missing.empty()) j->find(Grade::care, "session files are incomplete");
-  if (!s.left_out.empty())
-    j->find(Grade::care,
-            "the session is longer than the report reads: only its beginning is shown");
-  if (!s.summary.is_object() && !s.missing.empty())
-    j->advise(
-        "The session was not closed: stop with Ctrl-C and wait for the last message; check power "
-        "and the disk's free space.");
-  const double lines = number_at(s.summary, "drops.lines").value_or(0) +
-                       number_at(s.summary, "drops.records").value_or(0);
-  if (lines > 0) {
-    j->find(Grade::care, fmt::format("{:.0f} lines were not written to disk", lines));
-    j->advise("The disk was full or too slow: free space, or use a faster disk.");
-  }
-  if (const auto allocations = number_at(s.summary, "runtime_allocations");
-      allocations && *allocations > 0)
-    j->advise(fmt::format(
-        "{:.0f} runtime allocations, which must not happen: please report it with this session.",
-        *allocations));
-  const double p99 = number_at(s.summary, "timing_ms.p99").value_or(0) * 1e-3;
-  const double slow =
-      static_cast<double>(std::count_if(s.frames.begin(), s.frames.end(), [&a](const Frame& f) {
-        return f.estimate_ms * 1e-3 > a.interval_s;
-      }));
-  if (a.interval_s > 0 &&
-      (p99 > a.interval_s || slow > kFewOverBudget * static_cast<double>(a.read)))
-    j->advise(
-        "More than 1 % of the frames took longer than the frame interval; live, work would be "
-        "dropped: lower trigger.rate or odometry.features.");
-}
+/// The assessment of one session; each function adds what it finds.
+class Assessor {
+ public:
+  Assessor(const Session& session, const Analysis& analysis)
+      : s_(session), a_(analysis), all_(analysis.read + analysis.skipped) {}
 
-void advise_by_reasons(const Session& s, const Analysis& a, Findings* j) {
-  for (const Advice& skip : skip_advice())
-    if (const auto n = std::count_if(s.events.begin(), s.events.end(),
-                                     [&skip](const Event& e) { return e.kind == skip.word; });
-        n > 0)
-      j->advise(fmt::format("{} ({} frame{} skipped): {}", skip.word, n, n == 1 ? "" : "s",
-                            skip.message));
-  const bool changed = std::any_of(s.events.begin(), s.events.end(),
-                                   [](const Event& e) { return e.kind == "rig_changed"; });
-  for (const Advice& advice : pose_advice()) {
-    // Frames that were doubted for a moment, or a calibration that was asked for, are no knock.
-    if (advice.word == std::string_view("recalibrating") && !changed) continue;
-    const auto found = std::find(s.reasons.begin(), s.reasons.end(), advice.word);
-    if (found == s.reasons.end()) continue;
-    const auto i = static_cast<std::size_t>(found - s.reasons.begin());
-    const std::size_t frames =
-        a.by_reason[i] - (i < a.waited_by_reason.size() ? a.waited_by_reason[i] : 0);
-    if (frames > 0)
-      j->advise(fmt::format("{} ({} frame{}): {}", advice.word, frames, frames == 1 ? "" : "s",
-                            advice.message));
+  Assessment assess() {
+    const std::map<std::string, Outages> outages = outages_of(s_.events);
+    assess_outages(outages);
+    assess_focal_length();
+    if (a_.read > 0 || outages.empty()) assess_frames();
+    if (a_.source != ErrorSource::none) assess_drift();
+    assess_calibration();
+    // A session without frames needs no further evaluation.
+    if (a_.read > 0) assess_verification();
+    advise_on_events();
+    assess_session();
+    if (a_.source == ErrorSource::none && a_.read > 0) assess_drift();
+    advise_by_reasons();
+    return finish();
   }
-}
+
+ private:
+  /// `advice`: what to do about it; may be empty.
+  void find(Grade grade, const std::string& reason, const std::string& advice = "") {
+    reasons_[static_cast<std::size_t>(grade)].push_back(reason);
+    out_.grade = std::max(out_.grade, grade);
+    if (!advice.empty()) advise(advice);
+  }
+  void advise(const std::string& message) { out_.advice.push_back(message); }
+  /// No pose can be relied on. The first call has the main reason.
+  void give_up(const std::string& reason, const std::string& advice) {
+    out_.usable = false;
+    if (out_.main_reason.empty()) out_.main_reason = reason + (advice.empty() ? "" : ". " + advice);
+  }
+
+  [[nodiscard]] std::size_t count(std::string_view kind) const {
+    return static_cast<std::size_t>(std::count_if(
+        s_.events.begin(), s_.events.end(), [kind](const Event& e) { return e.kind == kind; }));
+  }
+  [[nodiscard]] bool any_accepted() const {
+    return std::any_of(s_.calibrations.begin(), s_.calibrations.end(), accepted);
+  }
+  [[nodiscard]] bool all_posed() const {
+    return std::all_of(s_.frames.begin(), s_.frames.end(), [](const Frame& f) { return f.posed; });
+  }
+  [[nodiscard]] std::string since_start(Stamp stamp) const {
+    const Stamp first = s_.frames.empty() ? stamp : s_.frames.front().stamp;
+    return duration_text(seconds_between(first, std::max(first, stamp)), 0.1);
+  }
+
+  /// The reason of most frames that are not ok; one that is no waiting goes before, where it is
+  /// that of a quarter of them or more. Of frames that were not read, the kind of most events.
+  [[nodiscard]] Main main_reason() const {
+    std::array<Main, 2> most{};  // of those that do not wait, of those that do
+    for (std::size_t i = 0; i < std::min(s_.reasons.size(), a_.by_reason.size()); ++i) {
+      Main& main = most[is_waiting(s_.reasons[i]) ? 1 : 0];
+      if (!s_.reasons[i].empty() && a_.by_reason[i] > main.frames)
+        main = {s_.reasons[i], a_.by_reason[i]};
+    }
+    Main main =
+        4 * most[0].frames >= a_.read || most[0].frames > most[1].frames ? most[0] : most[1];
+    for (const Advice& skip : skip_advice())
+      if (const std::size_t n = count(skip.word); n > main.frames) main = {skip.word, n};
+    return main;
+  }
+
+  /// Frames that a calibration can be verified from: those that moved.
+  [[nodiscard]] std::size_t moving_frames() const {
+    constexpr double kStep = 0.1;  // of the baseline; EuRoC's excerpt moves by 0.12 a frame
+    const double least = kStep * number_at(s_.summary, "calibration.baseline_m").value_or(0);
+    if (!(least > 0)) return a_.read;
+    std::size_t count = 0;
+    for (std::size_t i = 1; i < a_.distance_m.size(); ++i)
+      if (a_.distance_m[i] - a_.distance_m[i - 1] >= least) ++count;
+    return count;
+  }
+
+  /// Why no calibration was accepted; empty if one was, or there was no attempt.
+  [[nodiscard]] std::string rejection() const {
+    std::string why;
+    for (const CalibrationRow& row : s_.calibrations)
+      if (!row.kept && !row.reason.empty()) why = row.reason;
+    return any_accepted() ? "" : why;
+  }
+
+  /// No frame is ok. Returns true if that is because the run ended before it could verify its
+  /// calibration.
+  [[nodiscard]] bool ended_early() const {
+    std::size_t waiting = 0;
+    for (const Frame& f : s_.frames)
+      if (f.status == PoseStatus::degraded && is_waiting(s_.reasons[f.reason])) ++waiting;
+    return waiting > 0 && waiting == a_.degraded && moving_frames() < kFramesToVerify &&
+           a_.lost <= a_.read / 10 && a_.skipped <= a_.read;
+  }
+
+  void assess_frames() {
+    const bool posed =
+        std::any_of(s_.frames.begin(), s_.frames.end(), [](const Frame& f) { return f.posed; });
+    if (!posed && (a_.read == 0 || a_.ok > 0)) return find(Grade::bad, "no frame has a pose");
+    if (a_.ok == 0) {
+      unverified_ = ended_early();
+      if (!unverified_) return assess_no_ok_frame();
+      find(Grade::care, fmt::format("unverified: the run ended after {} frames; verifying the "
+                                    "calibration takes about {} frames in motion",
+                                    a_.read, kFramesToVerify));
+    }
+    const auto all = static_cast<double>(all_);
+    const double lost = static_cast<double>(a_.lost + a_.skipped) / all,
+                 degraded = static_cast<double>(a_.degraded - a_.waited) / all;
+    if (lost > kFewLost)
+      find(lost > kManyLost ? Grade::bad : Grade::care,
+           fmt::format("{} of the frames have no pose", percent(lost)));
+    if (a_.ok > 0 && degraded > kFewDegraded)
+      find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
+  }
+
+  void assess_no_ok_frame() {
+    const Main main = main_reason();
+    const std::string rejected = rejection();
+    std::string reason =
+        a_.degraded > 0 ? fmt::format("none of {} frames is ok", all_) : "no frame has a pose";
+    if (main.frames > 0)
+      reason += fmt::format(": {} ({} of {} frames)", main.word, main.frames, all_);
+    if (!rejected.empty()) reason += "; no calibration was found: " + rejected;
+    find(Grade::bad, reason);
+    give_up(reason, rejected.empty() ? std::string(advice_for(main.word)) : "");
+  }
+
+  /// A device that never came back.
+  void assess_open_outage(const std::string& device, Stamp from) {
+    if (s_.frames.empty())
+      return find(Grade::bad, "no frame was received: " + device + " was disconnected");
+    const Stamp end = s_.frames.back().stamp;
+    // Frames that were left out may be later.
+    if (s_.left_out.empty() && (end <= from || seconds_between(from, end) <= kLag))
+      find(Grade::bad, "no frame after " + since_start(std::max(from, end)) + ": " + device +
+                           " was disconnected");
+    else
+      find(Grade::care, device + " was disconnected from " + since_start(from) + " to the end");
+  }
+
+  /// One piece of advice per device.
+  void assess_outages(const std::map<std::string, Outages>& outages) {
+    const bool holes =
+        !all_posed() || std::find(a_.breaks.begin(), a_.breaks.end(), 1) != a_.breaks.end();
+    for (const auto& [device, o] : outages) {
+      if (o.open) assess_open_outage(device, *o.open);
+      if (holes && o.longest_s > kLong)
+        find(Grade::care, device + " was disconnected for " + duration_text(o.longest_s, 0.1));
+      broken_ = broken_ || (holes && (o.open || o.longest_s > kLong));
+      std::string text = capitalised(device) + " was disconnected";
+      if (o.count > 1) text += fmt::format(" {} times", o.count);
+      if (o.seconds > 0) text += " for " + duration_text(o.seconds, 0.1);
+      if (!s_.frames.empty()) text += " from " + since_start(o.first) + " on";
+      advise(text + (o.open ? ", to the end" : "") + ": check its cable and power.");
+    }
+  }
+
+  /// A focal length that is not the one the images show: all distances are wrong by that ratio.
+  void assess_focal_length() {
+    if (flag_at(s_.summary, "calibration.focal_length.contradicted") != true) return;
+    const auto metric = [&](const char* key) {
+      return number_at(s_.summary, std::string("calibration.focal_length.") + key).value_or(0);
+    };
+    const double sigma = metric("sigma_px");
+    const std::string measured =
+        sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", metric("measured_px"), sigma)
+                  : fmt::format("{:.0f} px or even further off", metric("measured_px"));
+    const std::string reason = fmt::format(
+        "the configured focal length, {:.0f} px, is contradicted by the images, which give {}; "
+        "distances are wrong by the same ratio",
+        metric("configured_px"), measured);
+    constexpr const char* kAdvice =
+        "Set the focal length in pixels of these images (cameras.N.intrinsics or --focal); "
+        "resizing, cropping or rectification changes it.";
+    find(Grade::bad, reason, kAdvice);
+    give_up(reason, kAdvice);
+  }
+
+  /// The last measurement at the depth where a rig of that baseline is evaluated, if the depth is
+  /// known well there.
+  [[nodiscard]] const CalibrationRow* known_well_near() const {
+    constexpr double kKnown = 2.0;  // %, rated `good`
+    constexpr double kFar = 20;     // m, where the rating is evaluated
+    const auto last = std::find_if(
+        s_.calibrations.rbegin(), s_.calibrations.rend(),
+        [](const auto& c) { return (c.accepted || c.kept) && std::isfinite(c.reference_depth_m); });
+    const bool known = last != s_.calibrations.rend() && last->reference_depth_m < kFar &&
+                       last->depth_sigma_percent <= kKnown;
+    return known ? &*last : nullptr;
+  }
+
+  /// Evaluates its uncertainty and the last attempt.
+  void assess_calibration() {
+    const std::string rating = text_at(s_.summary, "calibration.rating");
+    const CalibrationRow* near = known_well_near();
+    if (rating == "poor" && near != nullptr)
+      find(Grade::care, fmt::format("the baseline is short: depths are accurate to {:.1f} % at "
+                                    "{:.1f} m, but not at 20 m",
+                                    near->depth_sigma_percent, near->reference_depth_m));
+    else if (rating == "poor")
+      find(Grade::bad, "the calibration is too uncertain (rating: poor)",
+           text_at(s_.summary, "calibration.limited_by") == "intrinsics"
+               ? "The calibration is limited by focal lengths or principal points: calibrate the "
+                 "intrinsics with a target; driving on does not help."
+               : "The calibration is weak: drive turns with near and far structure in view, or "
+                 "calibrate with a target.");
+    else if (rating == "fair")
+      find(Grade::care, "the calibration is only fair");
+    // A run that begins with a calibration has a row of it; a foreign session has no count.
+    if (s_.calibrations.empty() && !number_at(s_.summary, "calibration.accepted")) return;
+    // Online measurements are no attempts to replace the calibration in use.
+    const auto last = std::find_if(s_.calibrations.rbegin(), s_.calibrations.rend(),
+                                   [](const CalibrationRow& c) { return !c.kept; });
+    if (!any_accepted()) {
+      if (a_.ok > 0 || a_.read == 0) find(Grade::care, "no calibration was found");
+      advise(
+          "No calibration was found: drive past objects near and far; calibrations.csv has the "
+          "reason of each attempt.");
+    } else if (last != s_.calibrations.rend() && !last->accepted && !fits_as_well(*last)) {
+      find(Grade::care, "the last calibration was rejected",
+           last->reason.empty() ? "" : "The last calibration was rejected: " + last->reason + ".");
+    }
+    for (const Advice& advice : kCauses)
+      if (std::any_of(s_.calibrations.begin(), s_.calibrations.end(),
+                      [&advice](const auto& c) { return c.accepted && c.cause == advice.word; }))
+        advise(advice.message);
+  }
+
+  /// Evaluates whether the calibration was verified.
+  void assess_verification() {
+    // The summary of a truncated session has no value.
+    const bool never_verified = !s_.summary.is_object() && a_.waited > 0 && !a_.verified_s;
+    if (!any_accepted() || flag_at(s_.summary, "calibration.verified").value_or(!never_verified))
+      return;
+    if (flag_at(s_.summary, "calibration.online") == false)
+      return find(Grade::care, "the calibration is not verified (calibration.online: off)",
+                  "The rig was not monitored: set calibration.online: on to verify the calibration "
+                  "while driving.");
+    if (!unverified_)
+      find(Grade::care, a_.verified_s ? "the calibration in use at the end is not verified"
+                                      : "the calibration was never verified");
+    advise(
+        "The calibration was not verified: drive turns past near objects, and check whether image "
+        "corners have no tracks (dirt, bonnet, sky).");
+  }
+
+  /// Findings from events about calibrations and lengths.
+  void advise_on_events() {
+    const auto first = [this](std::string_view kind) {
+      const auto event = std::find_if(s_.events.begin(), s_.events.end(),
+                                      [kind](const Event& e) { return e.kind == kind; });
+      return event == s_.events.end() ? nullptr : &*event;
+    };
+    if (const Event* event = first("calibration_save_failed"))
+      advise("A calibration was not saved: " + event->message + ".");
+    if (const Event* event = first("calibration_contradicted"))
+      find(Grade::care, "the initial calibration does not fit the rig",
+           "Event calibration_contradicted: " + event->message +
+               ". Use the calibration.yaml of this session if it is verified.");
+    if (const Event* event = first("scale_disagrees"))
+      find(Grade::care, "lengths disagree with the INS",
+           "Event scale_disagrees: " + event->message + ".");
+  }
+
+  void assess_drift() {
+    if (a_.ins_unplaced)
+      return find(Grade::care, "drift unknown: no ENU alignment with the INS",
+                  "The alignment needs comparison.alignment_distance_m (100 m) with a valid fix: "
+                  "drive further, or set it lower.");
+    if (a_.source == ErrorSource::none) {
+      find(Grade::care, "drift unknown: no reference");
+      // Two cameras alone cannot tell a wrong unit: everything is too long or too short alike.
+      if (const std::string warning = s_.calibration ? baseline_warning(s_.calibration->rig) : "";
+          !warning.empty())
+        find(Grade::care, warning,
+             "Measure the baseline of the rig: all lengths are wrong by the same ratio as the "
+             "baseline.");
+      return advise(
+          "To measure drift, record with an INS, or compare with ground truth: vergence evaluate "
+          "SESSION REFERENCE.");
+    }
+    if (!a_.drift)
+      find(Grade::care, "the path is too short to measure drift");
+    else if (*a_.drift > kGoodDrift)
+      find(*a_.drift > kWorstDrift ? Grade::bad : Grade::care,
+           fmt::format("drift is {} of the distance travelled{}{}", percent(*a_.drift),
+                       a_.source == ErrorSource::ins ? " against the INS" : "",
+                       broken_ ? ", across outages" : ""));
+    const double off = a_.scale ? std::abs(*a_.scale - 1) : 0;
+    if (off > kGoodScale && !broken_)
+      find(off > kWorstScale ? Grade::bad : Grade::care,
+           fmt::format("lengths are {} too {}", percent(off), *a_.scale < 1 ? "long" : "short"),
+           "Lengths disagree with the reference: measure the baseline again, then calibrate "
+           "again.");
+  }
+
+  void assess_session() {
+    if (!s_.missing.empty()) find(Grade::care, "session files are incomplete");
+    if (!s_.left_out.empty())
+      find(Grade::care, "the session is longer than the report reads: only its beginning is shown");
+    if (!s_.summary.is_object() && !s_.missing.empty())
+      advise(
+          "The session was not closed: stop with Ctrl-C and wait for the last message; check power "
+          "and the disk's free space.");
+    const double lines = number_at(s_.summary, "drops.lines").value_or(0) +
+                         number_at(s_.summary, "drops.records").value_or(0);
+    if (lines > 0)
+      find(Grade::care, fmt::format("{:.0f} lines were not written to disk", lines),
+           "The disk was full or too slow: free space, or use a faster disk.");
+    if (const double n = number_at(s_.summary, "runtime_allocations").value_or(0); n > 0)
+      advise(fmt::format(
+          "{:.0f} runtime allocations, which must not happen: please report it with this session.",
+          n));
+    const double p99 = number_at(s_.summary, "timing_ms.p99").value_or(0) * 1e-3;
+    const auto slow = std::count_if(s_.frames.begin(), s_.frames.end(), [this](const Frame& f) {
+      return f.estimate_ms * 1e-3 > a_.interval_s;
+    });
+    if (a_.interval_s > 0 &&
+        (p99 > a_.interval_s ||
+         static_cast<double>(slow) > kFewOverBudget * static_cast<double>(a_.read)))
+      advise(
+          "More than 1 % of the frames took longer than the frame interval; live, work would be "
+          "dropped: lower trigger.rate or odometry.features.");
+  }
+
+  void advise_by_reasons() {
+    for (const Advice& skip : skip_advice())
+      if (const std::size_t n = count(skip.word); n > 0)
+        advise(fmt::format("{} ({} frame{} skipped): {}", skip.word, n, n == 1 ? "" : "s",
+                           skip.message));
+    for (const Advice& advice : pose_advice()) {
+      // Frames that were doubted for a moment, or a calibration that was asked for, are no knock.
+      if (advice.word == "recalibrating" && count("rig_changed") == 0) continue;
+      const auto found = std::find(s_.reasons.begin(), s_.reasons.end(), advice.word);
+      if (found == s_.reasons.end()) continue;
+      const auto i = static_cast<std::size_t>(found - s_.reasons.begin());
+      const std::size_t frames =
+          a_.by_reason[i] - (i < a_.waited_by_reason.size() ? a_.waited_by_reason[i] : 0);
+      if (frames > 0)
+        advise(fmt::format("{} ({} frame{}): {}", advice.word, frames, frames == 1 ? "" : "s",
+                           advice.message));
+    }
+  }
+
+  /// The worst reasons first.
+  Assessment finish() {
+    for (auto same = reasons_.rbegin(); same != reasons_.rend(); ++same)
+      out_.reasons.insert(out_.reasons.end(), same->begin(), same->end());
+    out_.message =
+        out_.reasons.empty()
+            ? fmt::format(
+                  "every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames "
+                  "ok{}",
+                  percent(a_.drift.value_or(0)), a_.path_m, a_.ok, all_,
+                  a_.waited > 0 ? fmt::format(", {} before the calibration was verified", a_.waited)
+                                : "")
+            : fmt::format("{}", fmt::join(out_.reasons, "; "));
+    out_.message = capitalised(out_.message) + ".";
+    return std::move(out_);
+  }
+
+  const Session& s_;
+  const Analysis& a_;
+  const std::size_t all_;  // frames, also those that were not read
+  bool broken_ = false;    // poses are missing within a long outage: the path's length means little
+  bool unverified_ = false;  // the run ended before it could verify its calibration
+  std::array<std::vector<std::string>, 3> reasons_;  // by Grade
+  Assessment out_;
+};
 
 }  // namespace
-
-void Findings::find(Grade grade, std::string reason) {
-  found_.push_back({grade, std::move(reason)});
-  assessment_.grade = std::max(assessment_.grade, grade);
-}
-
-void Findings::give_up(const std::string& reason, const std::string& advice) {
-  assessment_.usable = false;
-  if (assessment_.main_reason.empty())
-    assessment_.main_reason = reason + (advice.empty() ? "" : ". " + advice);
-}
-
-Assessment Findings::assessment() const {
-  std::vector<Found> sorted = found_;
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const Found& a, const Found& b) { return a.grade > b.grade; });
-  Assessment assessment = assessment_;
-  for (Found& f : sorted) assessment.reasons.push_back(std::move(f.reason));
-  return assessment;
-}
 
 const char* spaced(Grade grade) noexcept {
   switch (grade) {
@@ -610,35 +604,7 @@ const char* spaced(Grade grade) noexcept {
 }
 
 Assessment assess(const Session& session, const Analysis& analysis) {
-  Findings j;
-  const Usability use = assess_usability(session, analysis);
-  const std::map<std::string, Outages> outages = outages_of(session.events);
-  const bool broken = assess_outages(outages, session, analysis, &j);
-  assess_focal_length(session, &j);
-  if (analysis.read > 0 || outages.empty()) assess_frames(session, analysis, use, &j);
-  if (analysis.source != ErrorSource::none) assess_drift(session, analysis, broken, &j);
-  assess_calibration(session, use, &j);
-  // A session without frames needs no further evaluation.
-  if (analysis.read > 0) assess_verification(session, analysis, use, &j);
-  advise_on_events(session, &j);
-  assess_session(session, analysis, &j);
-  if (analysis.source == ErrorSource::none && analysis.read > 0)
-    assess_drift(session, analysis, broken, &j);
-  advise_by_reasons(session, analysis, &j);
-  Assessment v = j.assessment();
-  for (const std::string& reason : v.reasons) v.message += (v.message.empty() ? "" : "; ") + reason;
-  if (v.reasons.empty())
-    v.message =
-        fmt::format("every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames ok{}",
-                    percent(analysis.drift.value_or(0)), analysis.path_m, analysis.ok,
-                    analysis.read + analysis.skipped,
-                    analysis.waited > 0
-                        ? fmt::format(", {} before the calibration was verified", analysis.waited)
-                        : "");
-  v.message.front() =
-      static_cast<char>(std::toupper(static_cast<unsigned char>(v.message.front())));
-  v.message += '.';
-  return v;
+  return Assessor(session, analysis).assess();
 }
 
 }  // namespace vergence::app::report

@@ -57,25 +57,6 @@ std::optional<double> times(std::optional<double> value, double factor) {
   return value ? std::optional(*value * factor) : std::nullopt;
 }
 
-const char* name_of_skipped(const Session& s) {
-  if (!s.summary.is_object()) return "missing (gaps in the frame numbers)";
-  return is_live(s) ? "not received or dropped" : "skipped (unreadable)";
-}
-
-void frames_group(const Session& s, const Analysis& a, MetricTable* f) {
-  f->group("Frames");
-  f->row("read", grouped(a.read));
-  if (a.read > a.unknown) {
-    f->row("ok", grouped(a.ok));
-    f->row("degraded", grouped(a.degraded));
-    f->row("lost", grouped(a.lost));
-  }
-  if (s.summary.is_object() || a.skipped > 0) f->row(name_of_skipped(s), grouped(a.skipped));
-  for (std::size_t i = 1; i < a.by_reason.size(); ++i)
-    if (a.by_reason[i] > 0) f->row("reason " + s.reasons[i], grouped(a.by_reason[i]));
-  if (a.interval_s > 0) f->row("frame interval", fmt::format("{:.1f} ms", a.interval_s * 1e3));
-}
-
 void error_group(const Analysis& a, MetricTable* f) {
   f->group(a.source == ErrorSource::ins ? "Errors against the INS"
                                         : "Errors against the reference");
@@ -90,42 +71,6 @@ void error_group(const Analysis& a, MetricTable* f) {
   if (a.ate_m) f->row("ATE (RMS after SE(3) alignment)", metres(*a.ate_m));
   f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the distance travelled");
   f->row("scale (reference / estimate)", a.scale, "{:.4f}");
-}
-
-/// Rows about the online estimate of the calibration in use.
-void verification_rows(const Session& s, const Analysis& a, MetricTable* f) {
-  if (const auto verified = flag_at(s.summary, "calibration.verified"))
-    f->row("verified online", *verified ? "yes" : "not verified");
-  if (a.verified_s) f->row("first verified after", duration_text(*a.verified_s, 0.1));
-  f->row("contradicted: depth error",
-         number_at(s.summary, "calibration.contradicted.depth_percent"), "{:.1f} %");
-  const auto newest =
-      std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
-                   [](const CalibrationRow& c) { return std::isfinite(c.depth_sigma_percent); });
-  if (newest == s.calibrations.rend()) return;
-  const std::string at = fmt::format(" at {:.0f} m, latest estimate", newest->reference_depth_m);
-  f->row("depth sigma" + at, newest->depth_sigma_percent, "{:.2f} %");
-  if (newest->depth_error_percent > 0)
-    f->row("depth error of the calibration in use" + at, newest->depth_error_percent, "{:.2f} %");
-}
-
-void calibration_group(const Session& s, const Analysis& a, MetricTable* f) {
-  f->group("Calibration at the end");
-  if (const std::string source = text_at(s.summary, "calibration.source"); !source.empty())
-    f->row("from", source);
-  if (s.calibration) {
-    const RigCalibration& rig = s.calibration->rig;
-    for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
-      const Vec3 phi = log_so3(rig.T_camera_left[k].R) * kDegreesPerRadian;
-      const std::string camera = rig.cameras > 2 ? s.calibration->names[k] + ": " : "";
-      f->row(camera + "baseline", fmt::format("{:.2f} mm", rig.T_camera_left[k].t.norm() * 1e3));
-      f->row(camera + "rotation x, y, z",
-             fmt::format("{:.4f}°, {:.4f}°, {:.4f}°", phi.x() + 0.0, phi.y() + 0.0, phi.z() + 0.0));
-    }
-  }
-  if (const std::string word = text_at(s.summary, "calibration.rating"); !word.empty())
-    f->row("rating", word);
-  verification_rows(s, a, f);
 }
 
 std::string event_time(const Session& s, Stamp stamp) {
@@ -177,12 +122,15 @@ std::string metrics_table(const Session& session, const Analysis& analysis) {
   f.group("Session");
   if (analysis.duration_s > 0) f.row("duration", duration_text(analysis.duration_s, 0.1));
   f.row("distance travelled", fmt::format("{:.1f} m", analysis.path_m));
-  frames_group(session, analysis, &f);
+  if (analysis.interval_s > 0)
+    f.row("frame interval", fmt::format("{:.1f} ms", analysis.interval_s * 1e3));
+  for (std::size_t i = 1; i < analysis.by_reason.size(); ++i)
+    if (analysis.by_reason[i] > 0)
+      f.row("frames with " + session.reasons[i], grouped(analysis.by_reason[i]));
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
   f.group("Processing time per frame, ms");
   for (const char* key : {"mean", "p50", "p99", "max"})
     f.row(key, number_at(session.summary, std::string("timing_ms.") + key), "{:.2f}");
-  calibration_group(session, analysis, &f);
   return std::move(f).finish();
 }
 
@@ -355,9 +303,7 @@ std::string error_card(const Analysis& a) {
 }
 
 std::string ok_card(const Session& s, const Analysis& a) {
-  if (!a.ok_share)
-    return number_card("unknown", "Frames ok",
-                       a.read > 0 ? "poses.csv is missing" : "no frame was received");
+  if (!a.ok_share) return number_card("unknown", "Frames ok", "no frame was received");
   // Rounded down, so that 100 % means every frame.
   const double percent = std::floor(*a.ok_share * 1000) / 10;
   const std::string skipped = a.skipped > 0 ? fmt::format(", {} {}", grouped(a.skipped),
@@ -401,26 +347,20 @@ std::string map_section(const Session& s, const Analysis& a) {
   return section("tall", "Map", map + legend + "</p>");
 }
 
-void error_plots(const Session& s, const Analysis& a, std::string* out) {
-  struct Kind {
-    const char* caption;
-    const std::vector<double>* values;
-    const char* css;
-    bool from_zero;
-    const char* note;
-  };
-  const std::array kinds{Kind{"Horizontal error, m", &a.horizontal_m, "curve s-ours", true,
-                              "Distance in the ground plane; a steady rise is drift."},
-                         Kind{"Vertical error, m", &a.vertical_m, "curve s-theirs", false,
-                              "Positive where the estimate is above the reference."},
-                         Kind{"Heading error, degrees", &a.heading_deg, "curve s-third", false,
-                              "Positive where the estimate is rotated clockwise."}};
-  for (const Kind& k : kinds) {
-    if (const std::string plot =
-            curve_plot({k.caption, *k.values, k.css, k.from_zero}, a, s.frames);
-        !plot.empty())
-      *out += figure(std::string(k.caption) + " · over time", plot, k.note);
-  }
+/// A curve over time with its caption; empty if no frame has a value.
+std::string curve_figure(const CurvePlot& plot, const char* note, const Session& s,
+                         const Analysis& a) {
+  const std::string drawing = curve_plot(plot, a, s.frames);
+  return drawing.empty() ? "" : figure(plot.description + " · over time", drawing, note);
+}
+
+std::string error_plots(const Session& s, const Analysis& a) {
+  return curve_figure({"Horizontal error, m", a.horizontal_m, "curve s-ours", true},
+                      "Distance in the ground plane; a steady rise is drift.", s, a) +
+         curve_figure({"Vertical error, m", a.vertical_m, "curve s-theirs", false},
+                      "Positive where the estimate is above the reference.", s, a) +
+         curve_figure({"Heading error, degrees", a.heading_deg, "curve s-third", false},
+                      "Positive where the estimate is rotated clockwise.", s, a);
 }
 
 std::string errors_head(const Analysis& a) {
@@ -432,29 +372,24 @@ std::string errors_head(const Analysis& a) {
                           : ""));
 }
 
-void running_plots(const Session& s, const Analysis& a, std::string* out) {
+std::string running_plots(const Session& s, const Analysis& a) {
+  std::string out;
   if (const std::string bands = bands_plot(s, a); !bands.empty())
-    *out += figure("Status and state · over time", bands,
-                   "Upper rows: status of each frame. Lower rows: state of the estimator. Ticks: "
-                   "events, listed below.");
+    out = figure("Status and state · over time", bands,
+                 "Upper rows: status of each frame. Lower rows: state of the estimator. Ticks: "
+                 "events, listed below.");
   std::vector<double> inliers, times;
   for (const Frame& f : s.frames) {
     inliers.push_back(f.inliers >= 0 && f.posed ? f.inliers : kNone);
     times.push_back(f.estimate_ms);
   }
-  struct Running {
-    const char* caption;
-    const std::vector<double>* values;
-    const char* note;
-  };
-  for (const auto& [caption, values, note] :
-       {Running{"Inliers, points", &inliers,
-                "Points that constrain the pose; few of them make a pose degraded or lost."},
-        Running{"Processing time per frame, ms", &times,
-                "From the decoded images to the pose; it must stay below the frame interval."}})
-    if (const std::string plot = curve_plot({caption, *values, "curve s-ours", true}, a, s.frames);
-        !plot.empty())
-      *out += figure(std::string(caption) + " · over time", plot, note);
+  return out +
+         curve_figure({"Inliers, points", inliers, "curve s-ours", true},
+                      "Points that constrain the pose; few of them make a pose degraded or lost.",
+                      s, a) +
+         curve_figure({"Processing time per frame, ms", times, "curve s-ours", true},
+                      "From the decoded images to the pose; it must stay below the frame interval.",
+                      s, a);
 }
 
 /// A single one that the drive began with is no curve.
@@ -517,17 +452,14 @@ std::string page_html(const Session& session, const Analysis& analysis,
   if (const std::vector<std::string> missing = session.not_had(); !missing.empty())
     out += section("wide", "What is missing in this session", list(missing));
   out += map_section(session, analysis);
-  std::string running;
-  running_plots(session, analysis, &running);
-  out += running + errors_head(analysis);
-  if (analysis.source != ErrorSource::none) error_plots(session, analysis, &out);
+  out += running_plots(session, analysis) + errors_head(analysis);
+  if (analysis.source != ErrorSource::none) out += error_plots(session, analysis);
   calibration_sections(session, analysis, &out);
   out += section("wide long", "Events",
                  session.events.empty() ? "<p>No events.</p>" : events_table(session));
   out += section("wide long", "Metrics",
                  "<div class=\"two\">" + metrics_table(session, analysis) +
-                     "</div><p class=\"soft\">Metrics of devices, clocks, memory and drops are in "
-                     "summary.json.</p>");
+                     "</div><p class=\"soft\">Other metrics are in summary.json.</p>");
   out += "</div>\n" + footer(session) + "</main></body></html>\n";
   return out;
 }

@@ -7,11 +7,10 @@
 
 namespace vergence::app::report {
 
-/// `0.004 m`, `54.34 m`: millimetres below a decimetre.
+/// Length such as `0.004 m` or `54.34 m`, in millimetres below a decimetre.
 [[nodiscard]] std::string metres(double value);
 
-/// The whole of report.html: one document, well-formed as XML, too; no script, nothing loaded from
-/// anywhere.
+/// Complete report.html: one document, also well-formed XML, without scripts or external content.
 [[nodiscard]] std::string page_html(const Session& session, const Analysis& analysis,
                                     const Assessment& assessment);
 

@@ -192,14 +192,13 @@ std::vector<Lane> make_lanes(const Session& s, const Analysis& a, const PlotBox&
   std::array<std::optional<Lane>, 6> states;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
-    if (f.status) mark(&lanes[static_cast<std::size_t>(*f.status)], box, a, i);
-    if (!f.state || f.state == State::lost)
-      continue;  // that state and that status are the same frames
-    auto& lane = states[static_cast<std::size_t>(*f.state)];
+    mark(&lanes[static_cast<std::size_t>(f.status)], box, a, i);
+    if (f.state == State::lost) continue;  // that state and that status are the same frames
+    auto& lane = states[static_cast<std::size_t>(f.state)];
     if (!lane) {
-      std::string name(to_string(*f.state));
+      std::string name(to_string(f.state));
       std::replace(name.begin(), name.end(), '_', ' ');
-      lane = empty(name, kStateCss[static_cast<std::size_t>(*f.state)]);
+      lane = empty(name, kStateCss[static_cast<std::size_t>(f.state)]);
     }
     mark(&*lane, box, a, i);
   }
@@ -225,7 +224,7 @@ void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
 }  // namespace
 
 std::string bands_plot(const Session& session, const Analysis& analysis) {
-  if (analysis.read == analysis.unknown) return {};
+  if (analysis.read == 0) return {};
   PlotBox box = time_box(analysis);
   box.left = kBandLeft;
   box.top = 2;
@@ -250,48 +249,37 @@ namespace {
 
 constexpr double kMillimetres = 1e3;
 
-struct Held {  // a value that held for a while
-  double from = 0, to = 0, value = 0, two_sigma = kNone;
-};
-
-struct Mark {  // a value that was found and not taken
-  double at = 0, value = 0, two_sigma = kNone;
+/// A value of a calibration parameter and how long it was in use.
+struct CalibrationValue {
+  double from = 0, to = 0, value = 0;
+  double two_sigma = 0;  // 0: unknown
 };
 
 struct CalibrationCurve {
-  std::vector<Held> held;
-  std::vector<Mark> rejected, measured;
-  [[nodiscard]] bool empty() const { return held.empty() && rejected.empty() && measured.empty(); }
+  std::vector<CalibrationValue> used, rejected, measured;
+  [[nodiscard]] bool empty() const { return used.empty() && rejected.empty() && measured.empty(); }
 };
-
-struct Component {
-  double value = 0, sigma = kNone;
-};
-
-/// A number of a row in the unit it is shown in.
-Component get_component(const CalibrationRow& c, int component) {
-  const double unit = component < 3 ? kDegreesPerRadian : kMillimetres;
-  const auto k = static_cast<std::size_t>(component);
-  return {c.value[k] * unit, c.has_sigma ? c.sigma[k] * unit : kNone};
-}
 
 CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int camera, int component) {
+  const double unit = component < 3 ? kDegreesPerRadian : kMillimetres;
+  const auto k = static_cast<std::size_t>(component);
   CalibrationCurve curve;
   for (const CalibrationRow& c : s.calibrations) {
     if (c.camera != camera) continue;
-    const Component number = get_component(c, component);
     const double since = s.frames.empty() ? 0
                                           : (static_cast<double>(c.stamp.ns()) -
                                              static_cast<double>(s.frames.front().stamp.ns())) *
                                                 1e-9;
     const double at = std::clamp(since, 0.0, a.duration_s);
+    const CalibrationValue value{at, a.duration_s, c.value[k] * unit,
+                                 c.has_sigma ? 2 * c.sigma[k] * unit : 0};
     if (c.accepted) {
-      if (!curve.held.empty()) curve.held.back().to = at;
-      curve.held.push_back({at, a.duration_s, number.value, 2 * number.sigma});
+      if (!curve.used.empty()) curve.used.back().to = at;
+      curve.used.push_back(value);
     } else if (!c.kept) {
-      curve.rejected.push_back({at, number.value, kNone});
+      curve.rejected.push_back({at, at, value.value, 0});
     } else if (std::isfinite(c.depth_sigma_percent)) {  // else the solve came to nothing
-      curve.measured.push_back({at, number.value, 2 * number.sigma});
+      curve.measured.push_back(value);
     }
   }
   return curve;
@@ -299,40 +287,34 @@ CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int came
 
 void fit_calibration(const CalibrationCurve& curve, PlotBox* box) {
   double low = 1e300, high = -1e300;
-  const auto include = [&](double v) { low = std::min(low, v), high = std::max(high, v); };
-  for (const Held& h : curve.held) {
-    const double s = std::isfinite(h.two_sigma) ? h.two_sigma : 0;
-    include(h.value - s), include(h.value + s);
-  }
-  for (const Mark& m : curve.rejected) include(m.value);
-  for (const Mark& m : curve.measured) {
-    const double s = std::isfinite(m.two_sigma) ? m.two_sigma : 0;
-    include(m.value - s), include(m.value + s);
-  }
+  for (const auto* values : {&curve.used, &curve.rejected, &curve.measured})
+    for (const CalibrationValue& v : *values) {
+      low = std::min(low, v.value - v.two_sigma);
+      high = std::max(high, v.value + v.two_sigma);
+    }
   box->fit_y(low, high, false);
 }
 
-void draw_held(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
+void draw_calibration(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
   Line steps;
-  for (const Held& h : curve.held) {
-    if (h.two_sigma > 0)
-      svg->rect("band", box.x(h.from), box.y(h.value + h.two_sigma), box.x(h.to) - box.x(h.from),
-                box.y(h.value - h.two_sigma) - box.y(h.value + h.two_sigma));
-    steps.push_back({box.x(h.from), box.y(h.value)});
-    steps.push_back({box.x(h.to), box.y(h.value)});
+  for (const CalibrationValue& v : curve.used) {
+    const double high = box.y(v.value + v.two_sigma), low = box.y(v.value - v.two_sigma);
+    if (v.two_sigma > 0)
+      svg->rect("band", box.x(v.from), high, box.x(v.to) - box.x(v.from), low - high);
+    steps.push_back({box.x(v.from), box.y(v.value)});
+    steps.push_back({box.x(v.to), box.y(v.value)});
   }
   if (!steps.empty()) svg->lines("curve s-ours", {steps});
-  for (const Held& h : curve.held) svg->circle("f-ours", box.x(h.from), box.y(h.value), 2.6);
-}
-
-void draw_marks(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
-  for (const Mark& m : curve.measured) {
-    const double x = box.x(m.at);
-    if (m.two_sigma > 0)
-      svg->line("whisker", x, box.y(m.value + m.two_sigma), x, box.y(m.value - m.two_sigma));
-    svg->circle("seen", x, box.y(m.value), 2.8);
+  for (const CalibrationValue& v : curve.used)
+    svg->circle("f-ours", box.x(v.from), box.y(v.value), 2.6);
+  for (const CalibrationValue& v : curve.measured) {
+    const double x = box.x(v.from);
+    if (v.two_sigma > 0)
+      svg->line("whisker", x, box.y(v.value + v.two_sigma), x, box.y(v.value - v.two_sigma));
+    svg->circle("seen", x, box.y(v.value), 2.8);
   }
-  for (const Mark& m : curve.rejected) svg->circle("hollow", box.x(m.at), box.y(m.value), 3.2);
+  for (const CalibrationValue& v : curve.rejected)
+    svg->circle("hollow", box.x(v.from), box.y(v.value), 3.2);
 }
 
 void draw_verification(double at_s, const PlotBox& box, Svg* svg) {
@@ -356,8 +338,7 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
   if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
-  draw_held(curve, box, &svg);
-  draw_marks(curve, box, &svg);
+  draw_calibration(curve, box, &svg);
   return std::move(svg).finish();
 }
 

@@ -5,35 +5,38 @@
 #include "app/report/analysis.hpp"
 #include "app/report/session.hpp"
 
-/// Pictures of a session, each a whole <svg>; every coordinate is in units of its viewBox,
-/// kPlotWidth wide, so that letters stay readable on a phone. Curves are decimated so that extremes
-/// stay; where there is no value nothing is drawn.
+/// Plots of a session, each a complete <svg> with coordinates in units of its viewBox, kPlotWidth
+/// wide, so that text stays readable on a phone. Decimation keeps extremes; missing values leave
+/// gaps.
 namespace vergence::app::report {
 
 inline constexpr double kPlotWidth = 440, kPlotHeight = 190;
 
-/// A curve over the time of the frames.
+/// Curve over the time of the frames.
 struct CurvePlot {
   std::string description;
-  std::span<const double> y;  // a value a frame
+  /// One value per frame.
+  std::span<const double> y;
   const char* css = "curve s-ours";
-  bool from_zero = false;  // the y axis begins at 0
+  /// True if the y axis starts at 0.
+  bool from_zero = false;
 };
-/// Empty when there is no value at all.
+/// Empty if there is no value.
 [[nodiscard]] std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
                                      std::span<const Frame> frames);
 
-/// Ours and the reference from above, equal scale, scale bar, north arrow where up is north.
+/// Estimate and reference from above, with equal scales, a scale bar and a north arrow if up is
+/// north.
 [[nodiscard]] std::string map_plot(const Analysis& analysis, std::span<const Frame> frames);
 
-/// A lane for every status and state that occurred, and one for events. In a pixel column that
-/// holds several, each shows.
+/// Lanes for every status and state that occurred, and one for events. All values within a pixel
+/// column are visible.
 [[nodiscard]] std::string bands_plot(const Session& session, const Analysis& analysis);
 
-/// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow
-/// red marks are rejected ones, hollow grey ones what the drive measured beside one that was kept.
-/// A dashed line: the drive confirmed it there first. `component`: 0–2 rotation vector, shown in
-/// degrees; 3–5 translation, in millimetres. Empty when no row has it.
+/// Number of a camera's calibration over the run, with a band of ± 2 sigma. Hollow red marks are
+/// rejected calibrations, hollow grey ones measurements that did not replace the one in use. A
+/// dashed line marks the first verification. `component`: 0–2 rotation vector in degrees; 3–5
+/// translation in millimetres. Empty if no row has it.
 [[nodiscard]] std::string calibration_plot(const Session& session, const Analysis& analysis,
                                            int camera, int component);
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "app/report/analysis.hpp"
-#include "app/report/assessment.hpp"
 #include "app/report/page.hpp"
 #include "app/report/session.hpp"
 #include "app/runtime/durable_file.hpp"
@@ -23,17 +22,11 @@ std::string first_message(const std::vector<std::string>& messages, const char* 
 ReportOutcome write_report(const std::filesystem::path& session_folder) {
   const report::Session session = report::read_session(session_folder);
   const report::Analysis analysis = report::analyse(session);
-  const report::Assessment assessment = report::assess(session, analysis);
   ReportOutcome outcome;
   outcome.page = session_folder / "report.html";
-  replace_durably(outcome.page, report::page_html(session, analysis, assessment));
-  outcome.headline = std::string(report::spaced(assessment.grade)) + ": " + assessment.message;
-  outcome.usable = assessment.usable;
-  outcome.main_reason = assessment.main_reason;
+  outcome.assessment = report::assess(session, analysis);
   outcome.missing = session.not_had();
-  outcome.grade = report::spaced(assessment.grade);
-  outcome.reasons = assessment.reasons;
-  outcome.advice = assessment.advice;
+  replace_durably(outcome.page, report::page_html(session, analysis, outcome.assessment));
   return outcome;
 }
 
@@ -42,11 +35,11 @@ std::array<std::string, 3> closing_lines(const ReportOutcome& outcome, const std
     return {"result: unknown, no report was written",
             "to do: free space or fix permissions, then run vergence report SESSION",
             "report: " + failure};
-  const std::string why = outcome.reasons.empty() ? outcome.headline
-                          : outcome.usable
-                              ? outcome.grade + ": " + first_message(outcome.reasons, "")
-                              : "do not use these poses: " + outcome.main_reason;
-  return {"result: " + why, "to do: " + first_message(outcome.advice, "nothing"),
+  const report::Assessment& a = outcome.assessment;
+  const std::string why = a.usable ? fmt::format("{}: {}", report::spaced(a.grade),
+                                                 first_message(a.reasons, a.message.c_str()))
+                                   : "do not use these poses: " + a.main_reason;
+  return {"result: " + why, "to do: " + first_message(a.advice, "nothing"),
           "report: " + outcome.page.string()};
 }
 

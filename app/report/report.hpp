@@ -4,35 +4,29 @@
 #include <string>
 #include <vector>
 
+#include "app/report/assessment.hpp"
+
 namespace vergence::app {
 
 /// Result of writing a report.
 struct ReportOutcome {
-  std::filesystem::path page;  // SESSION/report.html
-  std::string headline;        // "Good", "Usable with care", "Do not use", and why, in one message
-  bool usable = true;          // false: no pose can be relied on
-  std::string main_reason{};   // then: why, with counts, and what to do
-  std::string grade{};         // the headline's beginning
-  std::vector<std::string> reasons{};  // half messages, the worst first
-  std::vector<std::string> advice{};   // what to do next, whole messages
+  std::filesystem::path page{};  // SESSION/report.html
+  report::Assessment assessment{};
   std::vector<std::string> missing{};  // messages: files or lines that were not there, not whole
-                                       // or not read
 };
 
-/// The end of a drive for a terminal, three lines: usable or not and why, what to do, where the
-/// report is. `failure`: why there is no report, empty: there is one.
+/// Three closing lines for the terminal: usable or not with the reason, what to do, and the path of
+/// the report. `failure` is the reason for a missing report, empty otherwise.
 [[nodiscard]] std::array<std::string, 3> closing_lines(const ReportOutcome& outcome,
                                                        const std::string& failure);
 
-/// Writes SESSION/report.html from the session's other files: one self-contained page,
-/// inline SVG, no script.
+/// Writes SESSION/report.html from the session's other files: one self-contained page with inline
+/// SVG and no script.
 ///
-/// A torn session (killed, disk full) gives a page, too: what is missing is said on it and in the
-/// outcome. Text from the files is escaped and bounded; a drive of any length gives a page of at
-/// most some 3 MB.
-/// Threads  Any; nothing is shared. Memory  Some 400 bytes a frame. Time  Linear in the frames.
-/// Errors   InputError: no folder, nothing of a session in it, or the page cannot be written (an
-///          older one is left as it was).
+/// An incomplete session (killed, disk full) also gives a page; page and outcome list what is
+/// missing. Text from files is escaped and bounded; any run gives at most some 3 MB. Thread-safe.
+/// Uses some 400 bytes and constant time per frame. Throws InputError if the directory is missing
+/// or has no session file, or the page cannot be written (an older one stays).
 ReportOutcome write_report(const std::filesystem::path& session);
 
 }  // namespace vergence::app

@@ -83,9 +83,9 @@ using Column = std::optional<std::size_t>;
 /// recorder writes. A row with another number of fields than the head has has empty ones.
 class CsvRows {
  public:
-  explicit CsvRows(FileLines* lines) : lines_(lines) {
+  explicit CsvRows(FileLines* lines) {
     std::string_view head;
-    if (!lines_->next(&head)) return;
+    if (!lines->next(&head)) return;
     std::vector<std::string_view> names(kMaxColumns);
     names.resize(std::min(split(head, ',', names), kMaxColumns));
     names_.assign(names.begin(), names.end());
@@ -97,12 +97,9 @@ class CsvRows {
     return found == names_.end() ? Column() : static_cast<std::size_t>(found - names_.begin());
   }
   /// False at the end.
-  [[nodiscard]] bool next() {
-    std::string_view line;
-    if (!lines_->next(&line)) return false;
+  void set(std::string_view line) {
     if (split(line, ',', fields_) != names_.size())
       std::fill(fields_.begin(), fields_.end(), std::string_view());
-    return true;
   }
   /// Field of the last row; empty if the column does not exist.
   [[nodiscard]] std::string_view text(Column column) const noexcept {
@@ -119,7 +116,6 @@ class CsvRows {
 
  private:
   static constexpr std::size_t kMaxColumns = 256;
-  FileLines* lines_;
   std::vector<std::string> names_;
   std::vector<std::string_view> fields_;
 };
@@ -185,17 +181,18 @@ void report_damage(const char* file, const FileLines& lines, std::size_t rows,
 
 /// Reads up to `most` rows of a file. `next` gives a row, nothing for a damaged one; false: the
 /// end.
-template <class Row, class Next>
-void read_rows(const char* file, std::size_t most, const FileLines& lines, const Next& next,
+template <class Row, class Parse>
+void read_rows(const char* file, std::size_t most, FileLines* lines, const Parse& parse,
                std::vector<Row>* rows, Session* session) {
   constexpr bool kAscending = std::is_same_v<Row, Frame> || std::is_same_v<Row, StampedPose>;
   std::size_t damaged = 0, disordered = 0;
-  for (std::optional<Row> row; next(&row);) {
+  for (std::string_view line; lines->next(&line);) {
     if (rows->size() == most) {
       session->left_out.push_back(
           fmt::format("{} has more than {} lines; the rest is left out", file, most));
       break;
     }
+    std::optional<Row> row = parse(line);
     if (!row)
       ++damaged;
     else if (kAscending && !rows->empty() && row->stamp <= rows->back().stamp)
@@ -203,7 +200,7 @@ void read_rows(const char* file, std::size_t most, const FileLines& lines, const
     else
       rows->push_back(std::move(*row));
   }
-  report_damage(file, lines, damaged, disordered, session);
+  report_damage(file, *lines, damaged, disordered, session);
 }
 
 constexpr std::size_t kMaxReasons = 64;
@@ -249,12 +246,14 @@ class PoseColumns {
   /// Nothing: the row has no stamp.
   [[nodiscard]] std::optional<Frame> read(const CsvRows& rows, Session* session) const {
     const auto stamp = rows.integer(stamp_);
-    if (!stamp) return std::nullopt;
+    const auto state = word_to_enum<State>(rows.text(state_), 6);
+    const auto status = word_to_enum<PoseStatus>(rows.text(status_), 3);
+    if (!stamp || !state || !status) return std::nullopt;
     Frame f;
     f.stamp = Stamp(*stamp);
+    f.state = *state;
+    f.status = *status;
     f.number = rows.integer(frame_).value_or(-1);
-    f.state = word_to_enum<State>(rows.text(state_), 6);
-    f.status = word_to_enum<PoseStatus>(rows.text(status_), 3);
     f.reason = reason_index(rows.text(reason_), session);
     std::array<double, 7> world{};
     f.posed = numbers(rows, world_, &world) && f.status != PoseStatus::lost &&
@@ -308,55 +307,32 @@ std::optional<StampedPose> tum_pose(std::string_view line) {
   return pose;
 }
 
-bool read_poses(const fs::path& folder, Session* session) {
-  auto lines = open_part(folder / "poses.csv",
-                         "status, inliers and times of the frames are not known", session);
-  if (!lines) return false;
+void read_poses(const fs::path& folder, Session* session) {
+  auto lines = open_part(folder / "poses.csv", "there are no poses", session);
+  if (!lines) return;
   CsvRows rows(&*lines);
   if (!rows.column("stamp_ns")) {
     session->missing.emplace_back(
-        "poses.csv has no head that names its columns: status, inliers and times of the frames are "
-        "not known");
-    return false;
+        "poses.csv has no head that names its columns: there are no poses");
+    return;
   }
   const PoseColumns columns(rows);
   constexpr std::uintmax_t kLine = 200;  // bytes, about
   std::error_code error;
   if (const auto size = fs::file_size(folder / "poses.csv", error); !error)
     session->frames.reserve(std::min(kMaxFrames, static_cast<std::size_t>(size / kLine)));
-  const auto next = [&](std::optional<Frame>* frame) {
-    if (!rows.next()) return false;
-    *frame = columns.read(rows, session);
-    return true;
+  const auto parse = [&](std::string_view line) {
+    rows.set(line);
+    return columns.read(rows, session);
   };
-  read_rows("poses.csv", kMaxFrames, *lines, next, &session->frames, session);
-  return true;
+  read_rows("poses.csv", kMaxFrames, &*lines, parse, &session->frames, session);
 }
 
-std::vector<StampedPose> read_trajectory_part(const fs::path& folder, const char* name,
-                                              const char* consequence, Session* session) {
-  std::vector<StampedPose> poses;
-  auto lines = open_part(folder / name, consequence, session);
-  if (!lines) return poses;
-  const auto next = [&lines](std::optional<StampedPose>* pose) {
-    std::string_view line;
-    if (!lines->next(&line)) return false;
-    *pose = tum_pose(line);
-    return true;
-  };
-  read_rows(name, kMaxFrames, *lines, next, &poses, session);
-  return poses;
-}
-
-void frames_from_trajectory(const fs::path& folder, Session* session) {
-  for (const StampedPose& p :
-       read_trajectory_part(folder, "trajectory.tum", "there is no trajectory", session)) {
-    Frame f;
-    f.stamp = p.stamp;
-    f.posed = true;
-    f.T_world_left = p.T_world_body;
-    session->frames.push_back(f);
-  }
+void read_reference(const fs::path& folder, Session* session) {
+  auto lines = open_part(folder / "reference.tum",
+                         "there is nothing to compare the trajectory with", session);
+  if (!lines) return;
+  read_rows("reference.tum", kMaxFrames, &*lines, tum_pose, &session->reference, session);
 }
 
 bool read_six(const CsvRows& rows, const char* prefix, std::array<double, 6>* out) {
@@ -402,12 +378,11 @@ void read_calibrations(const fs::path& folder, Session* session) {
       open_part(folder / "calibrations.csv", "how the calibration changed is not known", session);
   if (!lines) return;
   CsvRows rows(&*lines);
-  const auto next = [&rows](std::optional<CalibrationRow>* row) {
-    if (!rows.next()) return false;
-    *row = read_calibration_row(rows);
-    return true;
+  const auto parse = [&rows](std::string_view line) {
+    rows.set(line);
+    return read_calibration_row(rows);
   };
-  read_rows("calibrations.csv", kMaxCalibrations, *lines, next, &session->calibrations, session);
+  read_rows("calibrations.csv", kMaxCalibrations, &*lines, parse, &session->calibrations, session);
 }
 
 std::optional<Event> parse_event(std::string_view line) {
@@ -425,13 +400,7 @@ std::optional<Event> parse_event(std::string_view line) {
 void read_events(const fs::path& folder, Session* session) {
   auto lines = open_part(folder / "events.jsonl", "the events of the run are unknown", session);
   if (!lines) return;
-  const auto next = [&lines](std::optional<Event>* event) {
-    std::string_view line;
-    if (!lines->next(&line)) return false;
-    *event = parse_event(line);
-    return true;
-  };
-  read_rows("events.jsonl", kMaxEvents, *lines, next, &session->events, session);
+  read_rows("events.jsonl", kMaxEvents, &*lines, parse_event, &session->events, session);
 }
 
 void read_summary(const fs::path& folder, Session* session) {
@@ -470,7 +439,7 @@ void read_calibration_file(const fs::path& folder, Session* session) {
 
 bool is_session(const fs::path& folder) {
   std::error_code error;
-  for (const char* name : {"poses.csv", "trajectory.tum", "summary.json", "events.jsonl"})
+  for (const char* name : {"poses.csv", "summary.json", "events.jsonl"})
     if (fs::exists(folder / name, error)) return true;
   return false;
 }
@@ -508,19 +477,16 @@ Session read_session(const fs::path& folder) {
     throw InputError(folder.string() +
                      ": no such directory; pass the session directory (--out of run or replay)");
   if (!is_session(folder))
-    throw InputError(folder.string() +
-                     ": is not a session directory (no poses.csv, trajectory.tum, summary.json or "
-                     "events.jsonl); " +
-                     "pass the directory of --out");
+    throw InputError(
+        folder.string() +
+        ": is not a session directory (no poses.csv, summary.json or events.jsonl); pass the "
+        "directory of --out");
   Session session;
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);
-  if (!read_poses(folder, &session) || session.frames.empty())
-    frames_from_trajectory(folder, &session);
-  // Where there was nothing to compare with there is no such file.
+  read_poses(folder, &session);
   if (fs::exists(folder / "reference.tum", error) || number_at(session.summary, "metrics.ate_m"))
-    session.reference = read_trajectory_part(
-        folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
+    read_reference(folder, &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
   read_events(folder, &session);

@@ -17,16 +17,15 @@
 
 namespace vergence::app::report {
 
-inline constexpr double kNone =
-    std::numeric_limits<double>::quiet_NaN();  // a number that is not there
+/// Stands for a missing number.
+inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// A line of poses.csv, or of trajectory.tum where poses.csv is lost (then state and status are not
-/// known).
+/// A line of poses.csv.
 struct Frame {
   Stamp stamp{};
   std::int64_t number = -1;
-  std::optional<State> state{};
-  std::optional<PoseStatus> status{};
+  State state{};
+  PoseStatus status{};
   /// Index into Session::reasons.
   std::uint16_t reason = 0;
   bool posed = false;
@@ -46,11 +45,11 @@ struct Frame {
   double estimate_ms = kNone;
 };
 
-/// A line of calibrations.csv.
+/// Line of calibrations.csv.
 struct CalibrationRow {
   Stamp stamp{};
   bool accepted = false;
-  /// A refinement that is no better than the calibration in use; this is no rejection.
+  /// True for a refinement that was not better than the calibration in use, which is no rejection.
   bool kept = false;
   /// Decided while driving; false for the initial calibration.
   bool decided = false;
@@ -63,8 +62,8 @@ struct CalibrationRow {
   /// Total sigma, or that of the noise alone; valid if has_sigma.
   std::array<double, 6> sigma{};
   bool has_sigma = false;
-  // Depth measured online by then: its distance, its sigma, and the error
-  // of the calibration in use.
+  // Depth measured online at that time: its distance, its sigma, and the error of the calibration
+  // in use.
   double reference_depth_m = kNone, depth_sigma_percent = kNone, depth_error_percent = kNone;
 };
 
@@ -73,8 +72,8 @@ struct Event {
   std::string kind{}, message{};
 };
 
-/// Stamps of `frames` and of `reference` ascend strictly; rows that break this are left out and
-/// told in `missing`.
+/// Content of a session. Stamps of `frames` and `reference` increase strictly; other rows are
+/// dropped and reported in `missing`.
 struct Session {
   std::string name{};
   std::vector<Frame> frames{};
@@ -84,14 +83,15 @@ struct Session {
   std::vector<StampedPose> reference{};
   std::vector<CalibrationRow> calibrations{};
   std::vector<Event> events{};
-  nlohmann::json summary{};  // null when it is missing or no JSON
+  /// Null if missing or invalid.
+  nlohmann::json summary{};
   std::optional<CalibrationFile> calibration{};
   /// A message for each missing file.
   std::vector<std::string> missing{};
   /// A message for each file that is longer than the limit.
   std::vector<std::string> left_out{};
 
-  /// All that the report does not have: what was left out first.
+  /// Everything that the report lacks, first the files over the limit.
   [[nodiscard]] std::vector<std::string> not_had() const {
     std::vector<std::string> messages = left_out;
     messages.insert(messages.end(), missing.begin(), missing.end());
@@ -99,22 +99,21 @@ struct Session {
   }
 };
 
-inline constexpr std::size_t kMaxFrames =
-    4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
+/// 37 hours at 30 Hz; further frames are dropped and reported.
+inline constexpr std::size_t kMaxFrames = 4'000'000;
 inline constexpr std::size_t kMaxEvents = 200'000;
 inline constexpr std::size_t kMaxCalibrations = 20'000;
-inline constexpr std::size_t kLongestText =
-    300;  // characters kept of a word or message from outside
+/// Maximum number of characters of an external value or message.
+inline constexpr std::size_t kLongestText = 300;
 
-/// Reads what is there, line by line: no file is held in memory. Errors  InputError: `folder` is no
-/// folder, or none of a session's files is in it.
+/// Reads the files line by line, without holding one in memory. Throws InputError if `folder` is
+/// not a directory or has no session file.
 [[nodiscard]] Session read_session(const std::filesystem::path& folder);
 
 /// True if it was recorded from devices; false for a replay, or if unknown.
 [[nodiscard]] bool is_live(const Session& session);
 
-/// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no
-/// number.
+/// Finite number of summary.json by its path, such as `metrics.ate_m`; empty for anything else.
 [[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);
 /// Reads a boolean at a path.
 [[nodiscard]] std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path);

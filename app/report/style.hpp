@@ -4,12 +4,14 @@
 
 namespace vergence::app::report {
 
-/// A colour with a job, for a light and a dark page: #rrggbb.
+/// Colour for the light and the dark page, as #rrggbb.
 struct Colour {
-  const char* name;  // of the CSS variable
+  /// Name of the CSS variable.
+  const char* name;
   const char* light;
   const char* dark;
-  bool text;  // letters have it: contrast of 4.5 to `page` and `panel`, others of 3
+  /// True for text, which needs a contrast of 4.5 to `page` and `panel`; others need 3.
+  bool text;
 };
 
 inline constexpr Colour kPage{"page", "#f5f6f8", "#101418", false};

@@ -16,65 +16,70 @@
 
 namespace vergence::app::ros2 {
 
-/// Where messages go: a DDS, or a test.
+/// Receiver of messages: DDS, or a test.
 class TopicWriter {
  public:
   virtual ~TopicWriter() = default;
-  /// Announces a topic, `/tf`; again: no effect. `latched`: readers that come later get the last
-  /// message.
+  /// Announces a topic such as `/tf`; has no effect if repeated. With `latched`, late readers get
+  /// the last message.
   virtual void advertise(const std::string& topic, RosType type, bool latched) = 0;
-  /// `cdr`: the message with its encapsulation. The topic was announced.
+  /// Publishes a message with its encapsulation. The topic must be announced.
   virtual void publish(const std::string& topic, std::span<const std::uint8_t> cdr) = 0;
 };
 
-/// Frames and topics (docs/ros2.md draws them).
+/// Frames and topics (drawn in docs/ros2.md).
 struct BridgeOptions {
-  std::string name_space = "/vergence";  // of the topics that are not ROS's own
+  /// Prefix of topics that are not ROS's own.
+  std::string name_space = "/vergence";
   std::string odom_frame = "odom", base_frame = "base_link", enu_frame = "enu";
-  bool camera_child = false;  // the child of odometry is the left camera's optical frame
-  bool publish_tf = true;     // odom → child
-  bool images = false;        // image_raw of the left and the right camera
-  Transform T_base_left{};    // pose of the left camera's optical axes in base_frame
+  /// If true, the child of odometry is the left camera's optical frame.
+  bool camera_child = false;
+  /// Publishes odom → child.
+  bool publish_tf = true;
+  /// Publishes image_raw of the left and right camera.
+  bool images = false;
+  /// Pose of the left camera's optical axes in base_frame.
+  Transform T_base_left{};
 };
 
-/// Makes ROS 2 messages of lines of the pose stream, version 2.
-///
-/// Threads  Not thread-safe: call from one thread.
-/// Errors   A line of another version: InputError. A malformed line is left out and counted.
+/// Converts lines of the pose stream, version 2, to ROS 2 messages. Not thread-safe. Throws
+/// InputError for another version; malformed lines are ignored and counted.
 class Bridge {
  public:
-  static constexpr int kVersion = 2;  // of the pose stream
+  /// Version of the pose stream.
+  static constexpr int kVersion = 2;
 
-  /// Answer to a request.
+  /// Response to a request.
   struct Response {
     bool accepted = false;
     std::string message{};
   };
 
-  /// Announces all topics but those of cameras, whose names come with the calibration. `writer`
-  /// outlives it.
+  /// Announces all topics except those of cameras, whose names come with the calibration. `writer`
+  /// must outlive it.
   Bridge(const BridgeOptions& options, TopicWriter* writer);
   ~Bridge();
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 
-  /// A line without its line feed. Returns the response that it holds.
+  /// Adds a line without its line feed. Returns the response that it contains.
   std::optional<Response> add(std::string_view line);
-  /// The line in front of an image; any other has no effect. Returns the image's size in bytes.
+  /// Handles the line before an image; others have no effect. Returns the image's size in bytes.
   std::size_t begin_image(std::string_view line);
-  /// The pixels that followed. camera_info is published with the image's stamp, so that
-  /// stereo_image_proc finds the two together. Without a calibration nothing is published.
+  /// Handles the pixels that followed. camera_info gets the image's stamp, because
+  /// stereo_image_proc requires equal stamps. Without a calibration nothing is published.
   void end_image(std::string_view pixels);
-  /// The connection has ended: speeds are not measured across it.
+  /// Called after a disconnect, because velocities are not measured across it.
   void disconnected() noexcept { previous_.reset(); }
-  /// Publishes diagnostics of level STALE. `message`: why there is no status.
+  /// Publishes diagnostics of level STALE with the reason `message`.
   void publish_stale(Stamp now, const std::string& message);
-  /// Lines that were left out, and status lines, since the start.
+  /// Number of ignored lines, and of status lines, since the start.
   [[nodiscard]] std::uint64_t malformed() const noexcept { return malformed_; }
   [[nodiscard]] std::uint64_t statuses() const noexcept { return statuses_; }
 
  private:
-  using Covariance = Eigen::Matrix<double, 6, 6>;  // translation, rotation
+  // Order: translation, rotation.
+  using Covariance = Eigen::Matrix<double, 6, 6>;
 
   struct PosedChild {
     Stamp stamp{};
@@ -83,7 +88,8 @@ class Bridge {
   struct Alignment {
     Transform T_enu_world{};
     LocalTangentPlane plane{};
-    Vec3 position_variance = Vec3::Zero(), rotation_variance = Vec3::Zero();  // m², rad²
+    // In m² and rad².
+    Vec3 position_variance = Vec3::Zero(), rotation_variance = Vec3::Zero();
   };
 
   void on_pose(const nlohmann::json& line);
@@ -100,21 +106,25 @@ class Bridge {
 
   const BridgeOptions options_;
   TopicWriter* const writer_;
-  // The odometry's frames, and the child as seen from the left camera.
+  // Transforms of the odometry's frames, and of the child in the left camera's frame.
   const Transform T_odom_world_, T_left_child_;
   std::string child_frame_;
   const std::string odometry_topic_, fix_topic_, pose_enu_topic_;
 
   std::optional<PosedChild> previous_{};
   std::optional<Alignment> alignment_{};
-  std::string calibration_text_{}, rating_{};  // the newest line; its rating, empty: none
-  RigCalibration rig_{};                       // of the newest line
-  std::vector<std::string> names_{};           // of its cameras, as parts of topics and frames
+  // Newest calibration line, and its rating; empty if there is none.
+  std::string calibration_text_{}, rating_{};
+  // Rig of the newest line.
+  RigCalibration rig_{};
+  // Names of its cameras, as parts of topics and frames.
+  std::vector<std::string> names_{};
+  // Image whose pixels follow.
   struct {
     std::size_t camera = 0;
     Stamp stamp{};
     int width = 0, height = 0;
-  } image_;  // whose pixels come next
+  } image_;
   std::uint64_t malformed_ = 0, statuses_ = 0, dropped_ = 0;
   std::vector<std::uint8_t> buffer_;
 };

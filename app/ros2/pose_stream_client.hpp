@@ -7,33 +7,35 @@
 
 namespace vergence::app::ros2 {
 
-/// A reader of the pose stream's Unix socket (docs/live_interface.md).
+/// Reader of the pose stream's Unix socket (docs/live_interface.md). Not thread-safe. No call
+/// blocks.
 ///
-/// Threads  Not thread-safe: call from one thread. Nothing waits.
-/// Memory   One line of at most kMaxLine bytes and the image that follows it, of at most kMaxImage
-///          bytes; longer ones close the connection.
+/// Holds one line of at most kMaxLine bytes and the following image of at most kMaxImage bytes;
+/// longer ones close the connection.
 class PoseStreamClient {
  public:
-  static constexpr std::size_t kMaxLine = std::size_t{64} << 10;    // bytes
-  static constexpr std::size_t kMaxImage = std::size_t{128} << 20;  // bytes
+  /// In bytes.
+  static constexpr std::size_t kMaxLine = std::size_t{64} << 10;
+  /// In bytes.
+  static constexpr std::size_t kMaxImage = std::size_t{128} << 20;
 
-  /// Receives a line without its line feed. Returns the number of bytes behind the line that are
-  /// no lines: an image's.
+  /// Receives a line without its line feed. Returns the size of the image that follows the line, in
+  /// bytes.
   using OnLine = std::function<std::size_t(std::string_view line)>;
-  /// Receives those bytes.
+  /// Receives the image.
   using OnImage = std::function<void(std::string_view pixels)>;
 
-  /// `address`: unix:///PATH. InputError: another form.
+  /// `address` is unix:///PATH; throws InputError for another form.
   explicit PoseStreamClient(std::string_view address);
 
-  /// Returns 0 when there is a connection now, else errno.
+  /// Returns 0 if connected, else errno.
   int connect();
   [[nodiscard]] bool connected() const noexcept { return static_cast<bool>(socket_); }
   /// Descriptor to poll; −1 without a connection.
   [[nodiscard]] int descriptor() const noexcept { return socket_.get(); }
-  /// Hands over the complete lines and images that have arrived. False: the connection has ended.
+  /// Passes on the complete lines and images received. Returns false if the connection has ended.
   bool read(const OnLine& on_line, const OnImage& on_image);
-  /// Sends a line, its line feed included. False: not sent.
+  /// Sends a line including its line feed. Returns false if it was not sent.
   bool send(std::string_view line) noexcept;
   void close() noexcept;
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
@@ -41,8 +43,10 @@ class PoseStreamClient {
  private:
   std::string path_;
   FileDescriptor socket_;
-  std::string rest_;            // the beginning of a line or an image
-  std::size_t image_size_ = 0;  // bytes of the image that comes next; 0: a line comes next
+  // Incomplete line or image.
+  std::string rest_;
+  // Size of the next image in bytes; 0 if a line is next.
+  std::size_t image_size_ = 0;
 };
 
 }  // namespace vergence::app::ros2

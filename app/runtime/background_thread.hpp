@@ -1,6 +1,7 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <thread>
 
@@ -8,16 +9,16 @@
 
 namespace vergence::app {
 
-/// A BackgroundRunner on a thread of its own, made with it. Both sides spin for 20 µs before they
-/// sleep in the kernel: the halves of a front end end within microseconds of each other, and waking
-/// a sleeper costs more than that.
+/// BackgroundRunner on its own thread. Both sides spin for 20 µs before they sleep in the kernel:
+/// the two halves of a front end finish within microseconds of each other, and waking a sleeper
+/// costs more.
 ///
-/// Threads  start(), busy(), wait(): one thread. The task runs on the other; the calibration
-///          solver's yields to the estimator's where a core is short.
-/// Memory   None after construction; the thread is sealed (AllocationGuard), a reader's is not: its
-///          tasks read files. No lock: start() and busy() never wait.
-/// Errors   The constructor throws std::system_error when no thread can be had. The destructor
-///          waits for the task.
+/// Threads  One thread calls start(), busy() and wait(); the task runs on the other. The
+///          calibration solver's thread has lower priority than the estimator's.
+/// Memory   Does not allocate after construction. The thread is sealed (AllocationGuard), except a
+///          reader's, whose tasks read files. start() and busy() never wait.
+/// Errors   The constructor throws std::system_error if there is no thread. The destructor waits
+///          for the task.
 class BackgroundThread final : public BackgroundRunner {
  public:
   enum class Role : std::uint8_t { solver, front_end, reader };
@@ -34,15 +35,19 @@ class BackgroundThread final : public BackgroundRunner {
  private:
   void work(Role role) noexcept;
 
-  std::optional<TaskRef> task_{};        // published by asked_
-  bool stop_ = false;                    // published by asked_
-  std::atomic<std::uint32_t> asked_{0};  // calls of start(), and one for the end
-  std::atomic<std::uint32_t> done_{0};   // calls the thread has answered
+  // Published by asked_.
+  std::optional<TaskRef> task_{};
+  // Published by asked_.
+  bool stop_ = false;
+  // Number of calls of start(), and one for the end.
+  std::atomic<std::uint32_t> asked_{0};
+  // Number of completed calls.
+  std::atomic<std::uint32_t> done_{0};
   std::thread thread_;
 };
 
-/// A PairRunner with one such thread: `here` on the caller, `there` on the thread, at the same
-/// time.
+/// PairRunner with one such thread: runs `here` on the caller and `there` on the thread, in
+/// parallel.
 class ThreadRunner final : public PairRunner {
  public:
   explicit ThreadRunner(BackgroundThread::Role role = BackgroundThread::Role::front_end)
@@ -58,6 +63,12 @@ class ThreadRunner final : public PairRunner {
   BackgroundThread thread_;
 };
 
+/// One worker beside the estimator with two threads or more.
+[[nodiscard]] inline std::unique_ptr<PairRunner> make_runner(int threads) {
+  if (threads >= 2) return std::make_unique<ThreadRunner>();
+  return std::make_unique<SequentialRunner>();
+}
+
 /// The calibration solver's runner, with a note of the frames at which it was found idle: the one
 /// thing by which time decides what the estimator does. With that note it answers in a replay as it
 /// did in the drive.
@@ -67,13 +78,13 @@ class ReplayableSolverRunner final : public BackgroundRunner {
  public:
   explicit ReplayableSolverRunner(BackgroundRunner& solver) noexcept : solver_(solver) {}
 
-  /// Before Estimator::process(). `idle_then`: of a replay, what was found at this frame of the
-  /// drive: busy() says the same, waiting where the solver is slower now.
+  /// Call before Estimator::process(). `idle_then` is the recorded value in a replay: busy() then
+  /// returns the same, and waits if the solver is slower now.
   void begin_frame(std::optional<bool> idle_then) noexcept {
     idle_then_ = idle_then;
     found_idle_ = false;
   }
-  /// busy() was asked since begin_frame(), and the task was done.
+  /// True if busy() found the task done since begin_frame().
   [[nodiscard]] bool found_idle() const noexcept { return found_idle_; }
 
   void start(TaskRef task) noexcept override { solver_.start(task); }

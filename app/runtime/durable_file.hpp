@@ -4,21 +4,21 @@
 
 namespace vergence::app {
 
-/// Puts a whole file in the place of another: written beside it, synchronised, renamed, the folder
-/// synchronised. A power cut or a full disk leaves the old file or the new one, never a part.
-/// Devices and folders are not replaced.
+/// Replaces a file atomically: writes a temporary file next to it, synchronises, renames and
+/// synchronises the directory. A power cut or a full disk leaves the old or the new file, never a
+/// part. Devices and directories are not replaced.
 ///
-/// Threads  Two writers of one file at a time spoil each other's. Errors  InputError with the file,
-/// what the system says and what to do.
+/// Two simultaneous writers of one file corrupt it. Throws InputError with the file, the system's
+/// reason and the fix.
 void replace_durably(const std::filesystem::path& file, std::string_view text);
 
-/// Returns true if the session's folder exists and is empty. InputError: it exists and is not
-/// empty, or is no folder.
+/// Returns true if the session's directory exists and is empty. Throws InputError if it is not
+/// empty, or not a directory.
 bool check_session_folder(const std::filesystem::path& folder);
-/// Makes the folder of a session. False: it was there, empty. InputError: it exists and is not
-/// empty, is no folder, or cannot be made.
+/// Makes the directory of a session. Returns false if it existed and was empty. Throws InputError
+/// if it is not empty, not a directory, or cannot be made.
 bool make_session_folder(const std::filesystem::path& folder);
-/// Undoes make_session_folder(): removes what is in the folder, and with `made` the folder itself.
+/// Undoes make_session_folder(): removes the directory's content and, with `made`, the directory.
 void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept;
 
 }  // namespace vergence::app

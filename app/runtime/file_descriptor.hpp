@@ -5,7 +5,7 @@
 
 namespace vergence::app {
 
-/// A file descriptor that is closed with its owner. Moves; −1: none.
+/// File descriptor that is closed on destruction; −1 if empty. Movable.
 class FileDescriptor {
  public:
   FileDescriptor() = default;

@@ -25,30 +25,23 @@ namespace vergence::app {
   return distinct;
 }
 
-/// Insertions, deletions, replacements and exchanges of neighbours that turn `a` into `b`, bytes,
-/// upper and lower case alike (optimal string alignment). O(|a|·|b|) time, O(|b|) memory; only the
-/// first 256 bytes of each are looked at.
+/// Number of insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`, in
+/// bytes and case-insensitively (optimal string alignment). O(
+/// a
+/// ·
+/// b
+/// ) time, O(
+/// b
+/// ) memory; uses only the first 256 bytes of each.
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
 
-/// The known word closest to a mistyped one; the first of several equally close. Nothing when every
-/// word would have to be changed by more than half.
+/// Known word closest to a mistyped one, the first of several. Empty if every word would need
+/// changes to more than half.
 [[nodiscard]] std::optional<std::string> nearest(std::string_view word,
                                                  const std::vector<std::string>& known);
 
-/// `; did you mean "X"?` for a message, or "" when nothing is near.
+/// Text `; did you mean "X"?` for a message, or "" if no word is close.
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        const std::vector<std::string>& known);
-
-/// A name of an earlier version that a user may still write.
-struct Renamed {
-  enum class Kind { key, value, option } kind;
-  std::string_view name;  // record.roll_mb, sync.mode bus, run --page
-  std::string_view now;   // the new name
-};
-
-[[nodiscard]] std::span<const Renamed> renamed();
-
-/// `; it is now …` for an error message about an unknown name; empty where it was not renamed.
-[[nodiscard]] std::string new_name(Renamed::Kind kind, std::string_view name);
 
 }  // namespace vergence::app

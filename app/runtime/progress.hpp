@@ -13,41 +13,49 @@ namespace vergence::app {
 
 /// Content of the progress line; unset fields are omitted.
 struct ProgressState {
-  std::string state{};                  // `stereo`
-  std::uint64_t frame = 0;              // done so far
-  std::uint64_t frames = 0;             // in all; 0 if unknown (then no remaining time is printed)
-  double path_m = 0;                    // travelled
-  std::optional<int> inliers{};         // of the last pose
-  std::optional<double> estimate_ms{};  // of the last frame
-  std::optional<double> from_ins_m{};   // distance to the INS
-  std::string activity{};  // instead of path and figures, where there are none: `calibrate · frame
-                           // 7/26 · 5 with the board`
+  /// State, such as `stereo`.
+  std::string state{};
+  /// Number of frames done.
+  std::uint64_t frame = 0;
+  /// Total number of frames; 0 if unknown (no remaining time is then printed).
+  std::uint64_t frames = 0;
+  /// Distance travelled.
+  double path_m = 0;
+  /// Inliers of the last pose.
+  std::optional<int> inliers{};
+  /// Time of the last frame.
+  std::optional<double> estimate_ms{};
+  /// Distance to the INS.
+  std::optional<double> from_ins_m{};
+  /// Text in place of path and measurements: `calibrate · frame 7/26 · 5 with the board`.
+  std::string activity{};
 };
 
-/// `stereo · frame 1204/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 03:12 left`
+/// Progress line: `stereo · frame 1204/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS ·
+/// 03:12 left`
 ///
-/// terminal  one line, redrawn at most 10 times a second, cut to the terminal's width
-/// lines     one line every 10 s, the last one at finish(): for files and pipes
-/// quiet     nothing
-/// Not thread-safe. Time  Monotonic, from the clock handed in. Errors  A stream that fails is
-///           ignored.
+/// terminal  one line, redrawn at most 10 times per second, cut to the terminal's width
+/// lines     for files and pipes: one line every 10 s, the last one at finish()
+/// quiet     no output
+///
+/// Not thread-safe. Uses the given monotonic clock. Errors of the stream are ignored.
 class Progress {
  public:
   enum class Mode : std::uint8_t { terminal, lines, quiet };
-  /// `width` in columns is asked at every redraw, as a terminal may be resized; < 1: not known, 80.
+  /// `width` in columns is queried at every redraw, because a terminal may be resized; below 1 it
+  /// is unknown, and 80 is used.
   Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock,
            std::function<int()> width);
-  /// On standard error with the machine's clock: terminal or lines by what standard error is.
+  /// Writes to stderr with the machine's clock, in a mode that depends on stderr.
   [[nodiscard]] static Progress on_stderr(bool quiet);
   /// Ends the line as finish() does.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Called as often as wanted; draws when it is time. The clock of the rate starts with the first
-  /// call.
+  /// Stores the state and draws it when due. The first call starts the clock of the rate.
   void update(const ProgressState& state);
-  /// A message for the user between the redraws, on a line of its own; also with `quiet`.
+  /// Prints a message on its own line, also with `quiet`.
   void print(std::string_view message);
   /// Draws the last state and ends the line. Later updates start a new one.
   void finish();
@@ -64,11 +72,14 @@ class Progress {
   std::function<HostStamp()> clock_;
   std::function<int()> width_;
   ProgressState last_{};
-  bool started_ = false;  // an update has come since the start or the last finish()
-  bool drawn_ = false;    // the last update is on the screen
+  // True after an update since the start or the last finish().
+  bool started_ = false;
+  // True if the last update is on the screen.
+  bool drawn_ = false;
   HostStamp first_time_{}, drawn_time_{};
   std::uint64_t first_frame_ = 0;
-  std::size_t columns_ = 0;  // of the line on the terminal now
+  // Length of the line now on the terminal.
+  std::size_t columns_ = 0;
 };
 
 }  // namespace vergence::app

@@ -13,17 +13,16 @@
 
 namespace vergence::app {
 
-/// Policy for the newest item when a queue is full: its producer waits (replay, virtual time), or
-/// it is dropped (live).
+/// Policy for the newest item if a queue is full: its producer waits (replay, virtual time), or the
+/// item is dropped (live).
 enum class WhenFull : std::uint8_t { wait, drop };
 
-/// A bounded queue and the thread that takes from it, for producers that must never wait for a
-/// disk.
+/// Bounded queue and the thread that reads it, for producers that must not wait for a disk.
 ///
-/// Threads  start(), stop(): the owner's, stop() after the last post(). post(), high_water(): one
-///          producer.
-/// Memory   Fixed; post() takes none.
-/// Errors   start() throws std::system_error when no thread can be had.
+/// Threads  The owner calls start() and, after the last post(), stop(). One producer calls post()
+///          and high_water().
+/// Memory   Fixed; post() does not allocate.
+/// Errors   start() throws std::system_error if there is no thread.
 template <class Item, std::size_t N>
 class QueueThread {
  public:
@@ -32,8 +31,8 @@ class QueueThread {
   QueueThread(const QueueThread&) = delete;
   QueueThread& operator=(const QueueThread&) = delete;
 
-  /// `begin` is called first on the thread; `handle` with every item in order, and with null
-  /// whenever none waits.
+  /// Calls `begin` first on the thread, then `handle` with every item in order, and with null
+  /// whenever the queue is empty.
   template <class Begin, class Handle>
   void start(const char* name, Begin begin, Handle handle) {
     thread_ = std::thread([this, name, begin = std::move(begin), handle = std::move(handle)] {
@@ -41,7 +40,7 @@ class QueueThread {
       begin();
       for (Item item;;) {
         const WakeEvent::Ticket seen = filled_.ticket();
-        // Before the ring: what was posted before stop() is still found.
+        // Read before the ring, so that items posted before stop() are found.
         const bool stopping = stop_.load(std::memory_order_acquire);
         if (ring_.pop(&item)) {
           freed_.signal();
@@ -56,7 +55,8 @@ class QueueThread {
     });
   }
 
-  /// False: it was dropped. Where items are dropped, `spare` places stay free for others.
+  /// Returns false if the item was dropped. If items are dropped, `spare` places stay free for
+  /// others.
   bool post(const Item& item, std::size_t spare = 0) noexcept {
     for (;;) {
       const WakeEvent::Ticket seen = freed_.ticket();
@@ -68,7 +68,7 @@ class QueueThread {
     filled_.signal();
     return true;
   }
-  /// Handles what waits and joins. Twice is harmless.
+  /// Handles the remaining items and joins. May be called twice.
   void stop() noexcept {
     if (!thread_.joinable()) return;
     stop_.store(true, std::memory_order_release);

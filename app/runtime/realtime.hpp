@@ -1,54 +1,47 @@
 #pragma once
-#include <sched.h>
 #include <sys/types.h>
 
 #include <map>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace vergence::app {
 
-/// Processors as taskset(1) has them, `0-1,3`. Nothing: another text, an empty one, or a number
-/// beyond CPU_SETSIZE.
-[[nodiscard]] std::optional<cpu_set_t> parse_cpu_list(std::string_view text) noexcept;
-
 /// A thread of this program, as the kernel lists it.
 struct ProcessThread {
   pid_t id = 0;
-  std::string name{};  // at most 15 bytes: what pthread_setname_np gave it, else the creator's
+  /// At most 15 bytes: the name set by pthread_setname_np, else the creator's.
+  std::string name{};
 
-  /// One of ours that has its name; what a library starts is called otherwise.
+  /// True for a thread named by this program; those of libraries have other names.
   [[nodiscard]] bool ours() const noexcept { return name.starts_with("vergence"); }
 };
 
-/// All threads of this program into `threads`, by /proc/self/task; none where there is none such. A
-/// thread that has just begun may still have its creator's name.
+/// Lists all threads of this program in `threads` by /proc/self/task. A new thread may still have
+/// its creator's name.
 void process_threads(std::vector<ProcessThread>* threads);
 
 /// Real-time role of a thread, by its name (docs/deployment.md has the table).
 enum class ThreadRole : std::uint8_t {
-  capture,     // cameras, trigger, synchroniser: short, and never late
-  estimator,   // and its worker
-  ins,         // readings of the INS
-  background,  // files, publishers, exposure control
-  solver,      // the calibration solver: has what the others leave
-  other        // the caller's thread, the mock's world, threads of libraries: left as they are
+  /// Cameras, trigger and synchroniser, which are short and must not be late.
+  capture,
+  /// Estimator and its worker.
+  estimator,
+  /// Samples of the INS.
+  ins,
+  /// Files, publishers and exposure control.
+  background,
+  /// Calibration solver, which gets the remaining time.
+  solver,
+  /// Unchanged: the caller's thread, the simulated world, threads of libraries.
+  other
 };
 
 [[nodiscard]] ThreadRole thread_role(std::string_view name) noexcept;
 
-/// SCHED_FIFO priority of a role where the most urgent has `top`; 0: SCHED_OTHER.
+/// SCHED_FIFO priority of a role if the most urgent one has `top`; 0 means SCHED_OTHER.
 [[nodiscard]] int role_priority(ThreadRole role, int top) noexcept;
-
-/// `realtime:` of the configuration.
-struct RealtimeRequest {
-  int priority = 0;                     // of ThreadRole::capture; 0: no thread asks for one
-  std::optional<cpu_set_t> affinity{};  // of all roles but `other` and the solver's
-  std::optional<cpu_set_t> solver_affinity{};
-  bool lock_memory = false;
-};
 
 /// The system calls below, for tests to replace. Each returns 0 or errno.
 class RealtimeSystem {
@@ -56,39 +49,33 @@ class RealtimeSystem {
   enum class Locked : std::uint8_t { everything, present };
 
   virtual ~RealtimeSystem() = default;
-  /// SCHED_FIFO for that thread; what it starts is SCHED_OTHER again.
+  /// Sets SCHED_FIFO for that thread; the threads it starts are SCHED_OTHER again.
   [[nodiscard]] virtual int set_fifo(pid_t thread, int priority);
-  [[nodiscard]] virtual int set_affinity(pid_t thread, const cpu_set_t& cpus);
   /// Locks what is mapped now, all of it resident, and where no limit stands in the way what is
   /// mapped later, as it is first used.
   [[nodiscard]] virtual int lock_memory(Locked* locked);
 };
 
-/// Gives the threads of a drive the scheduling that the configuration asks for. A thread is
-/// recognised by its name, so drivers and publishers need not know of it.
+/// Applies the configured scheduling to the threads of a run. Threads are recognised by name, so
+/// drivers and publishers do not depend on this. Called by one thread that is not of the run.
 ///
-/// Threads  One, which is none of the drive's.
-/// Errors   A refusal by the system is a message, once for each key, with what allows it; the
-///          drive goes on.
+/// A refusal by the system gives a message with the fix, once per key; the run continues.
 class RealtimeThreads {
  public:
-  RealtimeThreads(const RealtimeRequest& request, RealtimeSystem& system) noexcept
-      : request_(request), system_(system) {}
+  /// `priority`: of ThreadRole::capture; 0: no thread gets one.
+  RealtimeThreads(int priority, RealtimeSystem& system) noexcept
+      : priority_(priority), system_(system) {}
 
-  /// Locks memory, if asked for: when everything is set up, before the first frame.
+  /// Locks memory: call it when everything is set up, before the first frame.
   [[nodiscard]] std::vector<std::string> lock_memory();
-  /// Priority and processors of the threads that were not there at the last call.
+  /// Sets the priority of the threads that were not there at the last call.
   [[nodiscard]] std::vector<std::string> apply(const std::vector<ProcessThread>& threads);
 
  private:
-  void apply(const ProcessThread& thread, std::vector<std::string>* messages);
-  void set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
-                    std::vector<std::string>* messages);
-
-  RealtimeRequest request_;
+  const int priority_;
   RealtimeSystem& system_;
   std::map<pid_t, ThreadRole> done_{};
-  bool priority_refused_ = false, affinity_refused_ = false, solver_affinity_refused_ = false;
+  bool refused_ = false;
 };
 
 }  // namespace vergence::app

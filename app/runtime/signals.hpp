@@ -6,15 +6,13 @@
 
 namespace vergence::app {
 
-/// SIGINT and SIGTERM become a flag that a command looks at between frames: it stops, closes its
-/// session and returns stop_code(). SIGHUP does the same, unless it was ignored before (nohup).
-/// SIGUSR1 asks for a new calibration; a command that has none to make takes no notice. SIGPIPE,
-/// SIGXFSZ and SIGUSR2 are ignored: they would end a drive without its summary and report.
+/// Turns SIGINT and SIGTERM into a flag that a command checks between frames; it then closes its
+/// session and returns stop_code(). SIGHUP does the same unless it was ignored before (nohup).
+/// SIGUSR1 requests a calibration, if the command supports it. SIGPIPE, SIGXFSZ and SIGUSR2 are
+/// ignored, because they would end a run without its summary and report.
 ///
-/// Ownership  One at a time in a program; the destructor puts the former handlers back.
-/// Threads    All but construction and destruction from any thread.
-/// Errors     A second signal of the same kind ends the program at once, as it would without this:
-///            the way out of a hang.
+/// One object at a time; the destructor restores the former handlers. Other calls are thread-safe.
+/// A second signal of the same kind ends the program immediately, as a way out of a hang.
 class SignalGuard {
  public:
   SignalGuard();
@@ -23,10 +21,10 @@ class SignalGuard {
   SignalGuard& operator=(const SignalGuard&) = delete;
 
   [[nodiscard]] bool stop_requested() const noexcept;
-  /// `interrupted` (130) or `terminated` (143; SIGHUP, too) by the first signal that came; nothing
-  /// when none did.
+  /// `interrupted` (130) or `terminated` (143, also for SIGHUP) by the first signal; empty if there
+  /// was none.
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
-  /// Returns true if SIGUSR1 was received since the last call, however often.
+  /// Returns true if SIGUSR1 was received since the last call.
   [[nodiscard]] bool poll_calibration_request() const noexcept;
 
  private:

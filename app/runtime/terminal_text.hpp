@@ -4,19 +4,19 @@
 #include <string_view>
 #include <vector>
 
-/// Plain text for people who read it on a terminal, in a file or in a pipe.
+/// Plain text for a terminal, a file or a pipe.
 namespace vergence::app {
 
-/// Columns that a text takes: its code points; what is printed here has no wide ones.
+/// Number of columns of a text: its code points, because no wide ones are printed.
 [[nodiscard]] std::size_t columns(std::string_view utf8) noexcept;
-/// The text and blanks up to `width` columns; longer texts stay as they are.
+/// Pads the text with blanks to `width` columns; longer texts are unchanged.
 [[nodiscard]] std::string padded(std::string_view text, std::size_t width);
-/// Lines of at most `width` columns, broken at blanks; a longer word gets a line of its own. At
-/// least one line.
+/// Splits into lines of at most `width` columns at blanks; a longer word gets its own line. Returns
+/// at least one line.
 [[nodiscard]] std::vector<std::string> wrapped(std::string_view text, std::size_t width);
 
-/// Standard output: its width (100 where it is no terminal, at least 60), and whether colours are
-/// welcome (a terminal that can, NO_COLOR unset).
+/// Width of standard output (100 if it is no terminal, at least 60), and whether to use colours (a
+/// capable terminal, NO_COLOR unset).
 struct Terminal {
   std::size_t width = 100;
   bool colours = false;
@@ -26,10 +26,10 @@ struct Terminal {
   [[nodiscard]] std::string in(Ink ink, std::string_view text) const;
 };
 
-/// Length of the well-formed UTF-8 character at the front of a text that is not empty; 0: none.
+/// Length of the well-formed UTF-8 character at the front of a non-empty text; 0 if there is none.
 [[nodiscard]] std::size_t utf8_length(std::string_view text);
-/// Whatever is not printable becomes a blank, and bytes that are no UTF-8 become question marks:
-/// texts of devices and files must not steer a terminal or spoil a JSON.
+/// Replaces unprintable characters by blanks and invalid UTF-8 by question marks, because texts of
+/// devices and files must not control a terminal or corrupt JSON.
 [[nodiscard]] std::string harmless(std::string_view text);
 
 }  // namespace vergence::app

@@ -15,11 +15,12 @@
 
 namespace vergence::app {
 
-/// Columns of calibrations.csv: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
-/// noise alone, `sigma_total_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 …
-/// k4 of an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
-/// errors are medians before and after. `kept`: what the drive measured is no better than what is
-/// in use. The last five are those of CalibrationDecision.
+/// Columns of calibrations.csv: rotation vectors and their sigmas in rad, lengths in m, image
+/// values in px; `sigma_` from noise only, `sigma_total_` with uncertain intrinsics. d0 … d3 are k1
+/// k2 p1 p2, or k1 … k4 of an equidistant lens. The latency is in frames since the alarm, the
+/// request or the start; held-out errors are medians before and after. Outcome `kept` means that
+/// the measurement was no better than the calibration in use. The last five columns are those of
+/// CalibrationDecision.
 inline constexpr const char* kCalibrationsHeader =
     "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_"
     "before_px,held_out_after_px,scale_sigma,"
@@ -32,22 +33,24 @@ inline constexpr const char* kCalibrationsHeader =
     "reference_depth_m,depth_sigma_percent,depth_error_percent,verified";
 
 /// Writes the calibrations of a session: a line of calibrations.csv for each, calibration.yaml with
-/// the one in use, and the state file that the next drive starts from. The state file gets a
-/// calibration that was estimated, or the initial one once it is verified.
+/// the one in use, and the state file for the next run. The state file gets an estimated
+/// calibration, or the initial one once verified.
 ///
-/// Threads  on_…(): one producer. next(): one consumer. The files are written on a thread of its
-///          own (`vergence-state`), because YAML takes heap memory and a disk may stand still.
+/// Threads  One producer calls on_…(), one consumer next(). An own thread (`vergence-state`) writes
+///          the files, because YAML allocates and a disk may block.
 /// Memory   Fixed for the producer.
-/// Full     A producer that waits (replay) waits. A live one does not: the calibration is lost and
-///          counted.
-/// Errors   The constructor throws InputError. What fails later is an Outcome, or a fault of
+/// Full     A producer of a replay waits. In a live run the calibration is dropped and counted.
+/// Errors   The constructor throws InputError. Later failures are an Outcome, or a fault of
 ///          close().
 class CalibrationWriter final : public SessionObserver {
  public:
   struct Options {
-    std::filesystem::path session{};  // its folder
-    CalibrationFile content{};        // names and serials, what the configuration says, the source
-    std::optional<std::filesystem::path> state{};  // nothing: the next drive is not to know
+    /// Directory of the session.
+    std::filesystem::path session{};
+    /// Names, serials, configured values and source.
+    CalibrationFile content{};
+    /// Empty if the next run must not use it.
+    std::optional<std::filesystem::path> state{};
     WhenFull when_full = WhenFull::drop;
   };
   /// Outcome of writing the state file: the event `calibration_saved` or `calibration_save_failed`.
@@ -63,20 +66,22 @@ class CalibrationWriter final : public SessionObserver {
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
   /// Pops the oldest outcome. Returns false if there is none.
   [[nodiscard]] bool next(Outcome* outcome) noexcept { return outcomes_.pop(outcome); }
-  /// Writes what waits and calibration.yaml with what is in use at the end, null: there is none.
-  /// Messages about files that are not whole go to *faults. Once, after the last on_…().
+  /// Writes the pending data, and calibration.yaml with the calibration in use at the end (null if
+  /// there is none). Messages about incomplete files go to *faults. Call once, after the last
+  /// on_…().
   void close(const RigCalibration* in_use, std::vector<std::string>* faults);
 
-  /// After close().
+  /// Valid after close().
   [[nodiscard]] const CalibrationTotals& totals() const noexcept { return totals_; }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
-  /// Bytes taken at the beginning.
+  /// Bytes allocated at construction.
   [[nodiscard]] std::size_t memory() const noexcept { return sizeof *this + lines_.pending(); }
 
  private:
-  static constexpr std::size_t kMaxWaiting = 8;  // they come seconds apart
-  using Item =
-      std::variant<CalibrationRecord, Stamp>;  // a Stamp: the calibration in use is verified then
+  // Sufficient, because calibrations are seconds apart.
+  static constexpr std::size_t kMaxWaiting = 8;
+  // A Stamp means that the calibration in use was verified then.
+  using Item = std::variant<CalibrationRecord, Stamp>;
 
   void post(const Item& item) noexcept;
   void take(const Item& item);
@@ -88,12 +93,15 @@ class CalibrationWriter final : public SessionObserver {
   const Options options_;
   LineFile lines_;
   Ring<Outcome, 2 * kMaxWaiting> outcomes_;
-  std::uint64_t dropped_ = 0;  // of the producer
+  // Counted by the producer.
+  std::uint64_t dropped_ = 0;
 
   // Used by the writer's thread, and by the owner after joining it.
   std::string line_;
-  std::optional<RigCalibration> unverified_{};  // what the drive began with
-  std::string fault_;                           // of calibration.yaml; empty: it is whole
+  // Initial calibration.
+  std::optional<RigCalibration> unverified_{};
+  // Fault of calibration.yaml; empty if it is complete.
+  std::string fault_;
   CalibrationTotals totals_{};
   QueueThread<Item, kMaxWaiting> thread_;
 };

@@ -17,13 +17,13 @@
 
 namespace vergence::app {
 
-/// A rig's calibration from a whole recorded drive.
+/// Calibration from a whole recorded sequence.
 struct DriveCalibration {
-  /// None: `why` states what is missing.
+  /// Empty if there is none; `why` then has the reason.
   std::optional<RigCalibration> rig;
   std::string why;
-  double depth_m = 0,
-         depth_sigma_percent = 0;  // predicted depth error at the depth it is judged at
+  /// Predicted depth error, and the depth at which it is evaluated.
+  double depth_m = 0, depth_sigma_percent = 0;
   /// True if the depth error is within the tolerance.
   bool verified = false;
   /// Moving frames with tracks.
@@ -34,7 +34,7 @@ struct DriveCalibration {
   std::vector<calibration::Agreement> agreements;
 };
 
-/// Callback of a pass over a sequence: after every frame, on the estimator's thread.
+/// Callback of a pass over a sequence, called after every frame on the estimator's thread.
 using DriveWatcher = std::function<void(const Estimator&, const PoseSample&)>;
 
 struct DrivePass {
@@ -48,34 +48,33 @@ struct DrivePass {
   std::function<void(std::size_t)> progress{};
 };
 
-/// Runs the drive once, without a session. → the calibration in use at its end; empty: there never
-/// was one, or it was stopped.
+/// Processes the sequence once, without a session. Returns the calibration in use at the end; empty
+/// if there was none or it was stopped.
 [[nodiscard]] std::optional<RigCalibration> drive_once(const DrivePass& pass,
                                                        const StartingCalibration& begin,
                                                        const DriveWatcher& watch);
 
-/// Twice over the drive, with twice its features: from scratch, which gives the tracks their rig;
-/// then all of its frames in segments, joined, and each segment alone, to be compared with the
-/// next. `given`: the drive's own calibration; its intrinsics, sigmas and baseline length are read.
+/// Processes the sequence twice with twice its number of features. The first pass calibrates from
+/// scratch for the tracks. The second solves for all frames in joined segments, and for each
+/// segment alone to compare consecutive ones. Uses intrinsics, sigmas and baseline length of
+/// `given`.
 [[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
                                                const StartingCalibration& given);
 
-/// Runs a pass with a progress line that signals stop: the caller's, whose own end they are,
-/// too.
+/// Runs calibrate_drive() with a progress line and the caller's stop signals.
 [[nodiscard]] DriveCalibration calibrate_with_progress(const DrivePass& pass,
                                                        const StartingCalibration& given,
                                                        const SignalGuard& signals,
                                                        Progress* progress);
 
-/// Formats the result as lines for the terminal: each parameter with its sigma, the depth error,
-/// how far the stretches agree.
+/// Text for the terminal: each parameter with its sigma, the depth error, and the agreement of the
+/// stretches.
 [[nodiscard]] std::string describe(const DriveCalibration& found);
 
-/// `vergence calibrate sequence`: calibrates from an ordinary recorded sequence instead of a
-/// target. Of its own or the supplied calibration intrinsics and baseline length are read. Writes
-/// the file and prints the result on standard output. → done, not_usable (no calibration was found,
-/// or its depth is not known well enough) Errors  InputError: data, calibration, a file that cannot
-/// be written.
+/// Implements `vergence calibrate sequence`: calibrates from a recorded sequence instead of a
+/// target, with intrinsics and baseline length of its own or the supplied calibration. Writes the
+/// file and prints the result. Returns done, or not_usable (no calibration, or its depth is too
+/// uncertain). Throws InputError for data, calibration or output file.
 ///
 ///     ReplayRequest request;
 ///     request.data = "MH_01_easy";

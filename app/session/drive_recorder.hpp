@@ -19,19 +19,17 @@
 
 namespace vergence::app {
 
-/// Queues of a recording, one for each thread that posts.
+/// Queues of a recording, one per producer thread.
 enum Queue : std::size_t { estimator_queue, acquisition_queue };
 
-/// `record:` of the configuration: what goes through a session into drive.mcap
-/// (docs/session_files.md).
+/// Records a session into drive.mcap as configured by `record` (docs/session_files.md).
 ///
-/// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
-///            PulseObserver, a queue each. The rest: the owner's.
-/// Memory     The recording's queues, at construction.
-/// Errors     The constructor throws InputError: no room, no file. Afterwards messages.
+/// Configuration, facts and watch must outlive it. Threads as in SessionObserver and PulseObserver,
+/// with a queue each; the owner makes the other calls. The queues are allocated at construction.
+/// The constructor throws InputError without room or file; later errors are messages.
 class DriveRecorder final : public SessionObserver, public PulseObserver {
  public:
-  /// `folder`: of the session, exists. Precondition: configuration.record.any().
+  /// `folder` is the session's directory and must exist. Precondition: configuration.record.any().
   DriveRecorder(const std::filesystem::path& folder, const Configuration& configuration,
                 const SourceFacts& facts, const ReplayableSolverRunner& watch);
 
@@ -43,11 +41,11 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
 
   void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept override;
 
-  /// Messages about the disk, since the last call.
+  /// Messages about the disk since the last call.
   [[nodiscard]] std::vector<std::string> pop_errors() { return recording_.pop_errors(); }
-  /// Ends the files. What a disk failure cost becomes a message of *faults.
+  /// Ends the files. Losses by a disk failure become a message in *faults.
   void close(std::vector<std::string>* faults);
-  /// Nothing more is recorded. The estimator's thread.
+  /// Ends recording. Called on the estimator's thread.
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
   [[nodiscard]] std::size_t memory() const noexcept { return recording_.counters().queue_bytes; }
@@ -62,7 +60,8 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
 
   const RecordSettings& settings_;
   const ReplayableSolverRunner& watch_;
-  std::vector<std::string> frames_;  // of reference, of the cameras
+  // Frames of reference of the cameras.
+  std::vector<std::string> frames_;
   std::array<std::string_view, kMaxCameras> frame_names_{};
   const std::string folder_;
   Recording recording_;
@@ -70,7 +69,8 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   // Used by the estimator's thread only.
   RigCalibration rig_;
   bool calibrated_ = false, recalibrate_ = false;
-  std::optional<std::uint64_t> rig_in_file_{};  // how many there were when it was posted last
+  // Number of files when the rig was last posted.
+  std::optional<std::uint64_t> rig_in_file_{};
   std::atomic<bool> stopped_{false};
   FrameRecord frame_{};
 };

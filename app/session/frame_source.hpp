@@ -21,7 +21,7 @@
 
 namespace vergence::app {
 
-/// A rig frame for the estimator; its slots are the session's until FrameSource::done().
+/// Rig frame for the estimator; its slots belong to the session until FrameSource::done().
 struct SourceFrame {
   RigFrame rig{};
   /// Time to read and decode the images; 0 if they came as pixels.
@@ -30,7 +30,7 @@ struct SourceFrame {
   std::optional<bool> solver_idle{};
 };
 
-/// An event, in its order among the frames.
+/// Event, in its order among the frames.
 struct SourceEvent {
   EventRecord record{};
   /// Print the message on stderr, too.
@@ -45,16 +45,16 @@ struct SourceEvent {
 
 using SourceItem = std::variant<SourceFrame, InsRecord, SourceEvent>;
 
-/// A message of the set-up.
+/// Message from the set-up.
 struct SourceRemark {
   std::string message{};
-  /// Kind of its event; null: it is printed only.
+  /// Kind of its event; null if it is only printed.
   const char* kind = nullptr;
   /// Print the message on stderr, too.
   bool print = true;
 };
 
-/// The INS of a source and how its readings are compared with.
+/// INS of a source, and the options of its comparison.
 struct SourceIns {
   ComparisonOptions options{};
   InsSource kind = InsSource::device;
@@ -68,11 +68,16 @@ struct SourceIns {
 struct SourceFacts {
   StartingCalibration begin{};
   Adoption adoption = Adoption::after_fixed_frames;
-  WhenFull when_full = WhenFull::wait;     // the session's files fall behind
-  std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
-  std::uint64_t frames = 0;                // of the whole drive; 0 if unknown
-  Stamp first{};                           // of the drive
-  std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
+  /// Policy when the session's files fall behind.
+  WhenFull when_full = WhenFull::wait;
+  /// Value of Recorder::Options.
+  std::function<bool(Stamp)> disk_full{};
+  /// Total number of frames; 0 if unknown.
+  std::uint64_t frames = 0;
+  /// First stamp.
+  Stamp first{};
+  /// Maps stamps to this machine's clock, in real time.
+  std::optional<ClockTie> tie{};
   std::optional<SourceIns> ins{};
   /// Ground truth of a recording, the reference for an estimate without INS.
   Trajectory truth{};
@@ -90,50 +95,49 @@ struct SourceFacts {
   bool on_request = false;
 };
 
-/// Source of a session's frames, readings and device events: devices (LiveSource) or a recorded
-/// drive (RecordedSource). run_session() treats both alike.
+/// Source of a session's frames, readings and device events: devices (run_drive()) or a recorded
+/// drive (run_replay()). run_session() treats both alike.
 ///
-/// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's; finish()
-///          and what comes after it when the estimator's has joined.
+/// next() and done() run on the estimator's thread, which is sealed. stop() is thread-safe. The
+/// caller makes the other calls; finish() and later ones after the estimator's thread was joined.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  [[nodiscard]] virtual const SourceFacts& facts() const noexcept = 0;
+  [[nodiscard]] const SourceFacts& facts() const noexcept { return facts_; }
 
-  /// Before start(): `observer` receives the trigger board's pulses, if there is one, and outlives
-  /// the source.
+  /// Call before start(): `observer` receives the trigger board's pulses and must outlive the
+  /// source.
   virtual void observe_pulses(PulseObserver* /*observer*/) {}
-  /// Begins the stream; the session's files are open. What is wrong with a file goes to *faults.
-  /// InputError: a device does not start.
+  /// Starts the stream; the session's files are open. Problems of files go to *faults. Throws
+  /// InputError if a device does not start.
   virtual void start(std::vector<std::string>* faults) = 0;
-  /// The next item, waiting for it. False: the drive is over, or stopped.
+  /// Waits for the next item. Returns false once the run is over or stopped.
   [[nodiscard]] virtual bool next(SourceItem* item) noexcept = 0;
-  /// The frame that next() gave last has its pose: takes the slots back.
+  /// Takes back the slots of the last frame, whose pose is known.
   virtual void done(const PoseSample& sample) noexcept = 0;
   virtual void stop() noexcept = 0;
-  /// Number of iterations of the thread behind next(), with or without data: a thread whose number
-  /// no longer grows hangs. Any thread. Always 0 if it is not counted.
+  /// Number of iterations of the thread behind next(), with or without data; it stops growing if
+  /// the thread hangs. Thread-safe. Always 0 if not counted.
   [[nodiscard]] virtual std::uint64_t rounds() const noexcept { return 0; }
-  /// Called every 50 ms while frames come.
+  /// Called every 50 ms during the run.
   virtual void poll() {}
-  /// Called once when next() has ended, which the estimator may take time to conclude: stops what
-  /// still delivers.
+  /// Called once after next() has ended, while the estimator may still finish; stops the delivery.
   virtual void halt() noexcept {}
   /// Ends what start() began, after halt().
-  virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
+  virtual void finish(Progress* progress) = 0;
 
-  /// Adds to the summary: frames skipped, devices, times, truth.
+  /// Adds skipped frames, devices, times and ground truth to the summary.
   virtual void describe(const SessionTotals& totals, const Estimator& estimator,
                         SummaryInput* input) const = 0;
-  /// Prints the statistics shown at the end.
-  virtual void print_metrics(const SessionTotals& totals, const SummaryInput& input,
-                             Progress* progress) const = 0;
   /// Exit code for a problem of the source itself, whose message it has printed; called if there
   /// are poses.
   [[nodiscard]] virtual std::optional<ExitCode> verdict(Progress* /*progress*/) const {
     return std::nullopt;
   }
+
+ protected:
+  SourceFacts facts_{};  // set by the constructor
 };
 
 }  // namespace vergence::app

@@ -18,13 +18,13 @@
 
 namespace vergence::app {
 
-/// An alignment and the stamp from which it holds.
+/// Alignment and the stamp from which it applies.
 struct EnuAlignmentRecord {
   Stamp stamp{};
   EnuAlignment alignment{};
 };
 
-/// Errors against the INS after the alignment, over the poses that were compared.
+/// Errors against the INS after the alignment, over the compared poses.
 struct EnuErrors {
   std::uint64_t poses = 0;
   /// Horizontal path length of the INS from its first fix on, straight across gaps.
@@ -36,9 +36,9 @@ struct EnuErrors {
   double heading_rms_deg = 0, heading_max_deg = 0, heading_end_deg = 0;
 };
 
-/// Where a drive lies on the earth, and how far from the INS it is there.
+/// Position of a run on the earth, and its errors against the INS.
 struct EnuMetrics {
-  /// Origin of enu; none: the INS never had a fix.
+  /// Origin of enu; empty if the INS never had a fix.
   std::optional<Geodetic> origin{};
   std::vector<EnuAlignmentRecord> alignments{};
   EnuErrors errors{};
@@ -53,18 +53,18 @@ struct EnuMetrics {
 
 enum class InsSource : std::uint8_t { none, device, recording };
 
-/// Events about an INS and its comparison with the poses: each once, where something changes.
-/// Threads: the estimator's, sealed.
+/// Events about an INS and its comparison with the poses, each reported once per change. Runs on
+/// the estimator's thread, which is sealed.
 class InsEvents {
  public:
-  /// Without a source nothing is said about its silence. `event_log` outlives this.
+  /// Without a source its silence is not reported. `event_log` must outlive this object.
   InsEvents(InsSource source, double scale_stretch_m, EventLog& event_log) noexcept
       : source_(source), scale_stretch_m_(scale_stretch_m), event_log_(event_log) {}
 
-  /// A reading, after the comparison has counted `jumps` of the position. `contradicted`: an
-  /// attitude did not go with the way driven.
+  /// Handles a sample after the comparison has counted `jumps` of the position. `contradicted`
+  /// means that the attitude disagrees with the direction of travel.
   void update(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept;
-  /// A pose that has met its readings, the `matches`-th that found any.
+  /// Handles a pose whose samples have arrived; `matches` counts the poses with samples.
   void update(const ComparedPose& pose, std::uint64_t matches) noexcept;
   void update(const EnuAlignment& alignment, Stamp stamp) noexcept;
 
@@ -79,38 +79,40 @@ class InsEvents {
   bool attitude_reported_ = false, contradiction_reported_ = false, scale_disagrees_ = false;
   std::uint64_t jumps_ = 0;
   InsMatch last_match_ = InsMatch::ok;
-  std::uint64_t match_run_ = 0;  // poses in a row with that
+  // Number of consecutive poses with that result.
+  std::uint64_t match_run_ = 0;
 };
 
-/// Comparison of a session with its INS, live or recorded: the comparison pose by pose into the
-/// recorder, and what there is to tell of it.
+/// Compares a session with its live or recorded INS pose by pose, passes the results to the
+/// recorder and reports events.
 ///
-/// Threads    The estimator's, sealed; after it has joined, no synchronisation is needed.
-/// Memory     The comparison's, from the arena.
-/// Order      Readings and poses as they come; every add() of a pose is followed by drain().
+/// Runs on the estimator's thread, which is sealed; no synchronisation is needed after joining it.
+/// Memory is from the arena. Samples and poses are added in order of arrival; every add() of a pose
+/// is followed by drain().
 class InsComparison {
  public:
-  /// That are kept for the files at the end; later ones are in poses.csv alone, and count.
+  /// Maximum number of alignments kept for the files at the end; later ones are only in poses.csv
+  /// and counted.
   static constexpr std::size_t kMaxPlacements = 4096;
 
-  /// Without a source poses go through and nothing is said. `event_log` outlives it.
+  /// Without a source poses are passed on without events. `event_log` must outlive this object.
   InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
                 EventLog& event_log);
 
-  /// Before the first add(). `output` outlives the last one; with a source its recorder takes
-  /// readings (Recorder::Options::ins).
+  /// Call before the first add(). `output` must outlive the last one; with a source its recorder
+  /// needs Recorder::Options::ins.
   void open(SessionOutput* output) noexcept { output_ = output; }
   void add(const InsRecord& reading) noexcept;
   void add(const FrameReport& report) noexcept;
-  /// Hands on every pose that has met its readings.
+  /// Passes on every pose whose samples have arrived.
   void drain() noexcept;
-  /// No more readings and poses will come.
+  /// Called when no more samples and poses follow.
   void finish() noexcept;
 
-  /// Poses that the INS had a place for.
+  /// Number of poses with an INS position.
   [[nodiscard]] std::uint64_t matches() const noexcept { return matches_; }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
-  /// `mount_source`: where the mount of the options is from.
+  /// `mount_source` is the origin of the INS extrinsics in the options.
   [[nodiscard]] EnuMetrics earth(const std::string& mount_source) const;
 
  private:
@@ -122,16 +124,23 @@ class InsComparison {
   EventLog& event_log_;
   InsEvents events_;
   SessionOutput* output_ = nullptr;
-  std::array<FrameReport, Comparison::kPending> pending_{};  // by the count of their poses
+  // Indexed by the count of poses.
+  std::array<FrameReport, Comparison::kPending> pending_{};
   std::uint64_t added_ = 0, drained_ = 0;
   std::uint64_t matches_ = 0, scale_disagreements_ = 0;
   std::uint32_t alignment_revision_ = 0;
-  std::vector<EnuAlignmentRecord> alignments_;  // its memory is taken at construction
-  EnuErrors errors_{};                          // means and roots are squares' sums until earth()
-  std::uint64_t heights_ = 0;                   // poses whose error upwards is in errors_
-  bool on_way_ = false;                         // last_place_ means something
-  Vec2 last_place_ = Vec2::Zero();              // where the newest whole step of the way ended
-  double beyond_ = 0;                           // m from there to the newest place
+  // Allocated at construction.
+  std::vector<EnuAlignmentRecord> alignments_;
+  // Means and RMS are sums of squares until earth() is called.
+  EnuErrors errors_{};
+  // Number of poses whose vertical error is in errors_.
+  std::uint64_t heights_ = 0;
+  // True if last_place_ is valid.
+  bool on_way_ = false;
+  // End of the newest complete step of the path.
+  Vec2 last_place_ = Vec2::Zero();
+  // Distance in m from there to the newest position.
+  double beyond_ = 0;
   Stamp newest_stamp_{};
 };
 

@@ -1,75 +1,36 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "app/datasets/frame_decoder.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"
-#include "app/session/session_files.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/memory/frame_pool.hpp"
 
 namespace vergence::app {
 
-/// The INS of a drive that is replayed, and how it is compared.
+/// INS of a replayed sequence and the options of its comparison.
 struct ReplayedIns {
-  std::vector<InsRecord> readings{};  // around the frames that are replayed; empty: there is no INS
+  /// Samples around the replayed frames; empty without an INS.
+  std::vector<InsRecord> readings{};
   ComparisonOptions options{};
   std::string mount_source{};
-  std::vector<std::string> remarks{};  // messages
+  std::vector<std::string> remarks{};
 };
 
-/// Reads the frames [request.start, …) of the sequence. A mount that the configuration says
-/// (`ins.lever_arm_m`, `ins.boresight_deg`) stands before the data set's own;
-/// `comparison.max_gap_ms` and `max_wait_ms` are no less than one and a half of the recording's
-/// usual interval. InputError: as read_recorded_ins() and comparison_options() say.
+/// Reads the samples for the frames [request.start, …) of the sequence. Configured extrinsics
+/// (`ins.lever_arm_m`, `ins.boresight_deg`) take precedence over the data set's.
+/// `comparison.max_gap_ms` and `max_wait_ms` are at least 1.5 of the recording's usual interval.
+/// Throws InputError as read_recorded_ins() and comparison_options() do.
 [[nodiscard]] ReplayedIns replayed_ins(const ReplayRequest& request,
                                        const StereoSequence& sequence);
 
-/// A recorded drive as the source of a session. Nothing is dropped; an INS that was recorded comes
-/// in the order of its stamps, before the frames that are not older.
-///
-/// Ownership  Holds the sequence and the pool that its images are decoded into. `request` outlives
-///            it.
-class RecordedSource final : public FrameSource {
- public:
-  /// `truth`: of the data set, may be empty. Precondition: request.start is a frame of it.
-  RecordedSource(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin,
-                 Trajectory truth, ReplayedIns ins);
-
-  [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
-  void start(std::vector<std::string>* faults) override;
-  [[nodiscard]] bool next(SourceItem* item) noexcept override;
-  void done(const PoseSample& sample) noexcept override;
-  void stop() noexcept override;
-  void finish(Progress* progress, std::vector<std::string>* faults) override;
-  void describe(const SessionTotals& totals, const Estimator& estimator,
-                SummaryInput* input) const override;
-  void print_metrics(const SessionTotals& totals, const SummaryInput& input,
-                     Progress* progress) const override;
-
- private:
-  const ReplayRequest& request_;
-  const StereoSequence sequence_;
-  const ReplayedIns ins_;
-  const std::size_t count_;  // frames of this replay
-  Arena frames_arena_;
-  FramePool pool_;
-  SourceFacts facts_;
-  std::unique_ptr<FrameDecoder> decoder_;
-
-  // Used by the estimator's thread; read by others after it has joined.
-  DecodedPair pair_{};    // given, or held back behind its readings
-  bool waiting_ = false;  // pair_ was not given yet
-  bool ended_ = false;    // there are no more pairs
-  std::size_t next_reading_ = 0;
-  std::uint64_t unread_ = 0;  // of skipped_, those that the decoder came to
-  std::uint64_t skipped_ = 0;
-};
+/// `truth`: of the data set, may be empty. Precondition: request.start is a frame of the sequence;
+/// `request` outlives the source.
+[[nodiscard]] std::unique_ptr<FrameSource> make_recorded_source(const ReplayRequest& request,
+                                                                StereoSequence sequence,
+                                                                StartingCalibration begin,
+                                                                Trajectory truth, ReplayedIns ins);
 
 }  // namespace vergence::app

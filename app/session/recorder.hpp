@@ -21,34 +21,33 @@ namespace vergence::app {
 
 class LineFile;
 
-/// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv,
-/// events.jsonl and, with an INS, ins.csv of a session as it goes on, on a thread
-/// of its own: the estimator never waits for a disk.
+/// Writes trajectory.tum, reference.tum (removed at the end without a reference), poses.csv,
+/// events.jsonl and, with an INS, ins.csv of a session during the run, on its own thread, so that
+/// the estimator never waits for a disk.
 ///
 ///     make_session_folder("sessions/monday");
 ///     Recorder recorder("sessions/monday", {});
 ///     recorder.on_report(report);  // of each frame
 ///     const std::unique_ptr<SessionTotals> totals = recorder.close();
 ///
-/// Posted records reach the files at the latest after a
-/// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
-/// records give the same bytes.
-/// Threads  on_…(): one producer. pop_errors(): one consumer. close(): the owner's, after the
-///          last of these. The recorder's own is sealed: what takes heap memory is done by others.
-/// Memory   Fixed, whatever the length of the drive; with keep_trajectory close() reads the
-///          trajectories back from their files.
-/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
-///          Readings leave room for poses and events.
-/// Errors   The constructor throws InputError. When the disk takes no more: an error and an event
-///          `disk_full`; lines wait as LineFile says, and are written again every kRetry to the
-///          files that were opened at the start. An event `disk_recovered` when all was taken, with
-///          the number of lines lost. A file that lacks lines is a fault of the totals.
+/// Records reach the files within a second, so a killed session keeps its lines. Stamps are printed
+/// as integers. Equal records give equal bytes.
+/// Threads  One producer calls on_…(), one consumer pop_errors(), the owner close() after both. The
+///          recorder's thread is sealed.
+/// Memory   Fixed for any length of the run; with keep_trajectory close() reads the trajectories
+///          back from their files.
+/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live). INS
+///          samples leave room for poses and events.
+/// Errors   The constructor throws InputError. A full disk gives an error and an event `disk_full`;
+///          lines wait in LineFile and are written again every kRetry to the same files. An event
+///          `disk_recovered` with the number of lost lines follows. A file that lacks lines is a
+///          fault of the totals.
 class Recorder final : public SessionObserver {
  public:
   struct Options {
     WhenFull when_full = WhenFull::wait;
     bool keep_trajectory = true;
-    /// INS readings are recorded: ins.csv is written.
+    /// Records INS samples in ins.csv.
     bool ins = false;
     /// Stamp of the recorder's own events before the first pose.
     Stamp first{};
@@ -57,7 +56,7 @@ class Recorder final : public SessionObserver {
     std::function<bool(Stamp)> disk_full{};
   };
 
-  /// `folder` exists: make_session_folder().
+  /// `folder` must exist, see make_session_folder().
   Recorder(const std::filesystem::path& folder, const Options& options);
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
@@ -67,17 +66,20 @@ class Recorder final : public SessionObserver {
   void on_event(const EventRecord& event) noexcept override { post(event); }
   /// Precondition: Options::ins.
   void on_reading(const InsRecord& reading) noexcept override;
-  /// Bytes taken at the beginning: lines that may wait.
+  /// Bytes allocated at construction for waiting lines.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
   /// Messages about the disk since the last call.
   [[nodiscard]] std::vector<std::string> pop_errors();
-  /// Writes what is waiting, closes the files. Once.
+  /// Writes the waiting lines and closes the files. Call once.
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
 
  private:
-  static constexpr std::chrono::seconds kRetry{3};  // between two attempts to write
-  static constexpr std::size_t kRing = 1024;    // records: 2 s of the fastest INS and its frames
-  static constexpr std::size_t kOfPoses = 128;  // of these, that readings leave free
+  // Interval of attempts to write.
+  static constexpr std::chrono::seconds kRetry{3};
+  // Number of records: 2 s of the fastest INS and its frames.
+  static constexpr std::size_t kRing = 1024;
+  // Number of records that INS samples leave free.
+  static constexpr std::size_t kOfPoses = 128;
 
   using Record = std::variant<FrameReport, EventRecord, InsRecord>;
   void begin();
@@ -91,24 +93,27 @@ class Recorder final : public SessionObserver {
   void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
   using ErrorMessage = std::array<char, 512>;  // ends with 0, cut at the array's end
-  template <class... Arguments>
-  void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
 
   struct Files;
   Options options_;
   std::unique_ptr<Files> files_;
-  TotalsBuilder totals_;
+  SessionTotals totals_;
   std::string line_;  // being formatted
   std::size_t memory_ = 0;
-  Stamp newest_;  // of the poses
+  // Newest stamp of the poses.
+  Stamp newest_;
   bool disk_full_ = false, pretended_ = false;
-  std::chrono::steady_clock::time_point retry_due_{};  // while disk_full_
+  // Valid while disk_full_.
+  std::chrono::steady_clock::time_point retry_due_{};
 
   std::chrono::steady_clock::time_point flushed_{}, written_back_{};
-  Ring<ErrorMessage, 16> error_messages_;                     // full: the newest are lost
-  std::vector<std::string> errors_;                           // of close()
-  std::uint64_t dropped_records_ = 0, dropped_readings_ = 0;  // of the producer
+  // If full, the newest messages are lost.
+  Ring<ErrorMessage, 16> error_messages_;
+  // Errors of close().
+  std::vector<std::string> errors_;
+  // Counted by the producer.
+  std::uint64_t dropped_records_ = 0, dropped_readings_ = 0;
   QueueThread<Record, kRing> thread_;
 };
 

@@ -6,7 +6,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
+
+#include <fmt/format.h>
 
 #include "core/comparison/comparison.hpp"
 #include "core/estimator/estimator.hpp"
@@ -16,43 +19,42 @@
 #include "core/types/rig_frame.hpp"
 #include "core/types/stamped_pose.hpp"
 
-/// Input of a session's observers: plain values of fixed size, made on the estimator's thread
-/// without heap, copied through rings.
+/// Input of a session's observers: values of fixed size, made on the estimator's thread without
+/// heap and copied through rings.
 namespace vergence::app {
 
-/// A file that grows by whole lines, also over a disk that is full for a while.
+/// File that grows by complete lines, even if the disk is temporarily full.
 ///
-/// Lines are buffered until flush(). What the system does not take stays in the buffer and is
-/// written by a later flush(), to the same open file. Lines that find the buffer full are refused
-/// and counted, so the file never lacks a line's end in the middle.
-///
-/// Not thread-safe. Memory  A buffer of `pending` bytes, taken by the constructor.
-/// Errors   The constructor throws InputError. Afterwards nothing throws: see fault().
+/// Lines are buffered until flush(). Data that the system does not accept stay in the buffer for a
+/// later flush() to the same file. Lines that find the buffer full are refused and counted, so no
+/// line is cut. The constructor allocates a buffer of `pending` bytes and throws InputError; later
+/// errors are in fault(). Not thread-safe.
 class LineFile {
  public:
-  static constexpr std::size_t kPending = std::size_t{1} << 20;  // bytes: minutes of poses
+  /// In bytes: minutes of poses.
+  static constexpr std::size_t kPending = std::size_t{1} << 20;
 
-  /// Opens for appending; made when it is not there. `pending`: bytes that may wait.
+  /// Opens for appending and creates the file if needed. `pending` is the size of the buffer.
   explicit LineFile(const std::filesystem::path& file, std::size_t pending = kPending);
   ~LineFile();
   LineFile(const LineFile&) = delete;
   LineFile& operator=(const LineFile&) = delete;
 
-  /// Takes a line, end of line included; flushed first if the buffer is full. False: refused and
-  /// counted.
+  /// Adds a line including its end; flushes first if the buffer is full. Returns false if it was
+  /// refused and counted.
   bool append(std::string_view line);
-  /// Hands the buffer to the system. False: not all was taken; fault() says why.
+  /// Writes the buffer. Returns false if not all was accepted; fault() has the reason.
   bool flush();
-  /// Asks the system to begin writing to the disk, and does not wait. Without it the kernel begins
-  /// after 30 s (vm.dirty_expire_centisecs), which a power cut would cost.
+  /// Starts writeback to the disk without waiting. Otherwise the kernel starts after 30 s
+  /// (vm.dirty_expire_centisecs), which a power cut would lose.
   void write_back() noexcept;
-  /// flush(), then asks the system to put it on the disk, and closes. Twice is harmless.
+  /// Flushes, synchronises and closes. May be called twice.
   bool close();
 
   /// Simulates a disk without room, until called with false.
   void pretend_full(bool full) noexcept { pretend_full_ = full; }
 
-  /// errno of the last flush() or close(); 0: it succeeded.
+  /// Value of errno of the last flush() or close(); 0 on success.
   [[nodiscard]] int fault() const noexcept { return fault_; }
   [[nodiscard]] std::uint64_t lost_lines() const noexcept { return lost_lines_; }
   [[nodiscard]] std::size_t pending() const noexcept { return pending_; }
@@ -68,72 +70,92 @@ class LineFile {
   std::string waiting_;
 };
 
-/// Counts up to a frame, so that they stay true for a reader that misses frames.
+/// Totals up to a frame, so that they are correct for a reader that misses frames.
 struct FrameCounts {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
-  std::uint64_t skipped = 0;  // not read, for instance because the image file is broken
-  std::uint64_t missing = 0;  // numbers of frames that never came
-  double path_m = 0;          // sum of the steps between successive poses
+  /// Frames not read, for instance because of a damaged image file.
+  std::uint64_t skipped = 0;
+  /// Frame numbers that were not received.
+  std::uint64_t missing = 0;
+  /// Sum of the steps between successive poses.
+  double path_m = 0;
 };
 
-/// Report of one frame: its input but for the images, its pose, also in ENU beside the INS where
-/// there is one, and its times. format_frame() makes the line of poses.csv of it; unless lost, it
-/// is a line of trajectory.tum, too.
+/// Report of one frame: input without images, pose, also in ENU next to the INS, and times.
+/// format_frame() formats it for poses.csv; unless lost, it is also a line of trajectory.tum.
 struct FrameReport : ComparedPose {
   FrameCounts counts{};
-  Duration stamp_error{}, spread{};  // as in RigFrame
+  /// Same as in RigFrame.
+  Duration stamp_error{}, spread{};
   Pairing pairing = Pairing::assumed;
   int cameras = 0;
-  std::uint8_t images_present = 0;  // mask by camera
-  HostStamp estimated{};            // when the estimator was done
+  /// Bit k stands for camera k.
+  std::uint8_t images_present = 0;
+  /// Time when the estimator was done.
+  HostStamp estimated{};
   float decode_ms = 0;
-  /// The reference's pose of the left camera, in the reference's own frame.
+  /// Reference pose of the left camera, in the reference's frame.
   std::optional<Transform> T_reference_left{};
 
   /// Adds the comparison with the INS, which becomes the reference.
   void set_comparison(const ComparedPose& with_ins) noexcept;
-  /// ours − INS: east, north, up, m; heading, deg clockwise. Meaningful where `compared`.
+  /// Estimate − INS: east, north, up in m; heading in degrees clockwise. Valid if `compared`.
   [[nodiscard]] std::array<double, 4> error() const noexcept;
 };
 
-/// A number or a constant word beside an event's message. `name` null: not used.
+/// Number or constant text of an event. If `name` is null, it is not used.
 struct EventField {
   const char* name = nullptr;
   std::variant<std::int64_t, double, const char*> value{std::int64_t{0}};
 };
 
-/// A line of events.jsonl. `kind` and the fields' names point to constants.
+/// Line of events.jsonl. `kind` and the fields' names point to constants.
 struct EventRecord {
   Stamp stamp{};
   const char* kind = "";
-  /// Ends with 0.
+  /// Zero-terminated.
   std::array<char, 256> message{};
   std::array<EventField, 4> fields{};
 
-  /// Cut at the array's end, at a whole UTF-8 character.
+  /// Copies the text, cut at a whole UTF-8 character.
   void set_message(std::string_view text) noexcept;
+  /// Formats the message without heap.
+  template <class... Arguments>
+  [[nodiscard]] static EventRecord make(Stamp stamp, const char* kind,
+                                        fmt::format_string<Arguments...> format,
+                                        Arguments&&... arguments) noexcept {
+    std::array<char, 256> text;
+    const char* end =
+        fmt::format_to_n(text.data(), text.size(), format, std::forward<Arguments>(arguments)...)
+            .out;
+    EventRecord event;
+    event.stamp = stamp;
+    event.kind = kind;
+    event.set_message({text.data(), static_cast<std::size_t>(end - text.data())});
+    return event;
+  }
   [[nodiscard]] static EventRecord of(const EstimatorEvent& event) noexcept;
 };
 
-/// A calibration that was accepted or rejected, or that the drive began with: a line of
-/// calibrations.csv for every camera but the left one.
+/// Accepted, rejected or initial calibration: a line of calibrations.csv for every camera but the
+/// left one.
 struct CalibrationRecord : CalibrationDecision {
   /// Decided while driving; false for the initial calibration.
   bool decided = true;
   /// Source of the initial calibration: `given`, `state_file` …, a constant.
   const char* began_as = "";
-  /// Where it is from, if the drive began with it; ends with 0. A copy: the owner of a record may
-  /// outlive the source that has the text.
+  /// Origin of an initial calibration, zero-terminated. A copy, because a record may outlive the
+  /// source of the text.
   std::array<char, 256> origin{};
 
-  /// Record of the initial calibration. `origin` is copied, cut at the array's end, at a whole
-  /// UTF-8 character; `cause` is a constant.
+  /// Record of the initial calibration. `origin` is copied, cut at a whole UTF-8 character; `cause`
+  /// is a constant.
   [[nodiscard]] static CalibrationRecord begin(const RigCalibration& rig, Stamp stamp,
                                                const char* cause, std::string_view origin) noexcept;
   [[nodiscard]] std::string_view cause_name() const noexcept {
     return decided ? to_string(cause) : began_as;
   }
-  /// The decision's reason, or the origin of what the drive began with.
+  /// Reason of the decision, or origin of the initial calibration.
   [[nodiscard]] const char* why() const noexcept { return decided ? reason : origin.data(); }
 };
 
@@ -149,16 +171,13 @@ void format_frame(const FrameReport& report, std::string* line);
 /// Formats a line of a TUM file: the stamp in seconds, position, quaternion.
 void format_tum(Stamp stamp, const Transform& T, std::string* line);
 
-/// The line of calibrations.csv (kCalibrationsHeader) of camera k, 1 ≤ k < cameras, end of line
-/// included.
-///
-/// Memory  None where the capacity of *line is enough.
+/// Formats the line of calibrations.csv (kCalibrationsHeader) for camera k, 1 ≤ k < cameras, with
+/// its end. Allocates only if *line is too small.
 void format_calibration(const CalibrationRecord& calibration, int k, std::string* line);
 
-/// A line of events.jsonl, end of line included: `stamp_ns`, `kind`, `message`, `fields`. Bytes
-/// that are no UTF-8, which file names may hold, become U+FFFD: the line stays JSON.
-///
-/// Memory  None where the capacity of *line is enough.
+/// Formats a line of events.jsonl with its end: `stamp_ns`, `kind`, `message`, `fields`. Invalid
+/// UTF-8, as in file names, becomes U+FFFD to keep the JSON valid. Allocates only if *line is too
+/// small.
 void format_event(const EventRecord& event, std::string* line);
 
 }  // namespace vergence::app

@@ -18,31 +18,36 @@ struct ReplayRequest {
   SessionOptions session{};
   std::filesystem::path data;
   SequenceFormat format = SequenceFormat::kitti;
-  BagTopics topics{};                      // of a bag
-  std::optional<std::string> calibration;  // a file of any program, instead of the data set's own
-  std::optional<AssumedIntrinsics> known;  // instead of any calibration
-  std::optional<double> baseline;          // m: instead of the calibration's length
-  bool from_scratch = false;               // of the calibration only intrinsics and length are read
-  bool calibrate_first = false;            // from the whole drive, then drive with what was found
-  std::size_t start = 0;                   // first frame
-  std::optional<std::size_t> frames;       // at most so many; all when not set
+  /// Topics of a bag.
+  BagTopics topics{};
+  /// File of any supported program, in place of the data set's calibration.
+  std::optional<std::string> calibration;
+  /// Used in place of a calibration.
+  std::optional<AssumedIntrinsics> known;
+  /// In m, in place of the calibration's length.
+  std::optional<double> baseline;
+  /// Uses only intrinsics and length of the calibration.
+  bool from_scratch = false;
+  /// Calibrates from the whole sequence before the replay.
+  bool calibrate_first = false;
+  /// Index of the first frame.
+  std::size_t start = 0;
+  /// Maximum number of frames; empty for all.
+  std::optional<std::size_t> frames;
   Configuration configuration;
 };
 
-/// The drive of a request, with the calibration that the user names, if any. What a calibration's
-/// format did not carry over is said on stderr. InputError: as open_sequence().
+/// Sequence of a request, with the supplied calibration, if any. Prints on stderr what a
+/// calibration's format lacked. Throws InputError as open_sequence() does.
 [[nodiscard]] StereoSequence open_drive(const ReplayRequest& request);
 
-/// KEY=VALUE of the configuration that a recorded session was driven with, as far as poses depend
-/// on them. InputError: as RecordedSession::open().
+/// Recorded configuration (KEY=VALUE) of a session, as far as poses depend on it. Throws InputError
+/// as RecordedSession::open() does.
 [[nodiscard]] std::vector<std::string> recorded_settings(const std::filesystem::path& session);
 
-/// Reads a recorded drive, estimates a pose for every frame, writes the session directory
-/// and the figures against the data set's truth (run_session()).
-///
-/// Errors   InputError before the session folder is made, for all that can be known by then.
-///          Afterwards messages on stderr.
-/// → as run_session()
+/// Replays a recorded sequence: estimates a pose per frame, writes the session directory and
+/// evaluates against the ground truth (run_session()). Throws InputError before the directory is
+/// made, as far as possible; later errors are messages on stderr. Returns as run_session() does.
 [[nodiscard]] ExitCode run_replay(const ReplayRequest& request);
 
 }  // namespace vergence::app

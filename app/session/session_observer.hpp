@@ -17,7 +17,7 @@
 
 namespace vergence::app {
 
-/// One moment on both clocks: how stamps of a live session follow from this machine's clock.
+/// Same instant on both clocks, which maps stamps of a live session to this machine's clock.
 struct ClockTie {
   Stamp stamp{};
   HostStamp host{};
@@ -35,7 +35,7 @@ struct SessionStart {
   Stamp first{};
   /// Number of frames of the drive; 0 if unknown.
   std::uint64_t frames = 0;
-  /// None in a replay and in virtual time.
+  /// Empty in a replay and in virtual time.
   std::optional<ClockTie> tie{};
   /// Bytes of one frame of the largest camera.
   std::size_t image_bytes = 0;
@@ -45,9 +45,8 @@ struct SessionStart {
   bool recording = false;
 };
 
-/// Requests of viewers to a running session. They act at the next frame.
-///
-/// Threads  Any sets, the estimator's takes. Outlives the session.
+/// Requests of viewers to a running session, which act at the next frame. Any thread sets them, the
+/// estimator's reads them. Must outlive the session.
 struct SessionRequests {
   /// Requests a new calibration.
   std::atomic<bool> recalibrate{false};
@@ -57,85 +56,70 @@ struct SessionRequests {
   std::atomic<bool> stop_recording{false};
 };
 
-/// Interface of everything that is attached to a session, live or replayed: recording, live page,
-/// pose stream. RunRequest::observers and ReplayRequest::observers take them.
+/// Interface of everything attached to a session, live or replayed: recording, live page, pose
+/// stream. Set by SessionOptions::observers.
 ///
-/// Ownership  Everything is a reference to a plain value of fixed size that the observer copies if
-///            it keeps it. The images of a frame are views of driver memory: valid until
-///            on_frame() returns, never after. An observer outlives the session.
-/// Threads    The estimator's thread, one call at a time. It is sealed: an observer allocates
-///            nothing, takes no lock that a slow thread can hold, does no input or output, and
-///            never waits. What takes time goes by a ring to a thread of the observer's own; a full
-///            ring is the observer's loss, to be counted by it. Events of before the first frame
-///            and after the last come from the caller's thread, while the estimator's does not run.
+/// Ownership  Arguments are references to values of fixed size that the observer copies if needed.
+///            Images of a frame are views of driver memory, valid only until on_frame() returns. An
+///            observer must outlive the session.
+/// Threads    Calls come from the estimator's thread, one at a time. It is sealed: an observer must
+///            not allocate, take a lock held by a slow thread, do I/O or wait. Slow work goes
+///            through a ring to the observer's own thread; losses by a full ring are counted by the
+///            observer. Events before the first and after the last frame come from the caller's
+///            thread, while the estimator's does not run.
 /// Order      on_frame(), on_pose() of the same frame, then its events and calibrations;
-///            on_report() of a frame once its INS readings are there, frames in order.
-///            Live and replayed alike.
-/// Errors     Nothing throws. What an observer does changes neither poses nor files.
+///            on_report() of a frame once its INS samples have arrived, in order of frames. Equal
+///            for live and replayed sessions.
+/// Errors     No call throws. Observers do not affect poses or files.
 class SessionObserver {
  public:
   virtual ~SessionObserver() = default;
 
-  /// The session is about to begin. The caller's thread, not sealed.
+  /// Called before the session begins, on the caller's thread, which is not sealed.
   virtual void on_start(const SessionStart& /*start*/) noexcept {}
 
-  /// Called with the estimator's next input: images, stamp, how sure the pairing is.
+  /// Called with the estimator's next input: images, stamp and pairing.
   virtual void on_frame(const RigFrame& /*frame*/) noexcept {}
-  /// Called with the pose of that frame immediately; the report lacks the comparison with the INS.
+  /// Called immediately with the pose of that frame; the report lacks the comparison with the INS.
   virtual void on_pose(const FrameReport& /*report*/) noexcept {}
-  /// The newest moving frames with their tracks, after on_pose(); valid until it returns. Empty
-  /// where nothing watches the calibration.
+  /// Called after on_pose() with the newest moving frames and their tracks, valid until it returns.
+  /// Empty if the calibration is not monitored.
   virtual void on_tracks(const calibration::TrackLog& /*tracks*/) noexcept {}
   /// Called when the odometry's world was aligned with ENU; `origin` is the origin of ENU. Applies
   /// from the next pose on.
   virtual void on_enu_alignment(const EnuAlignment& /*alignment*/,
                                 const Geodetic& /*origin*/) noexcept {}
-  /// Called with the complete report of a frame: its pose, also in ENU once aligned, and the
-  /// comparison with the INS. Without an INS it follows on_pose() at once; with one it waits for
-  /// the readings around the frame.
+  /// Called with the complete report of a frame: pose, also in ENU once aligned, and the comparison
+  /// with the INS. Without an INS it follows on_pose() immediately, otherwise the samples around
+  /// the frame.
   virtual void on_report(const FrameReport& /*report*/) noexcept {}
-  /// A reading of the INS, stamped on the session's clock; in order of arrival.
+  /// Called with an INS sample stamped on the session's clock, in order of arrival.
   virtual void on_reading(const InsRecord& /*reading*/) noexcept {}
-  /// A line of events.jsonl.
+  /// Called with a line of events.jsonl.
   virtual void on_event(const EventRecord& /*event*/) noexcept {}
-  /// A calibration that was accepted or rejected, or that the session begins with.
+  /// Called with an accepted, rejected or initial calibration.
   virtual void on_calibration(const CalibrationRecord& /*calibration*/) noexcept {}
 
-  /// For summary.json, block `devices`. The caller's thread, once, after the last frame.
+  /// Counters for the block `devices` of summary.json. Called once on the caller's thread, after
+  /// the last frame.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> counters() { return {}; }
 };
 
-/// Forwards everything to all observers of a session, in their order.
-///
-/// Ownership  Observers outlive the last call. Threads: as SessionObserver. Memory: none.
+/// Forwards everything to all observers of a session, in their order. They must outlive the last
+/// call. Threads as in SessionObserver.
 class SessionOutput {
  public:
   SessionOutput() = default;
   explicit SessionOutput(std::span<SessionObserver* const> observers) noexcept
       : observers_(observers) {}
 
-  void post(const RigFrame& frame) noexcept { notify(&SessionObserver::on_frame, frame); }
-  void post_pose(const FrameReport& report) noexcept { notify(&SessionObserver::on_pose, report); }
-  void post(const calibration::TrackLog& tracks) noexcept {
-    notify(&SessionObserver::on_tracks, tracks);
-  }
-  void post(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
-    notify(&SessionObserver::on_enu_alignment, alignment, origin);
-  }
-  void post(const FrameReport& report) noexcept { notify(&SessionObserver::on_report, report); }
-  void post(const EventRecord& event) noexcept { notify(&SessionObserver::on_event, event); }
-  void post(const CalibrationRecord& calibration) noexcept {
-    notify(&SessionObserver::on_calibration, calibration);
-  }
-  /// Precondition: Recorder::Options::ins.
-  void post(const InsRecord& reading) noexcept { notify(&SessionObserver::on_reading, reading); }
-
- private:
+  /// Calls a function of every observer, such as &SessionObserver::on_pose.
   template <class Call, class... Values>
   void notify(Call call, const Values&... values) noexcept {
     for (SessionObserver* o : observers_) (o->*call)(values...);
   }
 
+ private:
   std::span<SessionObserver* const> observers_{};
 };
 

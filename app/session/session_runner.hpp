@@ -15,32 +15,34 @@ namespace vergence::app {
 struct SessionOptions {
   std::filesystem::path out;
   bool quiet = false;
-  bool print_memory = false;  // a table of what is held, on stdout
+  /// Prints a table of the memory on stdout.
+  bool print_memory = false;
   std::vector<SessionObserver*> observers{};
-  SessionRequests* requests = nullptr;  // from observers; may be null
+  /// Requests of observers; may be null.
+  SessionRequests* requests = nullptr;
 };
 
-/// Runs a source through estimator and comparison into a session folder: set-up,
-/// watching, events, comparison, summary, report and verdict, the same for devices and recordings.
+/// Processes a source by estimator and comparison into a session directory: set-up, monitoring,
+/// events, comparison, summary, report and result, equal for devices and recordings.
 ///
-///     LiveSource source(request);
+///     const auto source = make_recorded_source(request, …);
 ///     SessionOptions options;
 ///     options.out = "sessions/monday";
-///     const ExitCode code = run_session(source, request.configuration, options, signals);
+///     const ExitCode code = run_session(*source, request.configuration, options, signals);
 ///
-/// Threads  The source's own, the estimator (sealed, with the comparison and the observers), its
-///          worker, the calibration solver (sealed, too), the recorder; the caller's thread draws
-///          the progress line and watches for signals.
-/// Errors   InputError before the session folder is made, for all that can be known by then, and
-///          where the source does not start. Afterwards messages on stderr. A disk that is full,
-///          read-only or silent holds up no live drive: the folder is made when it takes one.
-/// → done, not_usable (never a pose, an INS that never had a position), device_failed (the source's
-///   verdict), not_written (a file is missing or not whole), interrupted, terminated
+/// Threads  The source's own, the estimator (sealed, with comparison and observers), its worker,
+///          the calibration solver (sealed) and the recorder. The caller's thread draws the
+///          progress line and watches for signals.
+/// Errors   Throws InputError before the directory is made, as far as possible, and if the source
+///          does not start. Later errors are messages on stderr. A full, read-only or unresponsive
+///          disk does not stop a live run; the directory is made when the disk allows it.
+/// Returns  done, not_usable (no pose, an INS without a position), device_failed (the source's
+///          result), not_written (a missing or incomplete file), interrupted, terminated
 [[nodiscard]] ExitCode run_session(FrameSource& source, const Configuration& configuration,
                                    const SessionOptions& options, const SignalGuard& signals);
 
 /// Returns the result of `make`. Turns std::invalid_argument and std::length_error, by which core
-/// refuses options and rig that do not fit together, into an InputError with the same message.
+/// rejects inconsistent options and rigs, into InputError with the same message.
 template <class Make>
 auto with_plain_errors(const Make& make) {
   try {

@@ -13,13 +13,13 @@
 
 namespace vergence::app {
 
-/// Times in fixed memory, however many: mean and largest exact, percentiles to 0.25 %.
-///
-/// Bins grow by the factor 1 + 1/200 from 1 µs on; 4000 of them reach 460 s. Not thread-safe.
+/// Distribution of times in fixed memory: exact mean and maximum, percentiles to 0.25 %. Bins grow
+/// by the factor 1 + 1/200 from 1 µs on; 4000 of them reach 460 s. Not thread-safe.
 class TimeHistogram {
  public:
   void add(double ms) noexcept {
-    if (!(ms >= 0)) return;  // NaN is no time
+    // Rejects negative values and NaN.
+    if (!(ms >= 0)) return;
     ++count_;
     sum_ += ms;
     max_ = std::max(max_, ms);
@@ -27,13 +27,13 @@ class TimeHistogram {
     ++bins_[std::min(static_cast<std::size_t>(place), kBins - 1)];
   }
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
-  /// ms; 0 without a time.
+  /// Mean in ms; 0 if empty.
   [[nodiscard]] double mean() const noexcept {
     return count_ == 0 ? 0 : sum_ / static_cast<double>(count_);
   }
   [[nodiscard]] double max() const noexcept { return max_; }
-  /// The least time that at least the share q of all does not exceed: the middle of its bin, at
-  /// most max(). 0 without a time.
+  /// Smallest time that at least the share q of all does not exceed: the middle of its bin, at most
+  /// max(). 0 if empty.
   [[nodiscard]] double percentile(double q) const noexcept {
     if (count_ == 0) return 0;
     const auto requested = std::max<std::uint64_t>(
@@ -49,14 +49,16 @@ class TimeHistogram {
 
  private:
   static constexpr std::size_t kBins = 4000;
-  static constexpr double kMin = 1e-3;                      // ms
-  static constexpr double kLogStep = 0.004987541511038968;  // ln(1.005)
+  // In ms.
+  static constexpr double kMin = 1e-3;
+  // ln(1.005).
+  static constexpr double kLogStep = 0.004987541511038968;
   std::array<std::uint32_t, kBins> bins_{};
   std::uint64_t count_ = 0;
   double sum_ = 0, max_ = 0;
 };
 
-/// One attempt to calibrate while driving.
+/// Attempt to calibrate during the run.
 struct CalibrationAttempt {
   Stamp stamp{};
   /// Name of the CalibrationCause, and the reason of a rejection; constants.
@@ -66,7 +68,7 @@ struct CalibrationAttempt {
   double solve_ms = 0;
 };
 
-/// The search of a drive that began without a calibration.
+/// Search of a run that began without a calibration.
 struct FromScratch {
   /// First accepted attempt.
   std::optional<CalibrationAttempt> found{};
@@ -74,22 +76,22 @@ struct FromScratch {
   std::uint64_t rejected = 0;
 };
 
-/// The calibration in use was not that of the rig.
+/// Proof that the calibration in use did not match the rig.
 struct Contradiction {
   Stamp stamp{};
   /// Depth error of the contradicted calibration.
   double depth_percent = 0;
 };
 
-/// Frames whose time was over before their work was done (docs/deployment.md), and what was left
-/// out.
+/// Frames that exceeded their time budget (docs/deployment.md), and the omitted work.
 struct BudgetStatistics {
   std::uint64_t frames = 0, points = 0, keyframes = 0, steps = 0, windows = 0;
 
   void add(const FrameWorkload& effort) noexcept;
 };
 
-inline constexpr std::size_t kMaxAttempts = 1000;  // in summary.json; calibrations.csv has all
+/// Limit in summary.json; calibrations.csv has all attempts.
+inline constexpr std::size_t kMaxAttempts = 1000;
 
 /// Totals of the attempts to calibrate.
 struct CalibrationTotals {
@@ -101,16 +103,20 @@ struct CalibrationTotals {
   /// Newest measurement of the focal length.
   FocalMeasurement focal{};
 
-  /// An attempt that was decided. True: it was accepted.
+  /// Adds a decided attempt. Returns true if it was accepted.
   bool add(const CalibrationRecord& calibration);
 };
 
 /// Totals of a session, for summary.json.
 struct SessionTotals : CalibrationTotals {
+  void add(const FrameReport& report);
+  void add(const EventRecord& event);
+
   /// Numbers of frames.
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
-  TimeHistogram estimate, decode;  // ms
-  /// Frames in other states than stereo_odometry and lost, ms.
+  /// In ms.
+  TimeHistogram estimate, decode;
+  /// Frames in states other than stereo_odometry and lost, in ms.
   TimeHistogram calibrating;
   std::array<TimeHistogram, kStages> stages;
   /// Stamp at which the calibration in use was first verified.
@@ -119,8 +125,7 @@ struct SessionTotals : CalibrationTotals {
   std::optional<std::uint64_t> verified_frame{};
   /// First contradiction of the calibration in use.
   std::optional<Contradiction> contradicted{};
-  /// Sum of the steps between successive poses.
-  double path_m = 0;
+  double path_m = 0;  // as FrameCounts
   /// Poses read back from trajectory.tum, if requested.
   std::vector<StampedPose> trajectory;
   /// Poses read back from reference.tum in its own frame, if requested.
@@ -135,21 +140,11 @@ struct SessionTotals : CalibrationTotals {
   std::size_t ring_high_water = 0;
   /// A message for each incomplete file.
   std::vector<std::string> faults;
-};
-
-/// Accumulates the totals from the frames and events of a session. Not thread-safe.
-class TotalsBuilder {
- public:
-  void add(const FrameReport& report);
-  void add(const EventRecord& event);
-  [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
 
  private:
   void match_verified();
 
-  SessionTotals totals_{};
-  std::optional<Vec3> last_position_{};
-  Stamp newest_{};
+  Stamp newest_{};  // frame
   std::uint64_t newest_frame_ = 0;
 };
 

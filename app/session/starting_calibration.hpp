@@ -10,30 +10,32 @@
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/estimator/estimator.hpp"
 
-/// Initial calibration, in this order: --from-scratch before --calibration FILE before the state
-/// file before the configuration.
+/// Initial calibration, in order of precedence: --from-scratch, --calibration FILE, the state file,
+/// the configuration.
 namespace vergence::app {
 
-/// Assumptions about a rig without a calibration: both cameras alike, principal points in the
-/// middle of the images.
+/// Assumptions about a rig without a calibration: equal cameras, principal points in the middle of
+/// the images.
 struct AssumedIntrinsics {
-  double focal = 0;     // px
-  double baseline = 0;  // m
+  /// In px.
+  double focal = 0;
+  /// In m.
+  double baseline = 0;
   CameraModelKind model = CameraModelKind::pinhole_radtan;
-  bool wide = false;  // begins with the distortion of a usual lens of 80 to 100 degrees
+  /// Starts with the distortion of a typical lens of 80 to 100 degrees.
+  bool wide = false;
 };
 
-/// calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or a folder with
-/// them) or OpenCV stereo YAML, told by
-/// content, with what is wanted of it applied. `size`: of the images, where a file has none. What a
-/// format did not carry over is a message of *remarks.
-/// Errors     InputError
+/// Reads a calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or their
+/// directory) or OpenCV stereo YAML, detected by content, and applies `use`. `size` is the image
+/// size if a file has none. *remarks receives messages about data that a format lacks. Throws
+/// InputError.
 [[nodiscard]] CalibrationFile read_given_calibration(const std::string& in,
                                                      const CalibrationUse& use,
                                                      const std::optional<ImageSize>& size,
                                                      std::vector<std::string>* remarks);
 
-/// For open_sequence().
+/// Calibration for open_sequence().
 [[nodiscard]] GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
                                                  std::vector<std::string>* remarks);
 [[nodiscard]] GivenCalibration given_calibration(const AssumedIntrinsics& known);
@@ -41,43 +43,48 @@ struct AssumedIntrinsics {
 /// Request of the command line.
 struct CalibrationSource {
   bool from_scratch = false;
-  std::optional<std::filesystem::path>
-      file{};  // --calibration; with from_scratch its intrinsics and its length only
+  /// Value of --calibration; with from_scratch only its intrinsics and length are used.
+  std::optional<std::filesystem::path> file{};
 };
 
 struct StartingCalibration {
-  CalibrationFile file{};  // what the estimator is given, with the cameras' names and serials, and
-                           // of a drive what the configuration says; from scratch T_camera_left is
-                           // parallel
-  RigCalibration nominal{};  // what the gates compare with
+  /// Calibration for the estimator, with the cameras' names and serials and, in a live run, the
+  /// configured values. From scratch T_camera_left is parallel.
+  CalibrationFile file{};
+  /// Calibration that the plausibility gates compare with.
+  RigCalibration nominal{};
   CalibrationTrust trust = CalibrationTrust::given;
-  const char* cause = "given";                   // of calibrations.csv
-  std::string source{};                          // a few words: what it is from
-  std::vector<std::string> remarks{};            // messages for the user
-  std::optional<std::filesystem::path> state{};  // where an accepted one is kept; nothing: nowhere
+  /// Value in calibrations.csv.
+  const char* cause = "given";
+  /// Short description of the origin.
+  std::string source{};
+  /// Messages for the user.
+  std::vector<std::string> remarks{};
+  /// File that stores an accepted calibration; empty if none.
+  std::optional<std::filesystem::path> state{};
 };
 
-/// Initial calibration of a live run. `serials`: the cameras' own, as far as they have one; else
-/// the configuration names them. From scratch, too, where the cameras are real and neither a file
-/// nor the configuration says where they sit. Errors InputError: a file that is damaged or of
-/// another rig. A state file that is not used is a remark.
+/// Initial calibration of a live run. `serials` are the cameras' own, if any, else the configured
+/// ones are used. It is also from scratch if the cameras are real and neither a file nor the
+/// configuration has extrinsics. Throws InputError for a file that is damaged or of another rig. An
+/// unused state file gives a remark.
 [[nodiscard]] StartingCalibration starting_calibration(const Configuration& configuration,
                                                        const CalibrationSource& source,
                                                        const std::vector<std::string>& serials);
 
-/// Initial calibration of a replay; the sequence was opened with the same from_scratch. State files
-/// are neither read nor written.
+/// Initial calibration of a replay; the sequence must be opened with the same from_scratch. State
+/// files are neither read nor written.
 [[nodiscard]] StartingCalibration replayed_calibration(const Configuration& configuration,
                                                        const StereoSequence& sequence,
                                                        bool from_scratch);
 
-/// Nominal geometry for the gates: parallel cameras a baseline apart; of a camera that is mounted
-/// farther from there than the gates let through, its place in `mounted`.
+/// Nominal geometry for the gates: parallel cameras a baseline apart. A camera mounted further from
+/// there than the gates permit keeps its pose in `mounted`.
 [[nodiscard]] RigCalibration nominal_geometry(const RigCalibration& given,
                                               const RigCalibration& mounted,
                                               const calibration::CalibrationOptions& options);
 
-/// `masks` by camera and `frame_budget` as EstimatorOptions has them.
+/// `masks` by camera and `frame_budget` are those of EstimatorOptions.
 [[nodiscard]] EstimatorOptions estimator_options(
     const Configuration& configuration, CalibrationTrust trust, Adoption adoption,
     const std::array<ImageView, kMaxCameras>& masks = {}, Duration frame_budget = {});

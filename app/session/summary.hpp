@@ -80,12 +80,12 @@ struct SummaryInput {
 /// (step 1), and these once more after one scale.
 [[nodiscard]] EvaluationOptions summary_evaluation_options();
 
-/// Error of a calibration against the true one: rotation vector, rad, and translation, m, that lead
-/// from the true transform of each further camera to ours (left perturbation).
+/// Error of a calibration against the true one: rotation vector in rad and translation in m, which
+/// lead from the true transform of each camera k ≥ 1 to the estimated one (left perturbation).
 [[nodiscard]] std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours,
                                                                     const RigCalibration& truth);
 
-/// summary.json, keys in a fixed order; what does not exist is null.
+/// Content of summary.json with a fixed order of keys; missing values are null.
 [[nodiscard]] nlohmann::ordered_json summary_json(const SessionTotals& totals,
                                                   const SummaryInput& input);
 

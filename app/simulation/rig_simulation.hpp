@@ -8,15 +8,17 @@
 namespace vergence {
 
 enum class SimulationGenerator : std::uint8_t {
-  ring,  // rigs 20 … 25 m from the cloud's centre, left camera looking exactly at it, right camera
-         // on its x axis
-  tight,  // rigs as near as all points stay in view, the middle of the baseline looking at the
-          // centre, baseline slightly askew
+  /// Rigs are 20 to 25 m from the cloud's centre. The left camera looks exactly at it, the right
+  /// camera is on its x axis.
+  ring,
+  /// Rigs are as close as all points stay in view. The middle of the baseline looks at the centre;
+  /// the baseline is slightly rotated.
+  tight,
 };
 enum class SimulationShape : std::uint8_t { ball, shell };
 
-/// The paper's simulated rig (Sec. V-A): a cloud of points round the origin, snapshots of a rig all
-/// round it, every point in every image.
+/// Simulated rig of Warren et al. 2013, Sec. V-A: a cloud of points round the origin, snapshots of
+/// a rig all round it, every point in every image.
 struct SimulationOptions {
   SimulationGenerator generator = SimulationGenerator::ring;
   SimulationShape shape = SimulationShape::ball;
@@ -33,38 +35,40 @@ struct SimulationOptions {
   double start_position = 0.1;
   /// Uniform initial error per axis (±) of the camera rotations, rad.
   double start_rotation = 0.1;
-  double start_translation =
-      0.05;  // m, uniform ±, an axis: centre of camera k, brought back to the true length
-  double start_points =
-      0.1;  // m, uniform ±, an axis; negative: triangulated from the perturbed cameras
+  /// Uniform initial error per axis (±) of the centre of camera k in m; the true baseline length is
+  /// then restored.
+  double start_translation = 0.05;
+  /// Uniform initial error per axis (±) of the points in m; negative: triangulated from the
+  /// perturbed cameras.
+  double start_points = 0.1;
 };
 
-/// One simulated problem: truth, measurements and a start. Plain memory of its own; not for the
-/// real-time path.
+/// Simulated problem: truth, measurements and start values. Allocates; not for the real-time path.
 struct SimulatedRig {
   std::vector<Camera> cameras;
-  std::vector<Transform> true_cameras, true_poses;     // T_camera_left, T_left_world of the truth
-  std::vector<Transform> T_camera_left, T_left_world;  // of the start
+  /// True T_camera_left and T_left_world.
+  std::vector<Transform> true_cameras, true_poses;
+  /// Start values.
+  std::vector<Transform> T_camera_left, T_left_world;
   std::vector<Vec3> true_points, points;
   std::vector<BundleObservation> observations;
 
-  /// The start as a problem in these arrays; the first pose constant.
+  /// Problem with the start values in these arrays; the first pose is constant.
   [[nodiscard]] BundleProblem problem() noexcept;
-  /// Variant like parallel_monocular: a pose an image, image = pose · cameras + camera; `images`
-  /// keeps the poses.
+  /// Variant like parallel_monocular with a pose per image: image = pose · cameras + camera.
+  /// `images` receives the poses.
   [[nodiscard]] BundleProblem monocular_problem(std::vector<Transform>* images,
                                                 std::vector<BundleObservation>* per_image,
                                                 std::vector<std::uint8_t>* constant);
 };
 
-/// Draws a problem. Throws std::runtime_error if no view of the whole cloud is found (impossible
-/// options).
+/// Draws a problem. Throws std::runtime_error if no view of the whole cloud exists.
 [[nodiscard]] SimulatedRig simulate_rig(const SimulationOptions& options, Random& random);
 
-/// Moves the start (not the truth) as the options say; called by simulate_rig.
+/// Perturbs the start values by the options; called by simulate_rig.
 void perturb_start(SimulatedRig& rig, const SimulationOptions& options, Random& random);
 
-/// Capacities that hold such a problem.
+/// Capacities for such a problem.
 [[nodiscard]] BundleCapacities capacities_for(const SimulationOptions& options);
 
 }  // namespace vergence

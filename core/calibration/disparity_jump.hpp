@@ -76,7 +76,7 @@ class DisparityJumpDetector {
   struct Row {
     // Measured minus predicted disparity, in px.
     double e = 0;
-    // Its derivative with respect to an error of the motion along the optical axis, in px/m.
+    // Derivative of `e` with respect to an error of the motion along the optical axis, in px/m.
     double along = 0;
   };
   [[nodiscard]] bool row(const StereoObservation& before, const StereoObservation& now,

@@ -37,7 +37,7 @@ enum class AlignStatus : std::uint8_t {
   ok,
   /// The window left the image.
   outside,
-  /// There is no structure in one direction.
+  /// The window lacks structure in a direction.
   flat,
   /// It moved further than AlignOptions::max_shift, or did not settle.
   diverged,

@@ -87,7 +87,7 @@ class StereoMlesac {
   std::span<float> x1_, y1_, x2_, y2_, weight_, cap_;
   // Usable matches.
   std::span<Vec2> left_, right_;
-  // Those that a matrix explains.
+  // Matches that a matrix explains.
   std::span<Vec2> near_left_, near_right_;
   std::span<double> inverse_sigma_;
   // Index in the input.

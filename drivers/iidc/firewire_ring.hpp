@@ -48,6 +48,7 @@ class FirewireRing {
   FirewireRing& operator=(const FirewireRing&) = delete;
 
   // Calls of the owner.
+
   /// Sets the shape for the next set_up(). Precondition: !captured().
   void set_shape(const StreamShape& shape) noexcept { shape_ = shape; }
   [[nodiscard]] const StreamShape& shape() const noexcept { return shape_; }
@@ -83,6 +84,7 @@ class FirewireRing {
   void enqueue_returned() noexcept;
 
   // Calls of any thread.
+
   /// Returns true if the buffer is of the present ring, so that the stream's thread has to enqueue
   /// it.
   [[nodiscard]] bool give_back(FrameSlot slot) noexcept;

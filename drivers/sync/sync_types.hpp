@@ -177,6 +177,7 @@ struct SyncCounters {
   /// Times that the pulses of all cameras were found by their stamps again.
   std::uint64_t realigned = 0;
   // The following apply to numbered pulses.
+
   /// Pulses that this camera did not expose.
   std::array<std::uint64_t, kMaxCameras> missed_trigger{};
   /// Frames returned while their pulse was not verified.

@@ -55,7 +55,7 @@ class BoardClock {
   /// Handles a start of the trigger board. `spread` is the maximum delay of a stamp's report, for
   /// stamps before the first answer. `pps` means that a signal disciplines the ticks.
   void restart(Duration spread, bool pps) noexcept;
-  /// PPS status of the board, about every second.
+  /// Handles the PPS status, received about every second.
   void report_lock(bool locked, HostStamp now) noexcept;
   /// Handles a reopened link: open pings will not be answered, the fit stays. `wire` is the time of
   /// a byte on the wire; 0 if it has none.

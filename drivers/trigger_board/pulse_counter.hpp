@@ -28,9 +28,9 @@ class PulseCounter {
   void begin(std::uint32_t boot, std::uint32_t next) noexcept;
   /// Sets the configured intervals, which limit the number of pulses between two ticks.
   void set_intervals(std::uint32_t rate_millihertz, std::uint32_t dither_us) noexcept;
-  /// So many pulses shall be left out.
+  /// Expects a pause that omits this number of pulses.
   void expect_pause(std::uint32_t pulses) noexcept { asked_ += pulses; }
-  /// They will not be after all.
+  /// Cancels the expected pause.
   void clear_pause() noexcept { asked_ = 0; }
   /// Allows the next event to be earlier than the last, because the clock was set back.
   void clear_time() noexcept { any_ = false, tick_ = 0; }

@@ -107,6 +107,7 @@ class FrameExchange {
   };
 
   // Calls of the owner.
+
   /// True while streaming or while images are in use.
   [[nodiscard]] bool busy() const noexcept;
   /// Selects grey images in the kernel's buffers, or images converted from them. Precondition: not
@@ -137,6 +138,7 @@ class FrameExchange {
     return queue_.wait(limit, frame);
   }
   // Calls of the releaser.
+
   /// Returns true if this frees a buffer for the capture thread.
   [[nodiscard]] bool release(FrameSlot slot) noexcept;
 

@@ -11,15 +11,13 @@
 
 namespace vergence::app::detail {
 
-/// The images of two topics of a bag by the names that a sequence gives them, loaded when they are
-/// asked for. The two chunks used last stay
-/// unpacked: the two images of a pair mostly lie in one.
-/// Threads  Any number at once, each with a workspace of its own.  Errors  As of image_file.hpp;
-/// std::bad_alloc.
-/// Memory  Some 80 bytes an image, and four times kMaxChunk at most.
+/// Images of two topics of a bag by their names in a sequence, loaded on request. The last two
+/// chunks stay unpacked, because the images of a pair are mostly in one. Thread-safe with a
+/// workspace per thread. Uses some 80 bytes per image, and at most four times kMaxChunk. Errors as
+/// in image_file.hpp, and std::bad_alloc.
 class BagImages {
  public:
-  /// `topics`, `images`: left, right.
+  /// `topics` and `images` are left and right.
   BagImages(BagFormat format, std::vector<BagFile> files, std::array<std::string, 2> topics,
             std::array<std::vector<BagImage>, 2> images) noexcept;
 
@@ -27,11 +25,11 @@ class BagImages {
   [[nodiscard]] std::string name(std::size_t camera, std::size_t index) const;
   /// → ok, missing
   [[nodiscard]] ImageFileStatus size(const std::string& name, ImageSize* size) const;
-  /// Its greatest sample, where those have 16 bits; nothing: another kind of image. 0: one that
-  /// says nothing, for it is missing, torn or black. *work: room that is used again.
+  /// Maximum of its 16-bit samples; empty for other images. 0 if it is missing, truncated or black.
+  /// *work is reused memory.
   [[nodiscard]] std::optional<std::uint16_t> peak(const std::string& name,
                                                   std::vector<std::uint8_t>* work) const;
-  /// As decode_grey(); *work: room that is used again.
+  /// Same contract as decode_grey(); *work is reused memory.
   [[nodiscard]] ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out,
                                        std::size_t stride, int deep_bits,
                                        std::vector<std::uint8_t>* work) const;
@@ -42,7 +40,7 @@ class BagImages {
     std::uint64_t chunk = BagPlace::kNoChunk;
     std::shared_ptr<const std::vector<std::uint8_t>> records{};
   };
-  /// Nothing: no such image.
+  /// Returns null if there is no such image.
   [[nodiscard]] const BagImage* find(const std::string& name, std::size_t* camera) const noexcept;
   [[nodiscard]] bool load(const BagImage& entry, std::vector<std::uint8_t>* data) const;
   /// Records of the image's chunk; null: it does not unpack.
@@ -53,8 +51,10 @@ class BagImages {
   std::vector<BagFile> files_;
   std::array<std::string, 2> topics_;
   std::array<std::vector<BagImage>, 2> images_;
-  mutable std::mutex mutex_;                  // with unpacked_
-  mutable std::array<Unpacked, 2> unpacked_;  // the newer one first
+  // Guards unpacked_.
+  mutable std::mutex mutex_;
+  // The newer one is first.
+  mutable std::array<Unpacked, 2> unpacked_;
 };
 
 }  // namespace vergence::app::detail

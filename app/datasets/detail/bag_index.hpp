@@ -14,37 +14,44 @@
 /// Content of a ROS recording by topic.
 namespace vergence::app::detail {
 
-/// Where an image of a bag is; its pixels stay in the file.
+/// Position of an image in a bag; its pixels stay in the file.
 struct BagImage {
   RosImage image{};
-  std::int64_t log_time = 0;  // ns, when it was recorded
+  /// Recording time in ns.
+  std::int64_t log_time = 0;
   BagPlace place{};
-  std::uint32_t file = 0;  // of the bag's files
+  /// Index of the bag's file.
+  std::uint32_t file = 0;
 };
 
 /// Messages of a topic that are omitted, and the first position.
 struct LeftOut {
   std::size_t unreadable = 0, other_size = 0, backwards = 0;
-  std::string first{};     // file and offset
-  std::string encoding{};  // of the first that cannot be read, as it names itself
+  /// File and offset.
+  std::string first{};
+  /// Encoding of the first unreadable message, as named in it.
+  std::string encoding{};
 };
 
-/// Images of one size, stamps strictly ascending.
+/// Images of one size with strictly increasing stamps.
 struct ImageTopic {
   std::vector<BagImage> images{};
   LeftOut left_out{};
-  std::size_t unstamped = 0;  // whose stamp was 0: the time of recording has its place
+  /// Number of images with stamp 0, which have the recording time instead.
+  std::size_t unstamped = 0;
 };
 
-/// Readings whose stamps strictly ascend.
+/// Samples with strictly increasing stamps.
 template <typename Reading>
 struct ReadingTopic {
   std::vector<Reading> readings{};
-  std::size_t unreadable = 0;  // are no such message, or numbers of them are none
-  std::size_t backwards = 0;   // left out: stamps go back or repeat one
+  /// Number of invalid messages.
+  std::size_t unreadable = 0;
+  /// Number of dropped samples, whose stamps decrease or repeat.
+  std::size_t backwards = 0;
 };
 
-/// A file of a bag.
+/// File of a bag.
 struct BagFile {
   std::string name{};
   std::unique_ptr<const ByteSource> bytes{};
@@ -53,23 +60,26 @@ struct BagFile {
 struct BagIndex {
   BagFormat format{};
   std::vector<BagFile> files{};
-  std::map<std::string, ImageTopic> images{};  // by topic, all of these
+  /// By topic, as the next ones.
+  std::map<std::string, ImageTopic> images{};
   std::map<std::string, RosCameraInfo> infos{};
   std::map<std::string, ReadingTopic<RosFix>> fixes{};
-  std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};  // without orientation: unreadable
-  std::vector<std::string> others{};   // some topics that are not read, each with its type
-  std::vector<std::string> remarks{};  // a message each
+  /// Messages without orientation count as unreadable.
+  std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};
+  /// Some topics that are not read, each with its type.
+  std::vector<std::string> others{};
+  /// Messages.
+  std::vector<std::string> remarks{};
 };
 
-/// The files of a bag: one, or those of a folder in the order in which recorders count them.
-/// InputError: no such file, no file of the format in the folder.
+/// Files of a bag: one, or those of a directory in recording order. Throws InputError for a missing
+/// file or a directory without the format.
 [[nodiscard]] std::vector<BagFile> open_bag_files(BagFormat format,
                                                   const std::filesystem::path& path);
 
-/// All messages of a bag's files. `path`: for messages.
-/// Memory  80 bytes an image, 60 to 180 a reading of an INS.
-/// InputError  A file does not begin as the format does, there are more images or readings than are
-/// held.
+/// Indexes all messages of a bag's files; `path` is for messages. Uses 80 bytes per image, 60 to
+/// 180 per INS sample. Throws InputError if a file does not begin as the format requires, or there
+/// are too many images or samples.
 [[nodiscard]] BagIndex index_bag(BagFormat format, const std::filesystem::path& path,
                                  std::vector<BagFile> files);
 

@@ -6,9 +6,9 @@
 
 namespace vergence::app::detail {
 
-/// The INS of a bag: NavSatFix with the orientation of Imu, as docs/datasets.md says.
-/// Nothing and a remark: there is none, it has no attitude, or several topics could be it.
-/// InputError  topics.ins or topics.imu is no topic of such messages.
+/// INS of a bag: NavSatFix with the orientation of Imu (docs/datasets.md). Empty with a remark if
+/// there is none, it has no attitude, or several topics match. Throws InputError if topics.ins or
+/// topics.imu has other messages.
 [[nodiscard]] RecordedIns bag_ins(const std::filesystem::path& path, const BagIndex& bag,
                                   const BagTopics& topics);
 

@@ -9,50 +9,56 @@
 
 #include "app/datasets/detail/byte_source.hpp"
 
-/// Messages out of recordings of ROS, whatever container they are in: front to back, indexes and
-/// summaries are neither believed nor needed.
+/// Reads messages of ROS recordings in any container front to back; indexes and summaries are not
+/// used.
 namespace vergence::app::detail {
 
-inline constexpr std::uint64_t kMaxChunk =
-    std::uint64_t{64}
-    << 20U;  // bytes, packed or unpacked: rosbag and rosbag2 write less than 1 MiB
-inline constexpr std::uint64_t kMaxDescription =
-    std::uint64_t{1} << 20;                         // bytes of a record that describes a channel
-inline constexpr std::size_t kMaxName = 1024;       // bytes of a topic's or a type's name
-inline constexpr std::size_t kMaxChannels = 65536;  // of a file
+/// In bytes, packed or unpacked; rosbag and rosbag2 write less than 1 MiB.
+inline constexpr std::uint64_t kMaxChunk = std::uint64_t{64} << 20U;
+/// Maximum size of a channel description, in bytes.
+inline constexpr std::uint64_t kMaxDescription = std::uint64_t{1} << 20;
+/// Maximum length of a topic's or type's name, in bytes.
+inline constexpr std::size_t kMaxName = 1024;
+/// Maximum number per file.
+inline constexpr std::size_t kMaxChannels = 65536;
 
 enum class BagFormat : std::uint8_t { mcap, rosbag, sqlite };
 
-/// Serialisation of a channel's messages: by CDR (ROS 2), as ROS 1 does it, or in a way that
-/// is not read.
+/// Serialisation of a channel's messages: CDR (ROS 2), ROS 1, or one that is not supported.
 enum class MessageEncoding : std::uint8_t { cdr, ros1, other };
 
 struct BagChannel {
   std::string topic;
-  std::string type;  // as ROS 1 writes it: sensor_msgs/Image
+  /// In ROS 1's form: sensor_msgs/Image.
+  std::string type;
   MessageEncoding encoding = MessageEncoding::other;
 };
 
-/// The type's name as ROS 1 writes it: without the /msg/ of ROS 2.
+/// Name of the type in ROS 1's form: without the /msg/ of ROS 2.
 [[nodiscard]] std::string plain_type(std::string_view type);
 
-/// Where a message's content is.
+/// Position of a message's content.
 struct BagPlace {
   static constexpr std::uint64_t kNoChunk = 0;
-  std::uint64_t chunk = kNoChunk;  // offset of a packed chunk's record in the file; kNoChunk:
-                                   // `offset` counts from the file's start
-  std::uint64_t offset = 0;        // of the message's content, in the unpacked records of the chunk
-  std::uint32_t size = 0;          // bytes of the content
+  /// Offset of a packed chunk's record in the file; with kNoChunk `offset` is in the file.
+  std::uint64_t chunk = kNoChunk;
+  /// Offset of the content, in the unpacked records of the chunk.
+  std::uint64_t offset = 0;
+  /// Size of the content in bytes.
+  std::uint32_t size = 0;
 };
 
 struct BagMessage {
-  const BagChannel* channel = nullptr;  // until the scan ends
+  /// Valid until the scan ends.
+  const BagChannel* channel = nullptr;
   BagPlace place{};
-  const ByteSource* bytes = nullptr;  // where place.offset counts; during the call
-  std::int64_t log_time = 0;          // ns, when it was recorded
+  /// Source to which place.offset refers; valid during the call.
+  const ByteSource* bytes = nullptr;
+  /// Recording time in ns.
+  std::int64_t log_time = 0;
 };
 
-/// The first `most` bytes of a message's content, or all; empty: they cannot be read.
+/// First `most` bytes of a message's content, or all; empty if unreadable.
 [[nodiscard]] std::vector<std::uint8_t> first_bytes(const BagMessage& message, std::size_t most);
 
 using BagVisitor = std::function<void(const BagMessage&)>;
@@ -60,53 +66,56 @@ using BagVisitor = std::function<void(const BagMessage&)>;
 /// Result of a scan.
 struct BagScan {
   std::uint64_t messages = 0;
-  std::uint64_t orphans = 0;  // messages of no channel that was described before them
-  std::uint64_t broken_chunks =
-      0;  // do not unpack, fail their check sum, or are larger than kMaxChunk: skipped
-  std::uint64_t broken_records =
-      0;  // descriptions that contradict themselves, messages shorter than their head: skipped
-  std::optional<std::uint64_t> first_broken{};  // offset in the file of the first of these
-  std::string why_broken{};                     // and what is wrong with it: a phrase
-  bool finished = false;                        // its writer closed it
-  std::uint64_t end = 0;                        // offset behind the last whole record
+  /// Messages of a channel that was not described before.
+  std::uint64_t orphans = 0;
+  /// Skipped chunks: not unpackable, wrong checksum, or larger than kMaxChunk.
+  std::uint64_t broken_chunks = 0;
+  /// Skipped records: contradicting descriptions, messages shorter than their header.
+  std::uint64_t broken_records = 0;
+  /// Offset of the first of these in the file.
+  std::optional<std::uint64_t> first_broken{};
+  /// Phrase about its problem.
+  std::string why_broken{};
+  /// True if the writer closed the file.
+  bool finished = false;
+  /// Offset after the last complete record.
+  std::uint64_t end = 0;
 
-  /// One more of `counter`, which is broken_chunks or broken_records.
+  /// Increments `counter`, which is broken_chunks or broken_records.
   void broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why);
-  /// Says what is missing of the file of this name.
+  /// Adds a remark about missing data of the file with this name.
   void remark(const std::string& name, std::vector<std::string>* remarks) const;
 };
 
-/// Hands every message to `each`, in the file's order (of sqlite in that of log times); content
-/// that is not all there is not handed over. Chunks without compression are read where they lie,
-/// the heads of messages only, whatever their length. Nothing: the file does not begin as the
-/// format does. Precondition: of sqlite a SqliteBag. Memory  Two times kMaxChunk, and
-/// kMaxChannels names, at most.
+/// Passes every message to `each`, in the file's order (sqlite: by log time), except incomplete
+/// ones. Of uncompressed chunks only message headers are read. Returns nothing if the file does not
+/// begin as the format requires. Precondition: of sqlite a SqliteBag. Uses at most two times
+/// kMaxChunk, and kMaxChannels names.
 [[nodiscard]] std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file,
                                               const BagVisitor& each);
 
-/// Unpacks the chunk at `offset` of the file into *records. False: it is not as the scan found it;
-/// *records undefined.
+/// Unpacks the chunk at `offset` of the file into *records. Returns false, with *records undefined,
+/// if it has changed since the scan.
 [[nodiscard]] bool unpack_chunk(BagFormat format, const ByteSource& file, std::uint64_t offset,
                                 std::vector<std::uint8_t>* records);
 
-// The containers' parts of scan_bag() and unpack_chunk().
+// Container-specific parts of scan_bag() and unpack_chunk().
 //
-// MCAP (mcap.dev, specification version 0) front to back; neither index nor summary is believed or
-// needed. Chunks without compression are read 9 bytes a record and 22 a message; their check sums
-// are not looked at.
+// MCAP (mcap.dev, specification version 0). Of uncompressed chunks 9 bytes per record and 22 per
+// message are read; their checksums are ignored.
 [[nodiscard]] std::optional<BagScan> scan_mcap(const ByteSource& file, const BagVisitor& each);
 [[nodiscard]] bool unpack_mcap_chunk(const ByteSource& file, std::uint64_t offset,
                                      std::vector<std::uint8_t>* records);
 
-// ROS 1 bags (wiki.ros.org/Bags/Format/2.0) front to back; index records and the places that they
-// name are passed over. A chunk that its recorder never closed says that it is empty, and its
-// records follow: those of one without compression are read like others of the file.
+// ROS 1 bags (wiki.ros.org/Bags/Format/2.0); index records are skipped. A chunk that its recorder
+// never closed claims to be empty, and its records follow; if uncompressed, they are read like
+// others of the file.
 [[nodiscard]] std::optional<BagScan> scan_rosbag(const ByteSource& file, const BagVisitor& each);
 [[nodiscard]] bool unpack_rosbag_chunk(const ByteSource& file, std::uint64_t offset,
                                        std::vector<std::uint8_t>* records);
 
-/// The frame or frames of `packed` as `name` says ("zstd", "lz4", "bz2"), exactly `records.size()`
-/// bytes. False: they are not.
+/// Decompresses `packed` by the method `name` ("zstd", "lz4", "bz2") into exactly `records.size()`
+/// bytes; false if that fails.
 [[nodiscard]] bool decompress(std::string_view name, std::span<const std::uint8_t> packed,
                               std::span<std::uint8_t> records) noexcept;
 

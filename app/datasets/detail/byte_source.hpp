@@ -5,22 +5,20 @@
 
 namespace vergence::app::detail {
 
-/// Bytes that are read by position. Threads  read() from any number at once.
+/// Bytes with random access. read() is thread-safe.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
   [[nodiscard]] virtual std::uint64_t size() const noexcept = 0;
-  /// All of `out` from `offset`. False: they are not all there, or cannot be read; content of `out`
-  /// undefined.
+  /// Fills `out` from `offset`. Returns false, with `out` undefined, if that fails.
   [[nodiscard]] virtual bool read(std::uint64_t offset,
                                   std::span<std::uint8_t> out) const noexcept = 0;
 };
 
-/// A file of which there may be more than a process may have open: each thread keeps the one that
-/// it read last open.
+/// File among more than a process may have open: each thread keeps only its last file open.
 class FileBytes final : public ByteSource {
  public:
-  /// InputError: no such file, no regular file, or it cannot be opened.
+  /// Throws InputError if the file is missing, not regular or cannot be opened.
   explicit FileBytes(const std::filesystem::path& file);
   FileBytes(const FileBytes&) = delete;
   FileBytes& operator=(const FileBytes&) = delete;
@@ -31,11 +29,12 @@ class FileBytes final : public ByteSource {
 
  private:
   std::filesystem::path path_;
-  std::uint64_t number_;  // no other one of the process has it
+  // Unique in the process.
+  std::uint64_t number_;
   std::uint64_t size_ = 0;
 };
 
-/// A view; the bytes outlive it.
+/// View of bytes, which must outlive it.
 class MemoryBytes final : public ByteSource {
  public:
   explicit MemoryBytes(std::span<const std::uint8_t> bytes) noexcept : bytes_(bytes) {}

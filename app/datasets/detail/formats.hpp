@@ -12,7 +12,7 @@ namespace vergence::app::detail {
 
 /// Each reader fills root, pairs and, unless `given`, the calibration.
 [[nodiscard]] StereoSequence open_kitti(const std::filesystem::path& folder, bool given);
-/// `cameras`: left and right, of 00 to 03.
+/// `cameras` are left and right, of 00 to 03.
 [[nodiscard]] StereoSequence open_kitti_raw(const std::filesystem::path& folder, bool given,
                                             const std::array<int, 2>& cameras);
 [[nodiscard]] StereoSequence open_euroc(const std::filesystem::path& folder, bool given,
@@ -26,29 +26,30 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag,
                                            bool given, const BagTopics& topics);
 
-/// The packets of oxts/ of a KITTI raw drive as INS samples (docs/datasets.md); what is missing,
-/// broken or out of order is left out and told. InputError: files that are not there, no packet
-/// that is whole, a calibration that is none.
+/// Reads the packets of oxts/ of a KITTI raw drive as INS samples (docs/datasets.md); missing,
+/// damaged or disordered ones are skipped and reported. Throws InputError for missing files, no
+/// complete packet, or an invalid calibration.
 [[nodiscard]] RecordedIns read_oxts(const std::filesystem::path& folder,
                                     const std::array<int, 2>& cameras, bool mount_wanted);
 
 /// Returns true if open_folder() finds images of two cameras below `root`.
 [[nodiscard]] bool holds_stereo_images(const std::filesystem::path& root);
 
-/// The log of the INS in a St Lucia folder (docs/datasets.md). Lines that are no twelve numbers are
-/// left out and counted, readings sorted by their stamps; without sigmas, the log has none. What
-/// the drive cannot tell of its axes (it never is fast or steep enough) is the MTi-G's own: x
-/// forward, y left, z up, yaw from north counter-clockwise. Without a log there are no readings,
-/// and a remark. InputError: several logs, more than one line in a hundred broken, positions that
-/// are no places.
+/// Reads the INS log in a St Lucia directory (docs/datasets.md). Lines without twelve numbers are
+/// skipped and counted, samples sorted by stamp; the log has no sigmas. Axes that the drive cannot
+/// determine (never fast or steep enough) are the MTi-G's: x forward, y left, z up, yaw from north
+/// counter-clockwise. Without a log there are no samples, with a remark. Throws InputError for
+/// several logs, more than 1 % damaged lines, or invalid positions.
 [[nodiscard]] RecordedIns read_st_lucia_ins(const std::filesystem::path& folder);
 
-/// A drive lies in `folder`, in its date's folder or one above. InputError: it cannot be listed.
+/// True if `folder`, its date's directory or one above contains a drive. Throws InputError if
+/// unreadable.
 [[nodiscard]] bool holds_kitti_raw(const std::filesystem::path& folder);
-/// `folder`: the drive, its date, or what the date lies in. InputError: no drive in it, or several.
+/// `folder` is the drive, its date, or the date's parent. Throws InputError for no or several
+/// drives.
 [[nodiscard]] KittiRawFolders find_kitti_raw(const std::filesystem::path& folder);
 
-/// InputError unless the path is a folder.
+/// Throws InputError unless the path is a directory.
 void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold);
 
 }  // namespace vergence::app::detail

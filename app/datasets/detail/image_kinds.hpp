@@ -6,35 +6,38 @@
 
 #include "app/datasets/image_file.hpp"
 
-/// The kinds of image files that are read. Files are untrusted: sizes are accepted before a decoder
-/// sees a byte, and every offset is checked against the bytes there are.
+/// Kinds of image files. Files are untrusted: sizes are checked before decoding, and every offset
+/// against the available bytes.
 namespace vergence::app::detail {
 
 using ImageBytes = std::span<const std::uint8_t>;
 
-/// Reduces grey samples of 16 bits to 8; colours keep their upper 8 bits.
+/// Reduces grey 16-bit samples to 8 bits; colours keep their upper 8 bits.
 struct DeepSamples {
-  int bits = 16;           // as narrowed()'s
-  std::uint16_t peak = 0;  // set: the greatest sample; 0 where the file has other samples
+  /// Parameter of narrowed().
+  int bits = 16;
+  /// Set to the maximum sample; 0 if the file has other samples.
+  std::uint16_t peak = 0;
 };
 
-/// The upper 8 of the lower `bits` (8 … 16) of a grey sample; what is beyond them is white.
+/// Upper 8 of the lower `bits` (8 to 16) of a grey sample; larger values are white.
 [[nodiscard]] inline std::uint8_t narrowed(std::uint16_t sample, int bits) noexcept {
   return static_cast<std::uint8_t>(std::min(sample >> static_cast<unsigned>(bits - 8), 255));
 }
 
-/// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it.
+/// Luminance of ITU-R BT.601 in 8 bits, as in JPEG.
 [[nodiscard]] inline std::uint8_t luminance(unsigned red, unsigned green, unsigned blue) noexcept {
   return static_cast<std::uint8_t>((77U * red + 150U * green + 29U * blue + 128U) >> 8U);
 }
 
-/// A width and a height as a file claims them, before anything is taken for them. → ok,
-/// not_an_image: nothing at all, or more than any camera gives
+/// Checks a file's claimed width and height before allocation. → ok, not_an_image (empty, or more
+/// than any camera gives)
 [[nodiscard]] inline ImageFileStatus accept_size(std::uint32_t width, std::uint32_t height,
                                                  ImageSize* size) noexcept {
-  constexpr std::uint32_t kMaxSide = 1U << 15;  // px
-  constexpr std::uint64_t kMaxPixels =
-      std::uint64_t{1} << 27;  // what a file of a hundred bytes may make a reader take
+  // In px.
+  constexpr std::uint32_t kMaxSide = 1U << 15;
+  // Limits what a file of a hundred bytes can make a reader allocate.
+  constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 27;
   if (width == 0 || height == 0 || width > kMaxSide || height > kMaxSide ||
       std::uint64_t{width} * height > kMaxPixels)
     return ImageFileStatus::not_an_image;
@@ -42,14 +45,15 @@ struct DeepSamples {
   return ImageFileStatus::ok;
 }
 
-/// One kind. Each function but the first has those before it as preconditions; none throws.
+/// Kind of image files. Each function requires the success of those before it; none throws.
 ///
-/// is      By the first bytes.
-/// size    From the head alone, `head` bytes. → ok, torn, not_an_image
-/// check   Whether all of it is there (image_file.hpp). → ok, torn, not_an_image
-/// deep    It is of grey samples of 16 bits.
-/// decode  Rows of `stride` bytes, colours as 0.299 R + 0.587 G + 0.114 B (or the file's own
-///         luminance), 8 of 16 bits as the samples say. → ok, torn (damaged inside), undecodable
+/// is      Detects the kind by the first bytes.
+/// size    Reads the size from the first `head` bytes. → ok, truncated, not_an_image
+/// check   Checks completeness (image_file.hpp). → ok, truncated, not_an_image
+/// deep    True for grey samples of 16 bits.
+/// decode  Writes rows of `stride` bytes, colours as 0.299 R + 0.587 G + 0.114 B (or the file's own
+///         luminance), 8 of 16 bits as the samples require. → ok, truncated (damaged inside),
+///         undecodable
 struct ImageKind {
   std::size_t head;
   bool (*is)(ImageBytes) noexcept;
@@ -63,10 +67,10 @@ struct ImageKind {
 /// BMP of 8, 24 and 32 bits; PGM and PPM of bytes (P5, P6).
 extern const ImageKind kPng, kJpeg, kBmp, kNetpbm;
 
-/// A JPEG's size stands behind its metadata: four segments of 64 KiB.
-inline constexpr std::size_t kJpegHead = std::size_t{256} << 10U;  // bytes
+/// In bytes: a JPEG's size follows its metadata of up to four segments of 64 KiB.
+inline constexpr std::size_t kJpegHead = std::size_t{256} << 10U;
 
-/// So few bytes that they may be the beginning of a PNG, or nothing at all.
+/// True for so few bytes that they may begin a PNG.
 [[nodiscard]] bool may_become_png(ImageBytes bytes) noexcept;
 
 }  // namespace vergence::app::detail

@@ -6,8 +6,8 @@
 
 namespace vergence::app::detail {
 
-/// Reads what MCAP records are made of, one after the other. Once something is not all there, ok()
-/// is false and every further value 0.
+/// Reads elements of MCAP records in sequence. Once one is incomplete, ok() is false and further
+/// values are 0.
 class LittleEndian {
  public:
   explicit LittleEndian(std::span<const std::uint8_t> bytes) noexcept : rest_(bytes) {}
@@ -21,7 +21,7 @@ class LittleEndian {
   [[nodiscard]] std::uint16_t u16() noexcept { return static_cast<std::uint16_t>(number(2)); }
   [[nodiscard]] std::uint32_t u32() noexcept { return static_cast<std::uint32_t>(number(4)); }
   [[nodiscard]] std::uint64_t u64() noexcept { return number(8); }
-  /// A length of four bytes and so many bytes.
+  /// Reads a length of four bytes and the text.
   [[nodiscard]] std::string text() {
     const auto b = take(u32());
     return {b.begin(), b.end()};

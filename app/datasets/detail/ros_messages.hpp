@@ -10,13 +10,14 @@
 #include "app/datasets/ros_camera.hpp"
 #include "core/types/time.hpp"
 
-/// The messages with a drive's images and cameras, of ROS 2 (CDR) and ROS 1. Lengths are checked
-/// against the bytes that are there before anything is reserved; pixels are not touched. Nothing:
-/// the bytes are no such message.
+/// Messages with a sequence's images and cameras, of ROS 2 (CDR) and ROS 1. Lengths are checked
+/// against the available bytes before allocation; pixels are not read. Readers return nothing for
+/// invalid messages.
 namespace vergence::app::detail {
 
 enum class PixelLayout : std::uint8_t {
-  grey,  // also of a planar YUV: its first plane
+  /// Includes the first plane of a planar YUV.
+  grey,
   grey16,
   bayer,
   bayer16,
@@ -24,42 +25,51 @@ enum class PixelLayout : std::uint8_t {
   bgr,
   rgba,
   bgra,
-  luma_first,  // YUV 4:2:2: of two bytes the first, or the second, is grey
+  /// YUV 4:2:2 with grey in the first or the second of two bytes.
+  luma_first,
   luma_second,
   encoded,
-  encoded_bayer,  // a mosaic in a PNG or JPEG
+  /// Mosaic in a PNG or JPEG.
+  encoded_bayer,
 };
 
 struct RosImage {
   Stamp stamp{};
   ImageSize size{};
   PixelLayout layout = PixelLayout::grey;
-  bool big_endian = false;   // of samples of 16 bits
-  std::uint32_t step = 0;    // bytes a row; 0: encoded
-  std::uint32_t offset = 0;  // of the data in the message
-  std::uint32_t bytes = 0;   // of the data
+  /// Applies to 16-bit samples.
+  bool big_endian = false;
+  /// Bytes per row; 0 if encoded.
+  std::uint32_t step = 0;
+  /// Offset of the data in the message.
+  std::uint32_t offset = 0;
+  /// Size of the data in bytes.
+  std::uint32_t bytes = 0;
 };
 
-inline constexpr std::size_t kRosImageHead =
-    4096;  // bytes in which an image's own fields have to end
+/// Maximum length in bytes of an image's fields before the data.
+inline constexpr std::size_t kRosImageHead = 4096;
 
-/// `head`: the first bytes of a message of `size` bytes. Also nothing: other encodings than
-/// those of docs/datasets.md. `pixels`: the encoding as the message names it, where that is not
-/// null.
+/// `head` has the first bytes of a message of `size` bytes. Returns nothing also for encodings not
+/// in docs/datasets.md. *pixels (may be null) receives the encoding's name.
 [[nodiscard]] std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head,
                                                      std::size_t size, MessageEncoding encoding,
                                                      std::string* pixels = nullptr);
-/// The head of the PNG or JPEG has to lie in `head`, too.
+/// `head` must also contain the header of the PNG or JPEG.
 [[nodiscard]] std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> head,
                                                                 std::size_t size,
                                                                 MessageEncoding encoding,
                                                                 std::string* pixels = nullptr);
 
 struct RosCameraInfo {
-  RosCamera camera;               // of raw images, as if these were of the whole sensor
-  RosCrop crop{};                 // which they are not
-  std::string fault{};            // why it is no calibration of these: a phrase; empty: it is one
-  std::string fault_rectified{};  // nor of rectified images
+  /// Camera of raw images, as if of the whole sensor.
+  RosCamera camera;
+  /// Region that the images actually show.
+  RosCrop crop{};
+  /// Phrase about why it is invalid for raw images; empty if valid.
+  std::string fault{};
+  /// The same for rectified images.
+  std::string fault_rectified{};
 };
 [[nodiscard]] std::optional<RosCameraInfo> read_ros_camera_info(
     std::span<const std::uint8_t> message, MessageEncoding encoding);

@@ -13,10 +13,9 @@
 
 namespace vergence::app::detail {
 
-/// Reads the values of a ROS message one after the other: CDR (XCDR1, either byte order), where
-/// they are aligned, or ROS 1, where they are not. Once something is not there, ok() is false and
-/// every further value 0. Lengths are checked against the bytes that are there before anything is
-/// reserved.
+/// Reads the values of a ROS message in sequence: CDR (XCDR1, either byte order), which is aligned,
+/// or ROS 1, which is not. Once a value is missing, ok() is false and further values are 0. Lengths
+/// are checked against the available bytes before allocation.
 class RosReader {
  public:
   RosReader(std::span<const std::uint8_t> bytes, MessageEncoding encoding) noexcept;
@@ -46,16 +45,17 @@ class RosReader {
     return values;
   }
   [[nodiscard]] std::string text();
-  [[nodiscard]] Stamp header();  // std_msgs/Header
+  /// Reads a std_msgs/Header.
+  [[nodiscard]] Stamp header();
   [[nodiscard]] bool ok() const noexcept { return ok_; }
-  [[nodiscard]] std::size_t position() const noexcept {
-    return at_;
-  }  // from the message's first byte
+  /// Position relative to the message's first byte.
+  [[nodiscard]] std::size_t position() const noexcept { return at_; }
 
  private:
   std::span<const std::uint8_t> bytes_;
   bool cdr_, little_ = true, ok_ = true;
-  std::size_t begin_ = 0;  // behind the encapsulation of CDR, from which alignment counts
+  // End of the CDR encapsulation, to which alignment refers.
+  std::size_t begin_ = 0;
   std::size_t at_ = 0;
 };
 

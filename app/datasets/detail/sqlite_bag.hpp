@@ -12,12 +12,12 @@ struct sqlite3_blob;
 
 namespace vergence::app::detail {
 
-/// A bag of ROS 2 in an SQLite file (.db3), opened for reading only. A message's bytes are at the
-/// number of its row times 2^32: what reads files by position reads it as one.
+/// ROS 2 bag in an SQLite file (.db3), opened read-only. A message's bytes have the offset row
+/// number · 2^32, so that code which reads files by offset can read it.
 class SqliteBag final : public ByteSource {
  public:
-  /// InputError: no such file, or SQLite cannot open it. A log of writes beside it (-wal) is read,
-  /// too.
+  /// Throws InputError if the file is missing or SQLite cannot open it. Also reads a write-ahead
+  /// log (-wal) next to it.
   explicit SqliteBag(const std::filesystem::path& file);
   /// Reads the bag from a file's bytes.
   explicit SqliteBag(std::vector<std::uint8_t> bytes);
@@ -28,7 +28,7 @@ class SqliteBag final : public ByteSource {
   [[nodiscard]] std::uint64_t size() const noexcept override;
   [[nodiscard]] bool read(std::uint64_t offset,
                           std::span<std::uint8_t> out) const noexcept override;
-  /// As scan_bag(). Nothing: it is no SQLite file, or has no tables of a bag.
+  /// Same as scan_bag(). Empty if it is no SQLite file, or has no tables of a bag.
   [[nodiscard]] std::optional<BagScan> scan(const BagVisitor& each) const;
 
  private:
@@ -40,9 +40,11 @@ class SqliteBag final : public ByteSource {
 
   std::vector<std::uint8_t> bytes_;
   std::unique_ptr<sqlite3, Close> database_;
-  mutable std::mutex mutex_;  // with what follows, and all uses of the database
+  // Guards the members below and all accesses to the database.
+  mutable std::mutex mutex_;
   mutable std::unique_ptr<sqlite3_blob, Close> blob_;
-  mutable std::uint64_t row_ = 0;  // of the blob
+  // Row of the blob.
+  mutable std::uint64_t row_ = 0;
 };
 
 }  // namespace vergence::app::detail

@@ -20,6 +20,7 @@ class SlotReturns {
   explicit SlotReturns(FrameQueue& queue) noexcept : queue_(queue) {}
 
   // Calls of the owner.
+
   /// Sets the maximum number of slots that are out. Precondition: stopped, no slot is held.
   void set_limit(std::size_t most) noexcept;
   /// Called before the queue begins: takes back the frames that were offered and not taken, and the
@@ -30,6 +31,7 @@ class SlotReturns {
   void release(FrameSlot slot) noexcept;
 
   // Calls of the transport.
+
   /// Returns false if refused; the slot then stays with the transport.
   [[nodiscard]] bool offer(const Frame& frame) noexcept;
   /// Takes the next released slot; returns false if there is none.

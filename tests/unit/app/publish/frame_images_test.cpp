@@ -1,4 +1,4 @@
-#include "app/publish/live_page.hpp"
+#include "app/publish/frame_images.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "app/datasets/image_file.hpp"
+#include "app/publish/live_page.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {

@@ -55,8 +55,8 @@ TEST(Page, acceptsEveryTruncatedSession) {
   const test::TemporaryFolder whole;
   writer_of(300).write(whole.path());
   std::vector<std::string> pages;
-  for (const char* gone : {"summary.json", "poses.csv", "trajectory.tum", "reference.tum",
-                           "calibrations.csv", "calibration.yaml", "events.jsonl"})
+  for (const char* gone : {"summary.json", "poses.csv", "reference.tum", "calibrations.csv",
+                           "calibration.yaml", "events.jsonl"})
     for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {  // of the file; negative: no file
       const test::TemporaryFolder folder;
       std::filesystem::copy(whole.path(), folder.path(), std::filesystem::copy_options::recursive);
@@ -69,8 +69,7 @@ TEST(Page, acceptsEveryTruncatedSession) {
       const std::string html = page_of(folder.path());
       EXPECT_TRUE(self_contained(html)) << gone << " " << kept;
       pages.push_back(html);
-      const bool may_be_gone = std::string(gone) == "trajectory.tum";
-      if (!may_be_gone && (kept < 0 || kept == 0.37)) {
+      if (kept < 0 || kept == 0.37) {
         EXPECT_TRUE(contains(html, "What is missing")) << gone << " " << kept;
       }
     }
