@@ -301,6 +301,7 @@ class Reader {
   }
 
   void find_order() {
+    out_.order_reported = columns_.order || options_.quaternion || columns_.layout != Layout::pose;
     out_.order = columns_.order.value_or(QuaternionOrder::xyzw);
     if (!columns_.order && columns_.layout == Layout::pose) {
       // EuRoC and those who write as it does (VINS): w first, commas, whole nanoseconds.
@@ -581,6 +582,17 @@ TrajectoryFile read_trajectory_file(const fs::path& path, const TrajectoryOption
            "has no trajectory.tum, no poses.txt (KITTI) and no "
            "mav0/state_groundtruth_estimate0/data.csv with cam0/sensor.yaml (EuRoC)");
   return read_file(truth->poses, options);
+}
+
+Trajectory in_other_order(Trajectory poses, QuaternionOrder read) {
+  for (StampedPose& pose : poses) {
+    const Eigen::Quaterniond q(pose.T_world_body.R);
+    const Eigen::Quaterniond other = read == QuaternionOrder::xyzw
+                                         ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w())
+                                         : Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
+    pose.T_world_body.R = other.normalized().toRotationMatrix();
+  }
+  return poses;
 }
 
 }  // namespace vergence::app

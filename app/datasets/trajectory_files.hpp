@@ -45,6 +45,8 @@ struct TrajectoryFile {
   bool numbered = false;
   /// False if the file has no times; rows are then 0.1 s apart, from 0.
   bool timed = true;
+  /// Headings, a matrix or the user define how rotations are written.
+  bool order_reported = false;
   QuaternionOrder order = QuaternionOrder::xyzw;  // as read
 };
 
@@ -76,5 +78,8 @@ struct TruthFiles {
 [[nodiscard]] std::optional<TruthFiles> find_truth(const std::filesystem::path& folder);
 
 [[nodiscard]] Trajectory read_truth(const TruthFiles& files);
+
+/// Rotations as if their quaternions had been written in the other order than they were read in.
+[[nodiscard]] Trajectory in_other_order(Trajectory poses, QuaternionOrder read);
 
 }  // namespace vergence::app

@@ -145,9 +145,14 @@ TEST(Trajectory, usesSuppliedUnitAndOrder) {
       mentions(refusal_of([&] { (void)read_trajectory_file(file, options); }), "--time-unit"));
   options.unit = TimeUnit::milliseconds;
   EXPECT_EQ(read_trajectory_file(file, options).poses[1].stamp.ns(), 100'000'000);
+  EXPECT_FALSE(read_trajectory_file(file, options).order_reported);
   options.quaternion = QuaternionOrder::wxyz;
   const Trajectory w_first = read_trajectory_file(file, options).poses;
   EXPECT_LT((w_first[0].T_world_body.R * Vec3(1, 0, 0) - Vec3(0, 1, 0)).norm(), 1e-8) << "about z";
+  options.quaternion = QuaternionOrder::xyzw;
+  const Trajectory other =
+      in_other_order(read_trajectory_file(file, options).poses, QuaternionOrder::xyzw);
+  EXPECT_LT(rotation_angle(other[0].T_world_body.R.transpose() * w_first[0].T_world_body.R), 1e-7);
 }
 
 TEST(Kitti, posesUseAdjacentTimesFile) {

@@ -1,0 +1,424 @@
+#include "app/commands/evaluation_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/datasets/text_file.hpp"
+#include "core/comparison/comparison.hpp"
+#include "core/comparison/geodesy.hpp"
+#include "core/math/angle.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kPercent = 100.0;
+
+Json statistics_json(const ErrorStatistics& s, double unit) {
+  return {{"rmse", s.rmse * unit},
+          {"mean", s.mean * unit},
+          {"median", s.median * unit},
+          {"max", s.max * unit}};
+}
+
+Json heading_json(const HeadingErrors& h) {
+  return {{"rms", h.rms * kDegreesPerRadian},
+          {"mean", h.mean * kDegreesPerRadian},
+          {"max_abs", h.max_abs * kDegreesPerRadian},
+          {"last", h.last * kDegreesPerRadian}};
+}
+
+Json vector_json(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+/// A length as people write it: 100, not 100.0.
+Json length_json(double length) {
+  constexpr double kExactIntegers = 1e15;
+  if (length == std::floor(length) && length < kExactIntegers)
+    return static_cast<std::int64_t>(length);
+  return length;
+}
+
+Json segments_json(const SegmentErrors& segments) {
+  Json lengths = Json::array(), rows = Json::object();
+  for (const LengthError& row : segments.per_length) {
+    lengths.push_back(length_json(row.length));
+    rows[fmt::format("{}", row.length)] = {{"n", row.count},
+                                           {"t_percent", row.translation * kPercent},
+                                           {"r_deg_per_m", row.rotation * kDegreesPerRadian}};
+  }
+  return {{"step", segments.step},
+          {"lengths", lengths},
+          {"per_length", rows},
+          {"n", segments.count},
+          {"t_percent", segments.translation * kPercent},
+          {"r_deg_per_m", segments.rotation * kDegreesPerRadian}};
+}
+
+std::string left_out(const TrajectoryEvaluation& e, const EvaluationOptions& options) {
+  const char* inside = options.association == Association::nearest
+                           ? "without a neighbour near enough"
+                           : "in holes of the reference";
+  return fmt::format("{} before the reference, {} after it, {} {}", e.before, e.after, e.gap,
+                     inside);
+}
+
+void statistics_row(std::string* out, const char* name, const ErrorStatistics& s, double unit,
+                    const char* symbol) {
+  fmt::format_to(std::back_inserter(*out), "  {:<34}{:>11.4f} {:>11.4f} {:>11.4f} {:>11.4f}  {}\n",
+                 name, s.rmse * unit, s.mean * unit, s.median * unit, s.max * unit, symbol);
+}
+
+void heading_row(std::string* out, const char* name, const HeadingErrors& h) {
+  fmt::format_to(std::back_inserter(*out), "  {:<34}{:>11.4f} {:>11.4f} {:>11.4f} {:>11.4f}  deg\n",
+                 name, h.rms * kDegreesPerRadian, h.mean * kDegreesPerRadian,
+                 h.max_abs * kDegreesPerRadian, h.last * kDegreesPerRadian);
+}
+
+void segment_rows(std::string* out, const SegmentErrors& segments) {
+  auto at = std::back_inserter(*out);
+  fmt::format_to(at, "\n  segments, from every {}. pose        number   translation    rotation\n",
+                 segments.step);
+  const auto row = [&](const std::string& name, std::size_t count, double translation,
+                       double rotation) {
+    if (count == 0)
+      fmt::format_to(at, "  {:<34}{:>8}   the path is too short\n", name, "none");
+    else
+      fmt::format_to(at, "  {:<34}{:>8} {:>10.4f} %  {:>10.6f} deg/m\n", name, count,
+                     translation * kPercent, rotation * kDegreesPerRadian);
+  };
+  for (const LengthError& length : segments.per_length)
+    row(fmt::format("{} m", length.length), length.count, length.translation, length.rotation);
+  row("all", segments.count, segments.translation, segments.rotation);
+}
+
+}  // namespace
+
+nlohmann::ordered_json evaluation_json(const TrajectoryEvaluation& e,
+                                       const EvaluationOptions& options) {
+  Json out;
+  out["matched"] = e.matched;
+  out["dropped"] = Json::object();
+  // For nearest neighbours only the match is defined, not on which side the others lie.
+  if (options.association == Association::interpolate)
+    out["dropped"] = {{"before", e.before}, {"after", e.after}, {"gap", e.gap}};
+  if (e.status != EvaluationStatus::ok) return out;
+
+  out["path_reference_m"] = e.path_reference;
+  out["path_estimate_m"] = e.path_estimate;
+  out["path_ratio_estimate_over_reference"] = e.path_ratio;
+  out["ate_se3_m"] = statistics_json(e.ate_se3, 1.0);
+  out["se3_rotation_vector_rad"] = vector_json(log_so3(e.se3.R_reference_estimate));
+  out["se3_translation_m"] = vector_json(e.se3.t_reference_estimate);
+  out["sim3_scale"] = e.sim3.scale;
+  out["ate_sim3_m"] = statistics_json(e.ate_sim3, 1.0);
+  out["ate_unaligned_m"] = statistics_json(e.ate_unaligned, 1.0);
+  out["heading_error_deg"] = heading_json(e.heading_se3);
+  out["heading_error_start_aligned_deg"] = heading_json(e.heading_start_aligned);
+  out["rotation_error_deg"] = statistics_json(e.rotation_se3, kDegreesPerRadian);
+  out["roll_about_path_unobservable"] = e.se3.roll_unobservable;
+  out["end_error_aligned_m"] = e.end_error_se3;
+  out["end_error_start_aligned_m"] = e.end_error_start_aligned;
+  out["end_error_start_aligned_percent"] = e.end_error_ratio * kPercent;
+  out["end_rotation_start_aligned_deg"] = e.end_rotation_start_aligned * kDegreesPerRadian;
+  out["segments"] = Json::array();
+  for (const SegmentErrors& segments : e.segments)
+    out["segments"].push_back(segments_json(segments));
+  return out;
+}
+
+std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptions& options) {
+  std::string out;
+  auto at = std::back_inserter(out);
+  fmt::format_to(at, "{} poses matched; left out: {}\n", e.matched, left_out(e, options));
+  if (e.status != EvaluationStatus::ok) return out;
+  fmt::format_to(at, "path: reference {:.3f} m, estimate {:.3f} m, ratio {:.6f}\n",
+                 e.path_reference, e.path_estimate, e.path_ratio);
+  fmt::format_to(
+      at, "scale: {:.6f} (Sim(3): reference = scale * R * estimate + t; reported, not applied)\n\n",
+      e.sim3.scale);
+
+  fmt::format_to(at, "  {:<34}{:>11} {:>11} {:>11} {:>11}\n", "position error", "rmse", "mean",
+                 "median", "max");
+  statistics_row(&out, "SE(3)-aligned", e.ate_se3, 1.0, "m");
+  statistics_row(&out, "Sim(3)-aligned", e.ate_sim3, 1.0, "m");
+  statistics_row(&out, "not aligned", e.ate_unaligned, 1.0, "m");
+  fmt::format_to(at, "\n  {:<34}{:>11} {:>11} {:>11} {:>11}\n", "heading error", "rms", "mean",
+                 "max", "last");
+  heading_row(&out, "start-aligned", e.heading_start_aligned);
+  heading_row(&out, "SE(3)-aligned", e.heading_se3);
+  fmt::format_to(at, "\n  {:<34}{:>11} {:>11} {:>11} {:>11}\n", "rotation error", "rmse", "mean",
+                 "median", "max");
+  statistics_row(&out, "SE(3)-aligned", e.rotation_se3, kDegreesPerRadian, "deg");
+  if (e.se3.roll_unobservable)
+    out +=
+        "  The path is nearly straight: positions do not hold the rotation about it. Use the "
+        "start-aligned angles.\n";
+
+  fmt::format_to(at, "\n  {:<34}{:>11.4f} m = {:.4f} % of the path, {:.4f} deg\n",
+                 "end error, start-aligned", e.end_error_start_aligned,
+                 e.end_error_ratio * kPercent, e.end_rotation_start_aligned * kDegreesPerRadian);
+  fmt::format_to(at, "  {:<34}{:>11.4f} m\n", "end error, SE(3)-aligned", e.end_error_se3);
+  for (const SegmentErrors& segments : e.segments) segment_rows(&out, segments);
+  return out;
+}
+
+std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& options,
+                       Duration interval) {
+  if (e.gap <= e.matched || options.association == Association::nearest) return "";
+  constexpr double kRoom = 1.1;  // above the interval, whose length varies
+  constexpr double kSteps = 20;  // of the number that is proposed, in a second
+  const double seconds = interval.to_seconds();
+  return fmt::format(
+      "{} poses lie in holes of the reference, whose poses are {:.3g} s apart (median), wider than "
+      "--max-gap {:g}; --max-gap {:g} bridges them",
+      e.gap, seconds, options.max_gap.to_seconds(), std::ceil(kSteps * kRoom * seconds) / kSteps);
+}
+
+std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOptions& options,
+                               Duration interval) {
+  const std::string holes = gap_remark(e, options, interval);
+  switch (e.status) {
+    case EvaluationStatus::no_match:
+      if (!holes.empty()) return holes;
+      return fmt::format(
+          "no pose of the estimate has a reference at its time ({}): are both stamped by the same "
+          "clock?",
+          left_out(e, options));
+    case EvaluationStatus::too_few:
+      return fmt::format("only {} poses matched, an alignment needs three ({}){}{}", e.matched,
+                         left_out(e, options), holes.empty() ? "" : "; ", holes);
+    case EvaluationStatus::no_motion:
+      return "one of the two trajectories stays in one place, there is nothing to align";
+    case EvaluationStatus::ok:
+      break;
+  }
+  assert(false);
+  return {};
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Nothing: no three finite numbers.
+std::optional<Vec3> read_vector(const Json& mount, const char* key) {
+  const auto found = mount.find(key);
+  if (found == mount.end() || !found->is_array() || found->size() != 3) return std::nullopt;
+  Vec3 v;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!(*found)[k].is_number()) return std::nullopt;
+    v[static_cast<int>(k)] = (*found)[k].get<double>();
+  }
+  return v.allFinite() ? std::optional(v) : std::nullopt;
+}
+
+/// The mount of a session's summary. Nothing: there is none, as of a drive without an INS or one
+/// that was cut off.
+std::optional<InsMount> mount_in(const std::filesystem::path& summary) {
+  constexpr std::size_t kLargest = std::size_t{1} << 26U;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(summary, ignored)) return std::nullopt;
+  const Json all = Json::parse(read_text(summary, kLargest), nullptr, false);
+  const Json mount = all.is_object() ? all.value("/enu/mount"_json_pointer, Json()) : Json();
+  if (!mount.is_object()) return std::nullopt;
+  const auto arm = read_vector(mount, "lever_arm_m"), turn = read_vector(mount, "boresight_deg");
+  if (!arm || !turn) return std::nullopt;
+  std::string source = summary.string();
+  if (const auto said = mount.find("source"); said != mount.end() && said->is_string())
+    source += ": " + said->get<std::string>();
+  return InsMount{mount_of(*arm, *turn * kRadiansPerDegree), source, false};
+}
+
+}  // namespace
+
+InsMount load_ins_mount(const std::filesystem::path& estimate,
+                        const std::filesystem::path& readings) {
+  std::error_code ignored;
+  for (const std::filesystem::path& path : {estimate, readings}) {
+    const bool folder = std::filesystem::is_directory(path, ignored);
+    if (auto mount = mount_in((folder ? path : path.parent_path()) / "summary.json")) return *mount;
+  }
+  return {mount_of(Vec3::Zero(), Vec3::Zero()), "the axes only", true};
+}
+
+Json ins_mount_json(const InsMount& mount) {
+  const Vec3& arm = mount.T_ins_left.t;
+  const Vec3 turn = boresight_of(mount.T_ins_left.R) * kDegreesPerRadian;
+  return {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
+          {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
+          {"source", mount.source}};
+}
+
+std::string ins_mount_text(const InsMount& mount) {
+  if (mount.axes_only)
+    return "the data set has no INS-to-camera extrinsics: the camera is assumed to look along the "
+           "INS's x, at "
+           "its place; --estimate-ins-extrinsics finds more\n";
+  return fmt::format("the INS is brought to the left camera by {}\n", mount.source);
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json value_json(const MountValue& v, double unit) {
+  return {{"value", v.observable ? Json(v.value * unit) : Json(nullptr)},
+          {"sigma", v.sigma * unit}};
+}
+
+std::string row(const char* what, const MountValue& v, double unit, const char* name) {
+  if (!v.observable)
+    return fmt::format("  {:<34}not_observable (sigma {:.3g} {})\n", what, v.sigma * unit, name);
+  return fmt::format("  {:<34}{:>11.4f} ± {:.4f} {}\n", what, v.value * unit, v.sigma * unit, name);
+}
+
+/// Value for `ins.boresight_deg`: roll, pitch, yaw. Nullopt: it is no INS's mount, or a part of
+/// it does not show.
+std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
+  const auto& r = found.mount.rotation;
+  if (!found.of_ins ||
+      !std::all_of(r.begin(), r.end(), [](const MountValue& v) { return v.observable; }))
+    return std::nullopt;
+  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegreesPerRadian;
+  return std::array{turn.x(), turn.y(), turn.z()};
+}
+
+}  // namespace
+
+const char* mount_problem(MountStatus status) {
+  switch (status) {
+    case MountStatus::too_few:
+      return "fewer than 20 moments in common; give a longer drive, or check that both have the "
+             "same clock";
+    case MountStatus::no_motion:
+      return "nothing moved: a mount shows only while driving";
+    case MountStatus::not_converged:
+      return "no fit: the two trajectories are not of the same drive, their clocks are more than "
+             "0.3 s apart, or their attitudes drift apart by more than 15 degrees";
+    case MountStatus::ok:
+      break;
+  }
+  return "";
+}
+
+std::vector<MountReference> ins_moments(std::span<const InsRecord> readings) {
+  const auto placed = [](const InsRecord& r) {
+    return r.sample.attitude_valid &&
+           (r.sample.fix == FixStatus::fix_2d || r.sample.fix == FixStatus::fix_3d);
+  };
+  std::vector<MountReference> moments;
+  const auto first = std::find_if(readings.begin(), readings.end(), placed);
+  if (first == readings.end()) return moments;
+  const LocalTangentPlane plane(first->sample.position);
+  moments.reserve(readings.size());
+  for (const InsRecord& r : readings) {
+    if (!placed(r)) continue;
+    const InsSample& s = r.sample;
+    const auto& [x, y, z, w] = s.q_enu_ins;
+    const Mat3 R_enu_local = plane.rotation_from(s.position);
+    const Transform T_enu_ins{
+        R_enu_local * Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix(),
+        plane.to_enu(s.position)};
+    const auto& [east, north, up] = s.velocity_enu;
+    moments.push_back({s.stamp, T_enu_ins, R_enu_local * Vec3(east, north, up), s.velocity_valid});
+  }
+  return moments;
+}
+
+FoundMount find_ins_mount(const Trajectory& estimate, std::span<const MountReference> moments) {
+  FoundMount found;
+  found.of_ins = true;
+  found.nominal = mount_of(Vec3::Zero(), Vec3::Zero()).R;
+  found.status = estimate_ins_extrinsics(estimate, moments, found.nominal, {}, &found.mount);
+  return found;
+}
+
+Trajectory poses_of(std::span<const MountReference> moments) {
+  Trajectory poses;
+  poses.reserve(moments.size());
+  for (const MountReference& m : moments) poses.push_back({m.stamp, m.T_enu_ref});
+  return poses;
+}
+
+FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference) {
+  std::vector<MountReference> readings;
+  readings.reserve(reference.size());
+  for (const StampedPose& pose : reference)
+    readings.push_back({pose.stamp, pose.T_world_body, Vec3::Zero(), false});
+  const Mat3 R_flu_camera = mount_of(Vec3::Zero(), Vec3::Zero()).R;
+  FoundMount best;
+  double least = 1e9;
+  for (const Mat3& nominal :
+       {Mat3(Mat3::Identity()), R_flu_camera, Mat3(R_flu_camera.transpose())}) {
+    FoundMount found;
+    found.nominal = nominal;
+    found.status = estimate_ins_extrinsics(estimate, readings, nominal, {}, &found.mount);
+    if (found.status != MountStatus::ok) {
+      if (best.status != MountStatus::ok) best.status = found.status;
+      continue;
+    }
+    const auto& r = found.mount.rotation;
+    const double turn = Vec3(r[0].value, r[1].value, r[2].value).norm();
+    if (turn >= least) continue;
+    least = turn;
+    best = found;
+  }
+  return best;
+}
+
+Trajectory brought_over(const Trajectory& reference, const Transform& T_ref_est) {
+  Trajectory out = reference;
+  for (StampedPose& pose : out) pose.T_world_body = pose.T_world_body * T_ref_est;
+  return out;
+}
+
+Json mount_json(const FoundMount& found) {
+  Json out;
+  out["status"] = found.status == MountStatus::ok ? "ok" : mount_problem(found.status);
+  if (found.status != MountStatus::ok) return out;
+  const Mount& m = found.mount;
+  constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    out["rotation_deg"][kAxes[k]] = value_json(m.rotation[k], kDegreesPerRadian);
+    out["lever_arm_m"][kAxes[k]] = value_json(m.lever_arm[k], 1);
+  }
+  out["clock_offset_s"] = value_json(m.clock_offset, 1);
+  if (const auto boresight = boresight_deg(found)) out["boresight_deg"] = *boresight;
+  out["moments"] = m.moments;
+  out["residual_rotation_deg"] = m.residual_rotation * kDegreesPerRadian;
+  out["residual_position_m"] = m.residual_position;
+  return out;
+}
+
+std::string mount_text(const FoundMount& found) {
+  const Mount& m = found.mount;
+  std::string out = fmt::format(
+      "mount of the {}, from {} moments (residuals {:.3f} deg, {:.3f} m)\n",
+      found.of_ins ? "left camera in the INS's body" : "estimate's body in the reference's",
+      m.moments, m.residual_rotation * kDegreesPerRadian, m.residual_position);
+  out += row("turn about the reference's x", m.rotation[0], kDegreesPerRadian, "deg");
+  out += row("turn about its y", m.rotation[1], kDegreesPerRadian, "deg");
+  out += row("turn about its z", m.rotation[2], kDegreesPerRadian, "deg");
+  out += row("lever arm along x", m.lever_arm[0], 1, "m");
+  out += row("lever arm along y", m.lever_arm[1], 1, "m");
+  out += row("lever arm along z", m.lever_arm[2], 1, "m");
+  out += row("reference's stamps are late by", m.clock_offset, 1e3, "ms (reported, not applied)");
+  if (const auto b = boresight_deg(found))
+    out +=
+        fmt::format("  as the configuration has it: ins.boresight_deg: [{:.2f}, {:.2f}, {:.2f}]\n",
+                    (*b)[0], (*b)[1], (*b)[2]);
+  return out + "\n";
+}
+
+}  // namespace vergence::app
