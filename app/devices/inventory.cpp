@@ -7,6 +7,7 @@
 #include <pwd.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <sys/timex.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <exception>
 #include <fstream>
 #include <future>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <thread>
@@ -101,6 +103,13 @@ std::optional<DiskRoom> disk_room(const fs::path& folder) {
   return room;
 }
 
+std::optional<bool> kernel_clock_synchronised() {
+  timex t{};
+  const int state = ::adjtimex(&t);
+  if (state < 0) return std::nullopt;
+  return state != TIME_ERROR && (t.status & STA_UNSYNC) == 0;
+}
+
 }  // namespace
 
 Machine Machine::here() {
@@ -111,6 +120,7 @@ Machine Machine::here() {
   m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };
   m.group_of = group_of_node;
   m.room_at = disk_room;
+  m.clock_synchronised = kernel_clock_synchronised();
   return m;
 }
 
@@ -177,10 +187,26 @@ bool Machine::has_capability(unsigned bit) const {
   return (whole_number<std::uint64_t>(hex, 16).value_or(0) >> bit & 1U) != 0;
 }
 
+std::optional<std::int64_t> Machine::limit(const std::string& name) const {
+  const std::optional<std::string> limits = text("/proc/self/limits");
+  if (!limits) return std::nullopt;
+  std::istringstream lines(*limits);
+  for (std::string row; std::getline(lines, row);) {
+    if (!row.starts_with(name)) continue;
+    std::istringstream words(row.substr(name.size()));
+    std::string soft;
+    words >> soft;
+    if (soft == "unlimited") return -1;
+    return whole_number<std::int64_t>(soft, 10);
+  }
+  return std::nullopt;
+}
+
 bool Machine::in_group(const std::string& group) const {
   return std::find(groups.begin(), groups.end(), group) != groups.end();
 }
 
+namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;

@@ -51,6 +51,8 @@ struct Machine {
   std::function<std::string(const std::string& node)> group_of;
   /// Free space for this user; of a directory that does not exist yet, that of its future parent.
   std::function<std::optional<DiskRoom>(const std::filesystem::path& folder)> room_at;
+  /// State that the kernel reports.
+  std::optional<bool> clock_synchronised;
 
   /// Machine of this process.
   [[nodiscard]] static Machine here();
@@ -70,6 +72,8 @@ struct Machine {
 
   /// Capability `bit` of this process (linux/capability.h).
   [[nodiscard]] bool has_capability(unsigned bit) const;
+  /// Soft limit of this process by its name in /proc/self/limits; -1: unlimited.
+  [[nodiscard]] std::optional<std::int64_t> limit(const std::string& name) const;
   [[nodiscard]] bool in_group(const std::string& group) const;
 
  private:

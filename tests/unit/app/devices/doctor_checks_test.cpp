@@ -15,6 +15,10 @@ using test::FakeMachine;
 using enum FindingState;
 
 constexpr std::uint32_t kHost = 0xC0A80A01U, kMask24 = 0xFFFFFF00U;  // 192.168.10.1/24
+const std::string kLimits =
+    "Max realtime priority     0                    0\n"
+    "Max locked memory         8388608              8388608   bytes\n";
+
 /// A GigE camera of 1280 x 960 at 30 Hz on eth1.
 void put_gige(FakeMachine& f) {
   f.camera("gige", "15021234", "192.168.10.11");
@@ -153,6 +157,29 @@ const std::vector<Case>& cases() {
        "serial_permission",
        {}},
       // System
+      {"no priority is asked for",
+       [](auto& f) { f.file("/proc/self/limits", kLimits); },
+       "realtime",
+       {}},
+      {"priority is refused",
+       [](auto& f) {
+         f.file("/proc/self/limits", kLimits), f.given = true, f.drive.realtime.priority = 50;
+       },
+       "realtime",
+       {problem},
+       "driver - rtprio 50"},
+      {"little memory may be locked",
+       [](auto& f) {
+         f.file("/proc/self/limits", kLimits), f.given = true, f.drive.realtime.lock_memory = 1;
+       },
+       "memory_lock",
+       {advice}},
+      {"clock in step", [](auto&) {}, "clock", {ok}},
+      {"clock not in step",
+       [](auto& f) { f.machine.clock_synchronised = false; },
+       "clock",
+       {advice},
+       "systemd-timesyncd"},
       {"room", [](auto&) {}, "disk", {ok}},
       {"1 GiB is left", [](auto& f) { f.room->bytes = std::uint64_t{1} << 30; }, "disk", {advice}},
       {"disk is full", [](auto& f) { f.room->bytes = 1000; }, "disk", {problem}},

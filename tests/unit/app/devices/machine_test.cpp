@@ -32,12 +32,21 @@ TEST(Machine, numbersAreReadAndOtherTextIsNone) {
     EXPECT_FALSE(f.machine.number(name)) << name;
 }
 
-TEST(Machine, capabilitiesAreRead) {
+TEST(Machine, limitsAndCapabilitiesAreRead) {
   const FakeMachine f;
   f.file("/proc/self/status", "Name:\tx\nCapPrm:\t0000000000000000\nCapEff:\t0000000000003000\n");
+  f.file("/proc/self/limits",
+         "Limit                     Soft Limit           Hard Limit           Units\n"
+         "Max locked memory         65536                unlimited            bytes\n"
+         "Max realtime priority     unlimited            0\n"
+         "Max nonsense              many                 0\n");
   EXPECT_TRUE(f.machine.has_capability(13));
   EXPECT_FALSE(f.machine.has_capability(14));
   EXPECT_FALSE(f.machine.has_capability(64));
+  EXPECT_EQ(f.machine.limit("Max locked memory"), 65536);
+  EXPECT_EQ(f.machine.limit("Max realtime priority"), -1);
+  EXPECT_FALSE(f.machine.limit("Max nonsense"));
+  EXPECT_FALSE(f.machine.limit("Max absent"));
 }
 
 TEST(Machine, roomBehindClosedFolderIsNotWritable) {
