@@ -149,7 +149,18 @@ std::string suggestion(const std::string& name) {
     if (find_key(entry.name.substr(0, dot)) != nullptr)
       throw InputError(entry.origin + ": " + entry.name.substr(0, dot) +
                        " takes one value, not a group or a list");
-  throw InputError(entry.origin + ": unknown key \"" + shown + "\"" + suggestion(entry.name));
+  // The items of a list have the same keys: the table has item 0's.
+  std::string in_table = entry.name;
+  if (in_table.starts_with("cameras.") && in_table.size() > 8) in_table[8] = '0';
+  const std::string why = new_name(Renamed::Kind::key, in_table);
+  throw InputError(entry.origin + ": unknown key \"" + shown + "\"" +
+                   (why.empty() ? suggestion(entry.name) : why));
+}
+
+/// Suggests a keyword instead of one that the key does not have; empty if nothing is close.
+std::string value_suggestion(const std::string& value, const Key& key) {
+  const std::string why = new_name(Renamed::Kind::value, key.name + " " + value);
+  return why.empty() ? did_you_mean(value, key.words) : why;
 }
 
 /// The rest of a message "it must be …".
@@ -215,7 +226,7 @@ void apply(const Entry& entry, Configuration* configuration) {
         if (!unset && std::find(key->words.begin(), key->words.end(), value) == key->words.end())
           throw InputError(fmt::format("{}: {} is \"{}\"{}; it is one of {}", entry.origin,
                                        key->name, entry.value.substr(0, 60),
-                                       did_you_mean(entry.value, key->words), range_text(*key)));
+                                       value_suggestion(entry.value, *key), range_text(*key)));
         key->set(*configuration, value);
         break;
       }

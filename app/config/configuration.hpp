@@ -183,10 +183,19 @@ struct PublishSettings {
   std::string token_file{};
 };
 
+/// `sessions:` the folders that drives leave side by side.
+struct SessionsSettings {
+  /// Quota of the parent directory; 0: none.
+  int quota_mb = 0;
+};
+
 /// `realtime:` scheduling of the drive's threads (docs/deployment.md).
 struct RealtimeSettings {
   /// SCHED_FIFO priority of the most urgent threads; 0: none.
   int priority = 0;
+  /// Processors of all threads but the solver's, such as `0-1,3`; empty: any.
+  std::string affinity{};
+  std::string solver_affinity{};
   /// 1: call mlockall().
   int lock_memory = 0;
   /// Time budget per frame of a live drive; 0: its frame interval.
@@ -209,6 +218,7 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
+  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   /// `KIND@SECONDS NAME=NUMBER …`; empty: none.
   std::array<std::string, kMaxFaults> faults{};

@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "app/runtime/realtime.hpp"
+
 namespace vergence::app {
 
 namespace groups {
@@ -220,6 +222,17 @@ Group publish() {
       .done();
 }
 
+Group sessions() {
+  using S = SessionsSettings;
+  return Rows<S>(
+             "sessions", "Session directories next to the one of `--out`.",
+             [](auto& c) -> auto& { return c.sessions; })
+      .integer(
+          "quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
+          "Maximum total size: before a run the oldest sessions beyond it are removed. 0: never.")
+      .done();
+}
+
 Group realtime() {
   using R = RealtimeSettings;
   return Rows<R>(
@@ -230,6 +243,10 @@ Group realtime() {
       .integer("priority", &R::priority, 0, 90, "",
                "SCHED_FIFO priority of the threads of cameras, trigger and synchroniser; the "
                "estimator has one less, the INS two, files three, the solver none. 0: off.")
+      .text("affinity", &R::affinity, 64,
+            "Processors of these threads, in the syntax of taskset: `0-1,3`. Empty: any.")
+      .text("solver_affinity", &R::solver_affinity, 64,
+            "Processors of the calibration solver. Empty: any.")
       .choice("lock_memory", &R::lock_memory, {"off", "on"},
               "`on`: lock memory before the first frame (mlockall), so that it is never paged out.")
       .number("frame_budget_ms", &R::frame_budget_ms, 0, 10000, "ms",
@@ -742,7 +759,7 @@ const std::vector<Group>& schema() {
       groups::sync(),     groups::odometry(),   groups::calibration_options(),
       groups::monitor(),  groups::comparison(), groups::kitti_raw(),
       groups::mock(),     groups::record(),     groups::publish(),
-      groups::realtime(), groups::faults()};
+      groups::sessions(), groups::realtime(),   groups::faults()};
   return all;
 }
 
@@ -787,6 +804,13 @@ std::string find_contradiction(const Configuration& c) {
     return fmt::format(
         "calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({})",
         c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
+  for (const auto& [key, list] :
+       {std::pair<const char*, const std::string&>{"affinity", c.realtime.affinity},
+        {"solver_affinity", c.realtime.solver_affinity}})
+    if (!list.empty() && !parse_cpu_list(list))
+      return fmt::format(
+          "realtime.{} ({}) is no list of processors; write numbers and ranges, as 0-1,3", key,
+          list);
   return {};
 }
 

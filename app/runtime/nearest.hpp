@@ -44,4 +44,16 @@ namespace vergence::app {
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        const std::vector<std::string>& known);
 
+/// A name of an earlier version that a user may still write.
+struct Renamed {
+  enum class Kind { key, value, option } kind;
+  std::string_view name;  // record.roll_mb, sync.mode bus, run --page
+  std::string_view now;   // the new name
+};
+
+[[nodiscard]] std::span<const Renamed> renamed();
+
+/// `; it is now …` for an error message about an unknown name; empty where it was not renamed.
+[[nodiscard]] std::string new_name(Renamed::Kind kind, std::string_view name);
+
 }  // namespace vergence::app

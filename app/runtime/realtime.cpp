@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -77,6 +78,10 @@ int RealtimeSystem::set_fifo(pid_t thread, int priority) {
                                                                                          : errno;
 }
 
+int RealtimeSystem::set_affinity(pid_t thread, const cpu_set_t& cpus) {
+  return ::sched_setaffinity(thread, sizeof(cpus), &cpus) == 0 ? 0 : errno;
+}
+
 int RealtimeSystem::lock_memory(Locked* locked) {
   *locked = Locked::present;
   if (::mlockall(MCL_CURRENT) != 0) return errno;
@@ -87,6 +92,7 @@ int RealtimeSystem::lock_memory(Locked* locked) {
 }
 
 std::vector<std::string> RealtimeThreads::lock_memory() {
+  if (!request_.lock_memory) return {};
   RealtimeSystem::Locked locked = RealtimeSystem::Locked::everything;
   if (const int error = system_.lock_memory(&locked); error != 0)
     return {
@@ -104,7 +110,7 @@ std::vector<std::string> RealtimeThreads::lock_memory() {
 
 std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>& threads) {
   std::vector<std::string> messages;
-  if (priority_ <= 0) return messages;
+  if (request_.priority <= 0 && !request_.affinity && !request_.solver_affinity) return messages;
   // One that has ended is forgotten: capture threads come and go for months, and a number is given
   // again.
   std::erase_if(done_, [&](const auto& done) {
@@ -117,17 +123,70 @@ std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>
     const auto [at, is_new] = done_.try_emplace(thread.id, role);
     if (!is_new && at->second == role) continue;
     at->second = role;  // the number of a thread that has ended is given again
-    const int priority = role_priority(role, priority_);
-    if (priority == 0) continue;
-    const int error = system_.set_fifo(thread.id, priority);
-    if (error == 0 || error == ESRCH || std::exchange(refused_, true)) continue;
-    messages.push_back(fmt::format(
-        "realtime.priority: {} does not get priority {} ({}), the run continues without it: allow "
-        "it with `sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v vergence)`, in a service "
-        "with LimitRTPRIO={}",
-        thread.name, priority, reason(error), priority_));
+    apply(thread, &messages);
   }
   return messages;
+}
+
+void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string>* messages) {
+  const ThreadRole role = thread_role(thread.name);
+  const bool solver = role == ThreadRole::solver;
+  if (const auto& cpus = solver ? request_.solver_affinity : request_.affinity; cpus)
+    set_affinity(thread.id, *cpus, solver, messages);
+  const int priority = role_priority(role, request_.priority);
+  if (priority == 0) return;
+  const int error = system_.set_fifo(thread.id, priority);
+  if (error == 0 || error == ESRCH || std::exchange(priority_refused_, true)) return;
+  messages->push_back(fmt::format(
+      "realtime.priority: {} does not get priority {} ({}), the run continues without it: allow it "
+      "with "
+      "`sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v vergence)`, in a service with "
+      "LimitRTPRIO={}",
+      thread.name, priority, reason(error), request_.priority));
+}
+
+void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
+                                   std::vector<std::string>* messages) {
+  const int error = system_.set_affinity(thread, cpus);
+  bool& refused = solver ? solver_affinity_refused_ : affinity_refused_;
+  if (error == 0 || error == ESRCH || std::exchange(refused, true)) return;
+  messages->push_back(
+      fmt::format("realtime.{}: none of these processors is available ({}), the run continues "
+                  "on all of them: `taskset -pc $$` lists those that there are",
+                  solver ? "solver_affinity" : "affinity", reason(error)));
+}
+
+namespace {
+
+/// Takes a number from the front of the text; false: there is none, or no such processor.
+bool parse_number(std::string_view* text, int* number) noexcept {
+  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), *number);
+  if (error != std::errc() || *number < 0 || *number >= CPU_SETSIZE) return false;
+  text->remove_prefix(static_cast<std::size_t>(end - text->data()));
+  return true;
+}
+
+bool skip_character(std::string_view* text, char c) noexcept {
+  if (!text->starts_with(c)) return false;
+  text->remove_prefix(1);
+  return true;
+}
+
+}  // namespace
+
+std::optional<cpu_set_t> parse_cpu_list(std::string_view text) noexcept {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  do {
+    int first = 0;
+    if (!parse_number(&text, &first)) return std::nullopt;
+    int last = first;
+    if (skip_character(&text, '-') && (!parse_number(&text, &last) || last < first))
+      return std::nullopt;
+    for (int cpu = first; cpu <= last; ++cpu) CPU_SET(static_cast<unsigned>(cpu), &set);
+  } while (skip_character(&text, ','));
+  if (!text.empty()) return std::nullopt;
+  return set;
 }
 
 void process_threads(std::vector<ProcessThread>* threads) {

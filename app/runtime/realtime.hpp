@@ -1,12 +1,18 @@
 #pragma once
+#include <sched.h>
 #include <sys/types.h>
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace vergence::app {
+
+/// Processors as taskset(1) has them, `0-1,3`. Nothing: another text, an empty one, or a number
+/// beyond CPU_SETSIZE.
+[[nodiscard]] std::optional<cpu_set_t> parse_cpu_list(std::string_view text) noexcept;
 
 /// A thread of this program, as the kernel lists it.
 struct ProcessThread {
@@ -43,6 +49,14 @@ enum class ThreadRole : std::uint8_t {
 /// SCHED_FIFO priority of a role if the most urgent one has `top`; 0 means SCHED_OTHER.
 [[nodiscard]] int role_priority(ThreadRole role, int top) noexcept;
 
+/// `realtime:` of the configuration.
+struct RealtimeRequest {
+  int priority = 0;                     // of ThreadRole::capture; 0: no thread asks for one
+  std::optional<cpu_set_t> affinity{};  // of all roles but `other` and the solver's
+  std::optional<cpu_set_t> solver_affinity{};
+  bool lock_memory = false;
+};
+
 /// The system calls below, for tests to replace. Each returns 0 or errno.
 class RealtimeSystem {
  public:
@@ -51,6 +65,7 @@ class RealtimeSystem {
   virtual ~RealtimeSystem() = default;
   /// Sets SCHED_FIFO for that thread; the threads it starts are SCHED_OTHER again.
   [[nodiscard]] virtual int set_fifo(pid_t thread, int priority);
+  [[nodiscard]] virtual int set_affinity(pid_t thread, const cpu_set_t& cpus);
   /// Locks what is mapped now, all of it resident, and where no limit stands in the way what is
   /// mapped later, as it is first used.
   [[nodiscard]] virtual int lock_memory(Locked* locked);
@@ -62,20 +77,23 @@ class RealtimeSystem {
 /// A refusal by the system gives a message with the fix, once per key; the run continues.
 class RealtimeThreads {
  public:
-  /// `priority`: of ThreadRole::capture; 0: no thread gets one.
-  RealtimeThreads(int priority, RealtimeSystem& system) noexcept
-      : priority_(priority), system_(system) {}
+  RealtimeThreads(const RealtimeRequest& request, RealtimeSystem& system) noexcept
+      : request_(request), system_(system) {}
 
-  /// Locks memory: call it when everything is set up, before the first frame.
+  /// Locks memory, if asked for: when everything is set up, before the first frame.
   [[nodiscard]] std::vector<std::string> lock_memory();
-  /// Sets the priority of the threads that were not there at the last call.
+  /// Priority and processors of the threads that were not there at the last call.
   [[nodiscard]] std::vector<std::string> apply(const std::vector<ProcessThread>& threads);
 
  private:
-  const int priority_;
+  void apply(const ProcessThread& thread, std::vector<std::string>* messages);
+  void set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
+                    std::vector<std::string>* messages);
+
+  RealtimeRequest request_;
   RealtimeSystem& system_;
   std::map<pid_t, ThreadRole> done_{};
-  bool refused_ = false;
+  bool priority_refused_ = false, affinity_refused_ = false, solver_affinity_refused_ = false;
 };
 
 }  // namespace vergence::app

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <pthread.h>
-#include <sched.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -23,15 +22,19 @@ class FakeSystem final : public RealtimeSystem {
     if (fifo_error == 0) priorities[thread] = priority;
     return fifo_error;
   }
+  int set_affinity(pid_t thread, const cpu_set_t& cpus) override {
+    if (affinity_error == 0) processors[thread] = CPU_COUNT(&cpus);
+    return affinity_error;
+  }
   int lock_memory(Locked* locked) override {
     ++locks;
     *locked = covers;
     return lock_error;
   }
 
-  int fifo_error = 0, lock_error = 0, calls = 0, locks = 0;
+  int fifo_error = 0, affinity_error = 0, lock_error = 0, calls = 0, locks = 0;
   Locked covers = Locked::everything;
-  std::map<pid_t, int> priorities;
+  std::map<pid_t, int> priorities, processors;
 };
 
 const std::vector<ProcessThread> kDrive{
@@ -44,7 +47,9 @@ bool mentions(const std::string& text, const std::string& part) {
 
 TEST(Realtime, urgentRolesHaveHigherPriority) {
   FakeSystem system;
-  RealtimeThreads threads(40, system);
+  RealtimeRequest request;
+  request.priority = 40;
+  RealtimeThreads threads(request, system);
   EXPECT_TRUE(threads.apply(kDrive).empty());
   const std::map<pid_t, int> expected{{2, 40}, {3, 39}, {4, 38}, {5, 37}};
   EXPECT_EQ(system.priorities, expected) << "solver, mock, caller and libraries stay as they are";
@@ -52,7 +57,9 @@ TEST(Realtime, urgentRolesHaveHigherPriority) {
 
 TEST(Realtime, eachThreadIsSetOnce) {
   FakeSystem system;
-  RealtimeThreads threads(40, system);
+  RealtimeRequest request;
+  request.priority = 40;
+  RealtimeThreads threads(request, system);
   (void)threads.apply(kDrive);
   EXPECT_EQ(system.calls, 4);
   (void)threads.apply(kDrive);
@@ -67,15 +74,21 @@ TEST(Realtime, eachThreadIsSetOnce) {
 TEST(Realtime, refusalIsOneMessageWithTheFix) {
   FakeSystem system;
   system.fifo_error = EPERM;
+  system.affinity_error = EINVAL;
   system.lock_error = ENOMEM;
-  RealtimeThreads threads(40, system);
+  RealtimeRequest request;
+  request.priority = 40;
+  request.lock_memory = true;
+  request.affinity = parse_cpu_list("900");
+  RealtimeThreads threads(request, system);
   const auto memory = threads.lock_memory();
   ASSERT_EQ(memory.size(), 1U);
   EXPECT_TRUE(mentions(memory[0], "LimitMEMLOCK") && mentions(memory[0], "ulimit -l")) << memory[0];
   const auto messages = threads.apply(kDrive);
-  ASSERT_EQ(messages.size(), 1U) << "one message, however many threads there are";
-  EXPECT_TRUE(mentions(messages[0], "setcap") && mentions(messages[0], "LimitRTPRIO=40"))
-      << messages[0];
+  ASSERT_EQ(messages.size(), 2U) << "one for each key, however many threads there are";
+  EXPECT_TRUE(mentions(messages[0], "realtime.affinity")) << messages[0];
+  EXPECT_TRUE(mentions(messages[1], "setcap") && mentions(messages[1], "LimitRTPRIO=40"))
+      << messages[1];
   EXPECT_TRUE(threads.apply({{20, "vergence-v4l2"}}).empty());
 }
 
@@ -90,20 +103,45 @@ TEST(Realtime, kernelSchedulesAsRequested) {
     stop.wait(false);
   });
   id.wait(0);
+  cpu_set_t here;
+  CPU_ZERO(&here);
+  ASSERT_EQ(::sched_getaffinity(0, sizeof(here), &here), 0);
+  unsigned first = 0;
+  while (!CPU_ISSET(first, &here)) ++first;
+  RealtimeRequest request;
+  request.priority = 10;
+  request.affinity = parse_cpu_list(std::to_string(first));
   RealtimeSystem system;
-  RealtimeThreads threads(10, system);
+  RealtimeThreads threads(request, system);
   std::vector<ProcessThread> all;
   process_threads(&all);
   const auto messages = threads.apply(all);
   sched_param parameter{};
   const int policy = ::sched_getscheduler(id);
   EXPECT_EQ(::sched_getparam(id, &parameter), 0);
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  EXPECT_EQ(::sched_getaffinity(id, sizeof(set), &set), 0);
   stop = true;
   stop.notify_one();
   worker.join();
+  EXPECT_EQ(CPU_COUNT(&set), 1);
+  EXPECT_TRUE(CPU_ISSET(first, &set));
   if (!messages.empty()) GTEST_SKIP() << "no real-time priority is allowed here: " << messages[0];
   EXPECT_EQ(policy, SCHED_FIFO | SCHED_RESET_ON_FORK);
   EXPECT_EQ(parameter.sched_priority, 9);
+}
+
+TEST(CpuList, readsTasksetLists) {
+  const auto count = [](const char* text) {
+    const auto set = parse_cpu_list(text);
+    return set ? CPU_COUNT(&*set) : -1;
+  };
+  EXPECT_EQ(count("0"), 1);
+  EXPECT_EQ(count("0-1,3"), 3);
+  EXPECT_EQ(count("2,2"), 1);
+  for (const char* bad : {"", ",", "1,", "3-1", "-1", "1-", "a", "1 2", "1024", "99999999999"})
+    EXPECT_EQ(count(bad), -1) << bad;
 }
 
 }  // namespace
