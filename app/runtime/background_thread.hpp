@@ -1,7 +1,6 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <thread>
 
@@ -62,12 +61,6 @@ class ThreadRunner final : public PairRunner {
  private:
   BackgroundThread thread_;
 };
-
-/// One worker beside the estimator with two threads or more.
-[[nodiscard]] inline std::unique_ptr<PairRunner> make_runner(int threads) {
-  if (threads >= 2) return std::make_unique<ThreadRunner>();
-  return std::make_unique<SequentialRunner>();
-}
 
 /// The calibration solver's runner, with a note of the frames at which it was found idle: the one
 /// thing by which time decides what the estimator does. With that note it answers in a replay as it

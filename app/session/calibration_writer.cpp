@@ -85,8 +85,12 @@ void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found)
     message += (message.empty() ? "" : "; ") + fault_;
   }
   if (message.empty()) return;
-  const char* kind = failed ? "calibration_save_failed" : "calibration_saved";
-  (void)outcomes_.push({EventRecord::make(stamp, kind, "{}", message), failed});
+  Outcome outcome;
+  outcome.failed = failed;
+  outcome.event.stamp = stamp;
+  outcome.event.kind = failed ? "calibration_save_failed" : "calibration_saved";
+  outcome.event.set_message(message);
+  (void)outcomes_.push(outcome);
 }
 
 void CalibrationWriter::write_session_file(const RigCalibration& rig) {

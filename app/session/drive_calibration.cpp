@@ -13,6 +13,7 @@
 #include "app/datasets/frame_decoder.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
+#include "app/session/session_files.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
 #include "core/calibration/segment_solver.hpp"
@@ -57,8 +58,8 @@ std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCa
   const CameraMasks masks(pass.configuration, rig);
   const EstimatorOptions options = estimator_options(pass.configuration, begin.trust,
                                                      Adoption::after_fixed_frames, masks.views());
-  Arena frames_arena(FramePool::memory_needed(width, height, FrameDecoder::kSlots));
-  Arena estimator_arena(Estimator::memory_needed(options, rig));
+  Arena frames_arena(arena_size(FramePool::memory_needed(width, height, FrameDecoder::kSlots)));
+  Arena estimator_arena(arena_size(Estimator::memory_needed(options, rig)));
   FramePool pool(width, height, FrameDecoder::kSlots, frames_arena);
   const std::unique_ptr<PairRunner> runner = make_runner(pass.configuration.threads);
   BackgroundThread solver;
@@ -119,8 +120,8 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   found.trust = CalibrationTrust::given;
 
   const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(
-      2 * SegmentSolver::memory_needed(c.calibration, c.monitor, given.file.rig.cameras, features));
+  Arena arena(arena_size(2 * SegmentSolver::memory_needed(c.calibration, c.monitor,
+                                                          given.file.rig.cameras, features)));
   SegmentSolver joined(
       SegmentSolver::Kind::joined, blank.file.rig, *first,
       stretch_length(result.frames, static_cast<std::size_t>(c.calibration.max_frames)),

@@ -49,11 +49,11 @@ void EventLog::collect(const Estimator& estimator) noexcept {
     if (event.kind == EstimatorEvent::Kind::dropped)
       dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
     const EventRecord record = EventRecord::of(event);
-    output_->notify(&SessionObserver::on_event, record);
+    output_->post(record);
     if (is_for_user(event.kind)) (void)notices_.push(record);
   }
   for (const CalibrationDecision& decision : estimator.calibrations())
-    output_->notify(&SessionObserver::on_calibration, CalibrationRecord{decision});
+    output_->post(CalibrationRecord{decision});
 }
 
 /// Frames in a row without all of their work are one event.
@@ -63,8 +63,10 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
     return;
   }
   if (std::exchange(whole_frames_, 0) < kWholeAgain) return;
-  EventRecord event = EventRecord::make(
-      sample.stamp, "work_dropped",
+  EventRecord event;
+  event.stamp = sample.stamp;
+  event.kind = "work_dropped";
+  event.set_message(
       "frames take longer than the frame budget: work other than the pose is omitted");
   event.fields[0] = {"points_percent", std::int64_t{sample.effort.points_percent}};
   event.fields[1] = {"window_keyframes", std::int64_t{sample.effort.window_keyframes}};
@@ -73,11 +75,15 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
 }
 
 void EventLog::log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept {
-  log(EventRecord::make(stamp, kind, "{}", message), to_user);
+  EventRecord event;
+  event.stamp = stamp;
+  event.kind = kind;
+  event.set_message(message);
+  log(event, to_user);
 }
 
 void EventLog::log(const EventRecord& event, bool to_user) noexcept {
-  output_->notify(&SessionObserver::on_event, event);
+  output_->post(event);
   if (to_user) (void)notices_.push(event);
 }
 

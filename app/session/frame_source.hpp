@@ -104,7 +104,7 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  [[nodiscard]] const SourceFacts& facts() const noexcept { return facts_; }
+  [[nodiscard]] virtual const SourceFacts& facts() const noexcept = 0;
 
   /// Call before start(): `observer` receives the trigger board's pulses and must outlive the
   /// source.
@@ -125,19 +125,19 @@ class FrameSource {
   /// Called once after next() has ended, while the estimator may still finish; stops the delivery.
   virtual void halt() noexcept {}
   /// Ends what start() began, after halt().
-  virtual void finish(Progress* progress) = 0;
+  virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
 
   /// Adds skipped frames, devices, times and ground truth to the summary.
   virtual void describe(const SessionTotals& totals, const Estimator& estimator,
                         SummaryInput* input) const = 0;
+  /// Prints the statistics shown at the end.
+  virtual void print_metrics(const SessionTotals& totals, const SummaryInput& input,
+                             Progress* progress) const = 0;
   /// Exit code for a problem of the source itself, whose message it has printed; called if there
   /// are poses.
   [[nodiscard]] virtual std::optional<ExitCode> verdict(Progress* /*progress*/) const {
     return std::nullopt;
   }
-
- protected:
-  SourceFacts facts_{};  // set by the constructor
 };
 
 }  // namespace vergence::app

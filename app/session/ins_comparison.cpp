@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include <nlohmann/json.hpp>
@@ -84,11 +85,11 @@ void InsEvents::update(const ComparedPose& pose, std::uint64_t matches) noexcept
 }
 
 void InsEvents::update(const EnuAlignment& p, Stamp stamp) noexcept {
-  event_log_.log(EventRecord::make(
-                     stamp, "enu_alignment",
-                     "aligned with ENU after {:.1f} m: heading sigma {:.2f} deg, residual {:.2f} m",
-                     p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual),
-                 false);
+  std::array<char, 160> text{};
+  (void)std::snprintf(text.data(), text.size(),
+                      "aligned with ENU after %.1f m: heading sigma %.2f deg, residual %.2f m",
+                      p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual);
+  event_log_.log(stamp, "enu_alignment", text.data(), false);
 }
 
 /// Once a drive: a receiver never has one, an INS has it after it has aligned.
@@ -142,16 +143,18 @@ void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) no
 void InsEvents::record_scale(const ComparedPose& pose) noexcept {
   if (pose.scale_disagrees == scale_disagrees_) return;
   scale_disagrees_ = pose.scale_disagrees;
-  if (!scale_disagrees_)
-    return event_log_.log(pose.pose.stamp, "scale_agrees",
-                          "the distance travelled agrees with the INS again", false);
-  event_log_.log(
-      EventRecord::make(pose.pose.stamp, "scale_disagrees",
-                        "the distance travelled is {:.1f} % {} than the INS's over {:.0f} m: "
-                        "measure the baseline again",
+  std::array<char, 200> text{};
+  if (scale_disagrees_)
+    (void)std::snprintf(text.data(), text.size(),
+                        "the distance travelled is %.1f %% %s than the INS's over %.0f m: measure "
+                        "the baseline again",
                         100 * std::abs(pose.path_ratio - 1),
-                        pose.path_ratio > 1 ? "longer" : "shorter", scale_stretch_m_),
-      true);
+                        pose.path_ratio > 1 ? "longer" : "shorter", scale_stretch_m_);
+  else
+    (void)std::snprintf(text.data(), text.size(),
+                        "the distance travelled agrees with the INS again");
+  event_log_.log(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees",
+                 text.data(), scale_disagrees_);
 }
 
 InsComparison::InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
@@ -164,7 +167,7 @@ InsComparison::InsComparison(const ComparisonOptions& options, InsSource source,
 }
 
 void InsComparison::add(const InsRecord& reading) noexcept {
-  output_->notify(&SessionObserver::on_reading, reading);
+  output_->post(reading);
   comparison_.add(reading.sample);
   events_.update(reading.sample, comparison_.counters().jumps,
                  comparison_.counters().ins_contradicted > 0);
@@ -180,7 +183,7 @@ void InsComparison::drain() noexcept {
   for (ComparedPose pose; comparison_.next(&pose);) {
     FrameReport& report = pending_[static_cast<std::size_t>(drained_++ % pending_.size())];
     report.set_comparison(pose);
-    output_->notify(&SessionObserver::on_report, report);
+    output_->post(report);
     event_log_.collect(report);
     if (pose.ins_valid) ++matches_;
     measure_way(pose);
@@ -274,7 +277,7 @@ void InsComparison::apply_enu_alignment(Stamp stamp) noexcept {
       event_log_.log(stamp, "enu_alignment_limit",
                      "too many ENU alignments for summary.json; poses.csv has all of them", true);
   }
-  output_->notify(&SessionObserver::on_enu_alignment, p, comparison_.plane().origin());
+  output_->post(p, comparison_.plane().origin());
   events_.update(p, stamp);
 }
 

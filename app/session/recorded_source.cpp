@@ -8,12 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/frame_decoder.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "core/comparison/attitude_check.hpp"
 #include "core/math/robust.hpp"
-#include "core/memory/frame_pool.hpp"
 
 namespace vergence::app {
 
@@ -150,135 +147,149 @@ int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].heig
 constexpr std::uint64_t kMaxListed = 1000;
 
 SourceEvent make_event(const DecodedPair& pair, std::uint64_t unread) noexcept {
-  SourceEvent event{EventRecord::make(
-      pair.stamp, pair.kind, "{}",
-      unread <= kMaxListed
-          ? pair.issue.data()
-          : "1000 frames could not be read; further ones are only counted (summary.json: "
-            "skipped)")};
+  SourceEvent event;
   event.skipped = true;
   event.listed = unread <= kMaxListed + 1;
+  event.record.stamp = pair.stamp;
+  event.record.kind = pair.kind;
+  event.record.set_message(
+      unread <= kMaxListed
+          ? pair.issue.data()
+          : "1000 frames could not be read; further ones are only counted (summary.json: skipped)");
   event.record.fields[0] = {"frame", static_cast<std::int64_t>(pair.frame)};
   return event;
 }
 
-/// A recorded drive as the source of a session. Nothing is dropped; an INS that was recorded comes
-/// in the order of its stamps, before the frames that are not older.
-///
-/// Ownership  Holds the sequence and the pool that its images are decoded into. `request` outlives
-///            it.
-class RecordedSource final : public FrameSource {
- public:
-  /// `truth`: of the data set, may be empty. Precondition: request.start is a frame of it.
-  RecordedSource(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin,
-                 Trajectory truth, ReplayedIns ins)
-      : request_(request),
-        sequence_(std::move(sequence)),
-        ins_(std::move(ins)),
-        count_(std::min(request.frames.value_or(sequence_.pairs.size()),
-                        sequence_.pairs.size() - request.start)),
-        frames_arena_(FramePool::memory_needed(width_of(sequence_), height_of(sequence_),
-                                               FrameDecoder::kSlots)),
-        pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
-        skipped_(sequence_.left_out) {
-    facts_.begin = std::move(begin);
-    facts_.truth = std::move(truth);
-    facts_.frames = count_;
-    facts_.first = sequence_.pairs[request.start].stamp;
-    if (!ins_.readings.empty())
-      facts_.ins = SourceIns{ins_.options, InsSource::recording, ins_.mount_source,
-                             ins_.readings.capacity() * sizeof(InsRecord)};
-    for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
-      for (const std::string& message : *remarks)
-        facts_.remarks.push_back({message, "data", !request.session.quiet});
-    facts_.assumptions = sequence_.assumptions;
-    if (!facts_.assumptions.empty())
-      facts_.remarks.push_back({fmt::format("assumed: {}", fmt::join(facts_.assumptions, "; ")),
-                                "data", !request.session.quiet});
-    // Otherwise the length is the user's own, and where the right camera sits is to be found.
-    if (!request.from_scratch && !request.known) {
-      const RigCalibration& rig = facts_.begin.file.rig;
-      facts_.remarks.push_back({baseline_message(rig) + " (" + facts_.begin.source + ")", nullptr,
-                                !request.session.quiet});
-      if (std::string warning = baseline_warning(rig); !warning.empty())
-        facts_.remarks.push_back({std::move(warning), "calibration", !request.session.quiet});
-    }
-    facts_.image_bytes = frames_arena_.capacity();
-    facts_.ring_bytes = sizeof(FrameDecoder);
-  }
-
-  void start(std::vector<std::string>* /*faults*/) override {
-    decoder_ = std::make_unique<FrameDecoder>(sequence_, request_.start, count_, pool_);
-  }
-
-  [[nodiscard]] bool next(SourceItem* item) noexcept override {
-    if (!waiting_ && !ended_) {
-      ended_ = !decoder_->next(&pair_);
-      if (!ended_ && !pair_.decoded) {
-        ++skipped_;
-        *item = make_event(pair_, ++unread_);
-        return true;
-      }
-      waiting_ = !ended_;
-    }
-    // Readings go before the first frame that is not older; those after the last frame at the end.
-    if (next_reading_ < ins_.readings.size()) {
-      const InsRecord& reading = ins_.readings[next_reading_];
-      if (ended_ || reading.sample.stamp <= pair_.stamp) {
-        ++next_reading_;
-        *item = reading;
-        return true;
-      }
-    }
-    if (ended_) return false;
-    waiting_ = false;
-    SourceFrame frame;
-    frame.rig.number = pair_.frame;
-    frame.rig.stamp = pair_.stamp;
-    frame.rig.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) frame.rig.images[k] = pool_.view(pair_.slots[k]);
-    frame.decode_ms = pair_.decode_ms;
-    *item = frame;
-    return true;
-  }
-
-  void done(const PoseSample& /*sample*/) noexcept override { decoder_->release(pair_); }
-
-  void stop() noexcept override { decoder_->stop(); }
-
-  void finish(Progress* /*progress*/) override { decoder_.reset(); }
-
-  void describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,
-                SummaryInput* input) const override {
-    input->skipped = skipped_;
-  }
-
- private:
-  const ReplayRequest& request_;
-  const StereoSequence sequence_;
-  const ReplayedIns ins_;
-  const std::size_t count_;  // frames of this replay
-  Arena frames_arena_;
-  FramePool pool_;
-  std::unique_ptr<FrameDecoder> decoder_;
-
-  // Used by the estimator's thread; read by others after it has joined.
-  DecodedPair pair_{};    // given, or held back behind its readings
-  bool waiting_ = false;  // pair_ was not given yet
-  bool ended_ = false;    // there are no more pairs
-  std::size_t next_reading_ = 0;
-  std::uint64_t unread_ = 0;  // of skipped_, those that the decoder came to
-  std::uint64_t skipped_ = 0;
-};
+void report_enu_errors(const EnuMetrics& earth, double alignment_distance_m, Progress* progress) {
+  const EnuErrors& e = earth.errors;
+  if (e.poses > 0)
+    progress->print(fmt::format(
+        "error against the INS after the alignment: {:.2f} m at the end ({:.2f} % of {:.1f} m), "
+        "maximum {:.2f} m; heading {:.2f} deg RMS, {:.2f} deg at the end",
+        e.horizontal_end_m, e.ins_path_m > 0 ? 100 * e.horizontal_end_m / e.ins_path_m : 0,
+        e.ins_path_m, e.horizontal_max_m, e.heading_rms_deg, e.heading_end_deg));
+  else
+    progress->print(
+        fmt::format("not compared with the INS: the alignment needs {:g} m with a fix "
+                    "(comparison.alignment_distance_m)",
+                    alignment_distance_m));
+}
 
 }  // namespace
 
-std::unique_ptr<FrameSource> make_recorded_source(const ReplayRequest& request,
-                                                  StereoSequence sequence,
-                                                  StartingCalibration begin, Trajectory truth,
-                                                  ReplayedIns ins) {
-  return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
-                                          std::move(truth), std::move(ins));
+RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequence,
+                               StartingCalibration begin, Trajectory truth, ReplayedIns ins)
+    : request_(request),
+      sequence_(std::move(sequence)),
+      ins_(std::move(ins)),
+      count_(std::min(request.frames.value_or(sequence_.pairs.size()),
+                      sequence_.pairs.size() - request.start)),
+      frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_),
+                                                        FrameDecoder::kSlots))),
+      pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
+      skipped_(sequence_.left_out) {
+  facts_.begin = std::move(begin);
+  facts_.truth = std::move(truth);
+  facts_.frames = count_;
+  facts_.first = sequence_.pairs[request.start].stamp;
+  if (!ins_.readings.empty())
+    facts_.ins = SourceIns{ins_.options, InsSource::recording, ins_.mount_source,
+                           ins_.readings.capacity() * sizeof(InsRecord)};
+  for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
+    for (const std::string& message : *remarks)
+      facts_.remarks.push_back({message, "data", !request.session.quiet});
+  facts_.assumptions = sequence_.assumptions;
+  if (!facts_.assumptions.empty())
+    facts_.remarks.push_back({fmt::format("assumed: {}", fmt::join(facts_.assumptions, "; ")),
+                              "data", !request.session.quiet});
+  // Otherwise the length is the user's own, and where the right camera sits is to be found.
+  if (!request.from_scratch && !request.known) {
+    const RigCalibration& rig = facts_.begin.file.rig;
+    facts_.remarks.push_back({baseline_message(rig) + " (" + facts_.begin.source + ")", nullptr,
+                              !request.session.quiet});
+    if (std::string warning = baseline_warning(rig); !warning.empty())
+      facts_.remarks.push_back({std::move(warning), "calibration", !request.session.quiet});
+  }
+  facts_.image_bytes = frames_arena_.capacity();
+  facts_.ring_bytes = sizeof(FrameDecoder);
+}
+
+void RecordedSource::start(std::vector<std::string>* /*faults*/) {
+  decoder_ = std::make_unique<FrameDecoder>(sequence_, request_.start, count_, pool_);
+}
+
+// ---- the estimator's thread
+
+bool RecordedSource::next(SourceItem* item) noexcept {
+  if (!waiting_ && !ended_) {
+    ended_ = !decoder_->next(&pair_);
+    if (!ended_ && !pair_.decoded) {
+      ++skipped_;
+      *item = make_event(pair_, ++unread_);
+      return true;
+    }
+    waiting_ = !ended_;
+  }
+  // Readings go before the first frame that is not older; those after the last frame at the end.
+  if (next_reading_ < ins_.readings.size()) {
+    const InsRecord& reading = ins_.readings[next_reading_];
+    if (ended_ || reading.sample.stamp <= pair_.stamp) {
+      ++next_reading_;
+      *item = reading;
+      return true;
+    }
+  }
+  if (ended_) return false;
+  waiting_ = false;
+  SourceFrame frame;
+  frame.rig.number = pair_.frame;
+  frame.rig.stamp = pair_.stamp;
+  frame.rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) frame.rig.images[k] = pool_.view(pair_.slots[k]);
+  frame.decode_ms = pair_.decode_ms;
+  *item = frame;
+  return true;
+}
+
+void RecordedSource::done(const PoseSample& /*sample*/) noexcept { decoder_->release(pair_); }
+
+void RecordedSource::stop() noexcept { decoder_->stop(); }
+
+// ---- the caller's thread
+
+void RecordedSource::finish(Progress* /*progress*/, std::vector<std::string>* /*faults*/) {
+  decoder_.reset();
+}
+
+void RecordedSource::describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,
+                              SummaryInput* input) const {
+  input->skipped = skipped_;
+}
+
+void RecordedSource::print_metrics(const SessionTotals& /*totals*/, const SummaryInput& input,
+                                   Progress* progress) const {
+  if (input.evaluation && input.evaluation->status == EvaluationStatus::ok) {
+    const TrajectoryEvaluation& e = *input.evaluation;
+    const SegmentErrors& near = e.segments[1];
+    const std::string segments =
+        near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation)
+                       : "";
+    progress->print(
+        fmt::format("error against the reference over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m "
+                    "with scale {:.4f}{}",
+                    e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
+    if (!facts_.ins)
+      progress->print(fmt::format("next: vergence evaluate {} {}",
+                                  (request_.session.out / "trajectory.tum").string(),
+                                  request_.data.string()));
+  } else if (!facts_.ins) {
+    progress->print(
+        fmt::format("no reference to compare with; next: vergence evaluate {} REFERENCE",
+                    (request_.session.out / "trajectory.tum").string()));
+  }
+  if (facts_.ins)
+    report_enu_errors(*input.earth, request_.configuration.comparison.alignment_distance_m,
+                      progress);
 }
 
 }  // namespace vergence::app

@@ -1,12 +1,18 @@
 #pragma once
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "app/datasets/frame_decoder.hpp"
+#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"
+#include "app/session/session_files.hpp"
 #include "core/comparison/comparison.hpp"
+#include "core/memory/frame_pool.hpp"
 
 namespace vergence::app {
 
@@ -26,11 +32,45 @@ struct ReplayedIns {
 [[nodiscard]] ReplayedIns replayed_ins(const ReplayRequest& request,
                                        const StereoSequence& sequence);
 
-/// `truth`: of the data set, may be empty. Precondition: request.start is a frame of the sequence;
-/// `request` outlives the source.
-[[nodiscard]] std::unique_ptr<FrameSource> make_recorded_source(const ReplayRequest& request,
-                                                                StereoSequence sequence,
-                                                                StartingCalibration begin,
-                                                                Trajectory truth, ReplayedIns ins);
+/// A recorded drive as the source of a session. Nothing is dropped; an INS that was recorded comes
+/// in the order of its stamps, before the frames that are not older.
+///
+/// Ownership  Holds the sequence and the pool that its images are decoded into. `request` outlives
+///            it.
+class RecordedSource final : public FrameSource {
+ public:
+  /// `truth`: of the data set, may be empty. Precondition: request.start is a frame of it.
+  RecordedSource(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin,
+                 Trajectory truth, ReplayedIns ins);
+
+  [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
+  void start(std::vector<std::string>* faults) override;
+  [[nodiscard]] bool next(SourceItem* item) noexcept override;
+  void done(const PoseSample& sample) noexcept override;
+  void stop() noexcept override;
+  void finish(Progress* progress, std::vector<std::string>* faults) override;
+  void describe(const SessionTotals& totals, const Estimator& estimator,
+                SummaryInput* input) const override;
+  void print_metrics(const SessionTotals& totals, const SummaryInput& input,
+                     Progress* progress) const override;
+
+ private:
+  const ReplayRequest& request_;
+  const StereoSequence sequence_;
+  const ReplayedIns ins_;
+  const std::size_t count_;  // frames of this replay
+  Arena frames_arena_;
+  FramePool pool_;
+  SourceFacts facts_;
+  std::unique_ptr<FrameDecoder> decoder_;
+
+  // Used by the estimator's thread; read by others after it has joined.
+  DecodedPair pair_{};    // given, or held back behind its readings
+  bool waiting_ = false;  // pair_ was not given yet
+  bool ended_ = false;    // there are no more pairs
+  std::size_t next_reading_ = 0;
+  std::uint64_t unread_ = 0;  // of skipped_, those that the decoder came to
+  std::uint64_t skipped_ = 0;
+};
 
 }  // namespace vergence::app

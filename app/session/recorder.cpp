@@ -145,28 +145,39 @@ void Recorder::pretend(Stamp stamp) {
 void Recorder::record_disk(const LineFile* failed, int fault) {
   if ((failed != nullptr) == disk_full_) return;
   disk_full_ = failed != nullptr;
-  if (!disk_full_) {
-    write(EventRecord::make(newest_, "disk_recovered", "the disk takes lines again; {} were lost",
-                            lost_lines()));
-    return;
+  EventRecord event;
+  event.stamp = newest_;
+  event.kind = disk_full_ ? "disk_full" : "disk_recovered";
+  std::array<char, 256> text{};
+  const auto out = text.begin();
+  if (disk_full_) {
+    const char* words = ::strerrordesc_np(fault);  // strerror() may take memory
+    if (words == nullptr) words = "unknown error";
+    report_error(
+        "{}: cannot be written ({}); the session goes on and writing is tried again every "
+        "{} s: check that disk",
+        failed->path().native(), words, kRetry.count());
+    (void)fmt::format_to_n(out, text.size() - 1, "the session's files cannot be written ({})",
+                           words);
+  } else {
+    (void)fmt::format_to_n(out, text.size() - 1, "the disk takes lines again; {} were lost",
+                           lost_lines());
   }
-  const char* words = ::strerrordesc_np(fault);  // strerror() may take memory
-  if (words == nullptr) words = "unknown error";
-  ErrorMessage message{};
-  (void)fmt::format_to_n(
-      message.begin(), message.size() - 1,
-      "{}: cannot be written ({}); the session goes on and writing is tried again every {} s: "
-      "check that disk",
-      failed->path().native(), words, kRetry.count());
-  (void)error_messages_.push(message);
-  write(
-      EventRecord::make(newest_, "disk_full", "the session's files cannot be written ({})", words));
+  event.set_message(text.data());
+  write(event);
 }
 
 std::uint64_t Recorder::lost_lines() const {
   std::uint64_t lines = 0;
   for (const LineFile* file : files_->all) lines += file->lost_lines();
   return lines;
+}
+
+template <class... Arguments>
+void Recorder::report_error(const char* format, const Arguments&... arguments) noexcept {
+  ErrorMessage message{};
+  (void)fmt::format_to_n(message.begin(), message.size() - 1, fmt::runtime(format), arguments...);
+  (void)error_messages_.push(message);
 }
 
 std::vector<std::string> Recorder::pop_errors() {
@@ -180,6 +191,7 @@ std::vector<std::string> Recorder::pop_errors() {
 /// The trajectories, from the session's own files: nothing that grows with the drive waits in
 /// memory.
 void Recorder::read_back() {
+  SessionTotals& totals = totals_.totals();
   const auto read = [this](const LineFile& file, std::vector<StampedPose>* out) {
     try {
       *out = read_tum(file.path());
@@ -191,29 +203,30 @@ void Recorder::read_back() {
                         "from it");
     }
   };
-  if (totals_.ok + totals_.degraded > 0) read(files_->trajectory, &totals_.trajectory);
-  if (files_->has_reference) read(files_->reference, &totals_.reference);
+  if (totals.ok + totals.degraded > 0) read(files_->trajectory, &totals.trajectory);
+  if (files_->has_reference) read(files_->reference, &totals.reference);
 }
 
 std::unique_ptr<SessionTotals> Recorder::close() {
   thread_.stop();
+  SessionTotals& totals = totals_.totals();
   for (LineFile* file : files_->all) {
     const bool good = file->close();
-    totals_.lost_lines += file->lost_lines();
+    totals.lost_lines += file->lost_lines();
     if (good && file->lost_lines() == 0) continue;
     const std::string why = good ? std::to_string(file->lost_lines()) + " lines are lost"
                                  : std::strerror(file->fault());
-    totals_.faults.push_back(file->path().string() + ": is not complete (" + why +
-                             "); check that disk and make room on it");
+    totals.faults.push_back(file->path().string() + ": is not complete (" + why +
+                            "); check that disk and make room on it");
   }
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;
   if (!files_->has_reference) std::filesystem::remove(files_->reference.path(), ignored);
   if (options_.keep_trajectory) read_back();
-  totals_.dropped_records = dropped_records_;
-  totals_.dropped_readings = dropped_readings_;
-  totals_.ring_high_water = thread_.high_water();
-  return std::make_unique<SessionTotals>(std::move(totals_));
+  totals.dropped_records = dropped_records_;
+  totals.dropped_readings = dropped_readings_;
+  totals.ring_high_water = thread_.high_water();
+  return std::make_unique<SessionTotals>(std::move(totals));
 }
 
 }  // namespace vergence::app

@@ -93,12 +93,14 @@ class Recorder final : public SessionObserver {
   void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
   using ErrorMessage = std::array<char, 512>;  // ends with 0, cut at the array's end
+  template <class... Arguments>
+  void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
 
   struct Files;
   Options options_;
   std::unique_ptr<Files> files_;
-  SessionTotals totals_;
+  TotalsBuilder totals_;
   std::string line_;  // being formatted
   std::size_t memory_ = 0;
   // Newest stamp of the poses.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <iterator>
 #include <numbers>
@@ -124,31 +125,41 @@ std::array<double, 4> FrameReport::error() const noexcept {
 void EventRecord::set_message(std::string_view text) noexcept { copy_text(text, &message); }
 
 EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
-  using Kind = EstimatorEvent::Kind;
+  EventRecord r;
+  r.stamp = event.stamp;
   const EventFormat& format = kEventFormats[static_cast<std::size_t>(event.kind)];
-  if (event.kind == Kind::state) {
+  r.kind = format.kind;
+  const bool state = event.kind == EstimatorEvent::Kind::state;
+  if (state) {
+    std::array<char, 256> text{};
     const auto from = to_string(event.from), to = to_string(event.to);
-    EventRecord r = make(event.stamp, format.kind, "{} to {}: {}", from, to, event.why);
+    (void)std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
+                        from.data(), static_cast<int>(to.size()), to.data(), event.why);
+    r.set_message(text.data());
     // The words are string literals: views of them end with 0.
     r.fields[0] = {"from", from.data()};
     r.fields[1] = {"to", to.data()};
-    return r;
-  }
-  const std::string_view begin = format.opening,
-                         why = event.kind == Kind::calibration_accepted ? "" : event.why;
-  EventRecord r = event.kind == Kind::calibration_contradicted && event.value > 0
-                      ? make(event.stamp, format.kind, "{}: depth error {:.1f} %", why, event.value)
-                  : event.kind == Kind::focal_length_contradicted
-                      ? make(event.stamp, format.kind, "{}: measured {:.0f} px", why, event.value)
-                      : make(event.stamp, format.kind, "{}{}{}", begin,
-                             begin.empty() || why.empty() ? "" : ": ", why);
-  if (format.field != nullptr) r.fields[0] = {format.field, event.value};
-  std::size_t n = 1;
-  const ChangeEvidence& e = event.evidence;
-  if (e.log_likelihood_ratio > 0) r.fields[n++] = {"log_likelihood_ratio", e.log_likelihood_ratio};
-  if (e.shift_px > 0) {
-    r.fields[n++] = {"shift_px", e.shift_px};
-    r.fields[n] = {"rotation_mrad", e.rotation_mrad};
+  } else {
+    const char* begin = format.opening;
+    const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
+    std::array<char, 256> text{};
+    if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
+      (void)std::snprintf(text.data(), text.size(), "%s: depth error %.1f %%", why, event.value);
+    else if (event.kind == EstimatorEvent::Kind::focal_length_contradicted)
+      (void)std::snprintf(text.data(), text.size(), "%s: measured %.0f px", why, event.value);
+    else
+      (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
+                          *begin != 0 && *why != 0 ? ": " : "", why);
+    r.set_message(text.data());
+    if (format.field != nullptr) r.fields[0] = {format.field, event.value};
+    std::size_t n = 1;
+    const ChangeEvidence& e = event.evidence;
+    if (e.log_likelihood_ratio > 0)
+      r.fields[n++] = {"log_likelihood_ratio", e.log_likelihood_ratio};
+    if (e.shift_px > 0) {
+      r.fields[n++] = {"shift_px", e.shift_px};
+      r.fields[n] = {"rotation_mrad", e.rotation_mrad};
+    }
   }
   return r;
 }

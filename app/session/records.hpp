@@ -6,10 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <variant>
-
-#include <fmt/format.h>
 
 #include "core/comparison/comparison.hpp"
 #include "core/estimator/estimator.hpp"
@@ -119,21 +116,6 @@ struct EventRecord {
 
   /// Copies the text, cut at a whole UTF-8 character.
   void set_message(std::string_view text) noexcept;
-  /// Formats the message without heap.
-  template <class... Arguments>
-  [[nodiscard]] static EventRecord make(Stamp stamp, const char* kind,
-                                        fmt::format_string<Arguments...> format,
-                                        Arguments&&... arguments) noexcept {
-    std::array<char, 256> text;
-    const char* end =
-        fmt::format_to_n(text.data(), text.size(), format, std::forward<Arguments>(arguments)...)
-            .out;
-    EventRecord event;
-    event.stamp = stamp;
-    event.kind = kind;
-    event.set_message({text.data(), static_cast<std::size_t>(end - text.data())});
-    return event;
-  }
   [[nodiscard]] static EventRecord of(const EstimatorEvent& event) noexcept;
 };
 

@@ -109,8 +109,9 @@ ExitCode replay_recording(const ReplayRequest& request) {
         fmt::format("--start {} is beyond the end: {} has {} frames; choose a smaller index",
                     request.start, request.data.string(), session.frames().size()));
   auto other = other_beginning(request, session);
-  const auto source = with_plain_errors(
-      [&] { return make_session_source(request, std::move(session), std::move(other)); });
+  const auto source = with_plain_errors([&] {
+    return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
+  });
   const SignalGuard signals;
   return run_session(*source, request.configuration, request.session, signals);
 }
@@ -163,8 +164,8 @@ ExitCode run_replay(const ReplayRequest& request) {
   if (request.calibrate_first) calibrate_unknown(request, signals, &sequence, &begin);
   if (const auto stopped = signals.stop_code()) return *stopped;
   const auto source = with_plain_errors([&] {
-    return make_recorded_source(request, std::move(sequence), std::move(begin), std::move(truth),
-                                std::move(ins));
+    return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
+                                            std::move(truth), std::move(ins));
   });
   return run_session(*source, request.configuration, request.session, signals);
 }

@@ -113,13 +113,28 @@ class SessionOutput {
   explicit SessionOutput(std::span<SessionObserver* const> observers) noexcept
       : observers_(observers) {}
 
-  /// Calls a function of every observer, such as &SessionObserver::on_pose.
+  void post(const RigFrame& frame) noexcept { notify(&SessionObserver::on_frame, frame); }
+  void post_pose(const FrameReport& report) noexcept { notify(&SessionObserver::on_pose, report); }
+  void post(const calibration::TrackLog& tracks) noexcept {
+    notify(&SessionObserver::on_tracks, tracks);
+  }
+  void post(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
+    notify(&SessionObserver::on_enu_alignment, alignment, origin);
+  }
+  void post(const FrameReport& report) noexcept { notify(&SessionObserver::on_report, report); }
+  void post(const EventRecord& event) noexcept { notify(&SessionObserver::on_event, event); }
+  void post(const CalibrationRecord& calibration) noexcept {
+    notify(&SessionObserver::on_calibration, calibration);
+  }
+  /// Precondition: Recorder::Options::ins.
+  void post(const InsRecord& reading) noexcept { notify(&SessionObserver::on_reading, reading); }
+
+ private:
   template <class Call, class... Values>
   void notify(Call call, const Values&... values) noexcept {
     for (SessionObserver* o : observers_) (o->*call)(values...);
   }
 
- private:
   std::span<SessionObserver* const> observers_{};
 };
 

@@ -109,9 +109,6 @@ struct CalibrationTotals {
 
 /// Totals of a session, for summary.json.
 struct SessionTotals : CalibrationTotals {
-  void add(const FrameReport& report);
-  void add(const EventRecord& event);
-
   /// Numbers of frames.
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
   /// In ms.
@@ -125,7 +122,8 @@ struct SessionTotals : CalibrationTotals {
   std::optional<std::uint64_t> verified_frame{};
   /// First contradiction of the calibration in use.
   std::optional<Contradiction> contradicted{};
-  double path_m = 0;  // as FrameCounts
+  /// Sum of the steps between successive poses.
+  double path_m = 0;
   /// Poses read back from trajectory.tum, if requested.
   std::vector<StampedPose> trajectory;
   /// Poses read back from reference.tum in its own frame, if requested.
@@ -140,11 +138,21 @@ struct SessionTotals : CalibrationTotals {
   std::size_t ring_high_water = 0;
   /// A message for each incomplete file.
   std::vector<std::string> faults;
+};
+
+/// Accumulates the totals from the frames and events of a session. Not thread-safe.
+class TotalsBuilder {
+ public:
+  void add(const FrameReport& report);
+  void add(const EventRecord& event);
+  [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
 
  private:
   void match_verified();
 
-  Stamp newest_{};  // frame
+  SessionTotals totals_{};
+  std::optional<Vec3> last_position_{};
+  Stamp newest_{};
   std::uint64_t newest_frame_ = 0;
 };
 

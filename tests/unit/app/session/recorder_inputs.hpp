@@ -28,7 +28,6 @@ inline FrameReport pose(std::uint64_t frame, PoseStatus status, double x) {
   FrameReport report;
   report.pose = sample;
   report.decode_ms = 2;
-  report.counts.path_m = x;
   return report;
 }
 

@@ -36,6 +36,7 @@ class BlackSource final : public FrameSource {
     facts_.remarks.push_back({"a remark", "data", false});
   }
 
+  [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
   void start(std::vector<std::string>* /*faults*/) override {}
   [[nodiscard]] bool next(SourceItem* item) noexcept override {
     if (next_ == count_) return false;
@@ -61,13 +62,18 @@ class BlackSource final : public FrameSource {
   }
   void done(const PoseSample& /*sample*/) noexcept override { --held_; }
   void stop() noexcept override {}
-  void finish(Progress* /*progress*/) override { ++finished_; }
+  void finish(Progress* /*progress*/, std::vector<std::string>* /*faults*/) override {
+    ++finished_;
+  }
   void describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,
                 SummaryInput* /*input*/) const override {}
+  void print_metrics(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
+                     Progress* /*progress*/) const override {}
   [[nodiscard]] int held() const { return held_; }
   [[nodiscard]] int finished() const { return finished_; }
 
  private:
+  SourceFacts facts_;
   std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight);
   int count_, next_ = 0, held_ = 0, finished_ = 0;
   bool noted_ = false;

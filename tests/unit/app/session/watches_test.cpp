@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/background_thread.hpp"
+#include "app/session/timing_monitor.hpp"
 
 namespace vergence::app {
 namespace {

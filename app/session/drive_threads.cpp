@@ -1,0 +1,70 @@
+#include "app/session/drive_threads.hpp"
+
+#include <cstdint>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "core/memory/thread_allocations.hpp"
+
+namespace vergence::app {
+
+namespace {
+
+RealtimeRequest make_request(const RealtimeSettings& settings) {
+  RealtimeRequest request;
+  request.priority = settings.priority;
+  request.affinity = parse_cpu_list(settings.affinity);
+  request.solver_affinity = parse_cpu_list(settings.solver_affinity);
+  request.lock_memory = settings.lock_memory != 0;
+  return request;
+}
+
+void print(const std::vector<std::string>& messages, Progress* progress) {
+  for (const std::string& message : messages) progress->print("vergence: " + message);
+}
+
+}  // namespace
+
+DriveThreads::DriveThreads(const RealtimeSettings& settings)
+    : realtime_(make_request(settings), system_) {
+  constexpr std::size_t kThreads = 64;  // more than a drive has, so that polling does not allocate
+  threads_.reserve(kThreads);
+}
+
+void DriveThreads::lock_memory(Progress* progress) { print(realtime_.lock_memory(), progress); }
+
+void DriveThreads::poll(Progress* progress) {
+  constexpr int kAtFirst = 20, kLater = 20;  // in the first second always, then once a second
+  const int count = polls_++;
+  if (count >= kAtFirst && count % kLater != 0) return;
+  process_threads(&threads_);
+  for (const ProcessThread& thread : threads_)
+    if (thread.ours()) ours_.insert(thread.name);
+  print(realtime_.apply(threads_), progress);
+}
+
+ThreadAllocationCounts DriveThreads::allocations() const {
+  const ThreadAllocations::Counts counts = ThreadAllocations::counts();
+  std::map<std::string, std::uint64_t> ours, libraries;
+  for (const std::string& name : ours_) ours[name] = 0;
+  for (std::size_t i = 0; i < counts.size; ++i) {
+    const std::string name = counts.rows[i].name.data();
+    (ProcessThread{0, name}.ours() ? ours : libraries)[name] += counts.rows[i].count;
+  }
+  if (counts.others > 0) libraries["others"] = counts.others;
+  ThreadAllocationCounts out;
+  out.ours.assign(ours.begin(), ours.end());
+  out.libraries.assign(libraries.begin(), libraries.end());
+  return out;
+}
+
+std::string allocations_message(const ThreadAllocationCounts& allocations) {
+  std::string list;
+  for (const auto* names : {&allocations.ours, &allocations.libraries})
+    for (const auto& [name, count] : *names)
+      if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", name, count);
+  return list.empty() ? "" : "runtime heap allocations: " + list;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,46 @@
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app/report/report.hpp"
+#include "app/runtime/progress.hpp"
+#include "app/session/starting_calibration.hpp"
+#include "app/session/summary.hpp"
+#include "core/types/parallel.hpp"
+
+/// Shared steps of commands that write a session directory.
+namespace vergence::app {
+
+/// Size of an arena for so many bytes of contents, with the alignment of the first piece.
+[[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
+
+/// One worker beside the estimator with two threads or more.
+[[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
+
+/// The calibration's part of the summary.
+void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
+                          const SessionTotals& totals, const EstimatorOptions& options,
+                          SummaryInput* input);
+
+/// Returns the message about an unverified calibration; empty if it is verified or there is
+/// none.
+[[nodiscard]] std::string verification_message(const SummaryInput& input);
+
+/// summary.json of the session; what goes wrong becomes a message of *faults.
+void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
+                           const SummaryInput& input, std::vector<std::string>* faults);
+
+/// Result of writing report.html.
+struct SessionReport {
+  ReportOutcome outcome{};
+  std::string failure{};  // why there is none; empty: it is there
+};
+[[nodiscard]] SessionReport write_session_report(const std::filesystem::path& session);
+
+/// Prints closing_lines(); with `quiet` only those that must not be missed.
+void print_verdict(const SessionReport& report, bool quiet, Progress* progress);
+
+}  // namespace vergence::app

@@ -1,0 +1,215 @@
+#include "app/session/timing_monitor.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+#include "app/devices/drive_sync.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr double kMicroseconds = 1e6;
+
+double us(Duration d) { return d.to_seconds() * kMicroseconds; }
+
+template <class... Arguments>
+TimingMonitor::Message message(const char* kind, bool to_user, const char* format,
+                               Arguments... arguments) noexcept {
+  TimingMonitor::Message s;
+  s.kind = kind;
+  s.to_user = to_user;
+  (void)std::snprintf(s.text.data(), s.text.size(), format, arguments...);
+  return s;
+}
+
+const char* fix_name(FixStatus fix) noexcept {
+  switch (fix) {
+    case FixStatus::none:
+      return "no position";
+    case FixStatus::fix_2d:
+      return "a fix without height";
+    case FixStatus::fix_3d:
+      return "a fix";
+    case FixStatus::dead_reckoning:
+      return "dead reckoning";
+  }
+  return "";
+}
+
+using Json = nlohmann::ordered_json;
+
+/// Three digits after the point: nanoseconds of microseconds, and a thousandth of a ppm.
+double rounded(double value) { return std::round(value * 1e3) / 1e3; }
+
+Json clock_json(const std::string& device, const ClockRecord& clock) {
+  return {{"device", device},
+          {"stamps", clock.stamps()},
+          {"drift_ppm", rounded(clock.drift_ppm())},
+          {"error_us", rounded(us(clock.error()))},
+          {"worst_error_us", rounded(us(clock.worst_error()))}};
+}
+
+Json latency_json(const TimeHistogram& latency, bool is_virtual) {
+  if (latency.count() == 0) return nullptr;
+  return {{"mean", rounded(latency.mean())},
+          {"p50", rounded(latency.percentile(0.5))},
+          {"p99", rounded(latency.percentile(0.99))},
+          {"p99_9", rounded(latency.percentile(0.999))},
+          {"max", rounded(latency.max())},
+          {"virtual", is_virtual}};
+}
+
+}  // namespace
+
+TimingMonitor::Message TimingMonitor::of_device(const DeviceEvent& event) const noexcept {
+  using Kind = DeviceEvent::Kind;
+  switch (event.kind) {
+    case Kind::camera_disconnected:
+      return message("camera_disconnected", true,
+                     "camera %d is disconnected; the run continues without it", event.camera);
+    case Kind::camera_reconnected:
+      return message("camera_reconnected", true, "camera %d is reconnected", event.camera);
+    case Kind::trigger_board_disconnected:
+      return message(
+          "trigger_board_disconnected", true,
+          "the trigger board is disconnected: check its cable; reconnecting every second");
+    case Kind::trigger_board_reconnected:
+      return message("trigger_board_reconnected", true, "the trigger board is reconnected");
+    case Kind::trigger_board_restarted:
+      return message("trigger_board_restarted", true,
+                     "the trigger board restarted: its pulses count from 0; the pairing is being "
+                     "verified again");
+    case Kind::pairing_pending:
+      return message("pairing_pending", false,
+                     "images of camera %d are not used until their pulses are identified",
+                     event.camera);
+    case Kind::pairing_verified:
+      return message("pairing_verified", false, "the pairing of camera %d is verified after %.2f s",
+                     event.camera, event.seconds);
+  }
+  return {};
+}
+
+TimingMonitor::Message TimingMonitor::of_set(const SyncedSet& set) noexcept {
+  const bool was = ambiguous_;
+  ambiguous_ = set.proof == SyncProof::ambiguous;
+  if (was || !ambiguous_) return {};
+  return message("pairing_ambiguous", true,
+                 "ambiguous pair: pulses, counters and stamps contradict each other%s",
+                 verifies_pairing(mode_) ? "; one image is used alone" : "");
+}
+
+TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexcept {
+  constexpr int kMany = 3;  // satellites: one more or less is not worth a word
+  const InsQuality& q = reading.quality;
+  const int count = q.satellites;
+  const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
+                       reading.sample.fix != fix_ ||
+                       std::abs(count - int{quality_.satellites}) >= kMany;
+  if (!changed) return of_utc(reading);
+  any_quality_ = true;
+  quality_ = q;
+  fix_ = reading.sample.fix;
+  std::array<char, 32> satellites{};
+  if (count > 0)
+    (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
+  const bool given =
+      q.status != 0 ||
+      q.filter_valid;  // a device that says nothing of its filter has no status either
+  return message("ins_status", false, "the INS has %s%s%s", fix_name(fix_), satellites.data(),
+                 !given           ? ""
+                 : q.filter_valid ? ", filter valid"
+                                  : ", filter not valid");
+}
+
+TimingMonitor::Message TimingMonitor::of_utc(const InsRecord& reading) noexcept {
+  constexpr double kStep = 0.1;  // s: a clock that was set
+  if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
+  const double ahead =
+      static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
+  if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
+  utc_reported_ = true;
+  reported_ahead_s_ = ahead;
+  return message("utc_offset", false,
+                 "the session's stamps are %.4f s %s the INS's UTC; they follow the host clock as "
+                 "set at the start",
+                 std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
+}
+
+void TimingMonitor::record_pose(const AcquiredFrame& frame, float estimate_ms,
+                                HostStamp now) noexcept {
+  const SyncedSet& set = frame.set;
+  const double ms =
+      virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + static_cast<double>(estimate_ms)
+               : (now - set.stamp).to_seconds() * 1e3;
+  latency_.add(ms);
+}
+
+nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
+                                           const DriveDevices& devices) const {
+  Json clocks = Json::array(), board = Json::object(), ins = Json::object(),
+       cameras = Json::array();
+  bool all_verified = verifies_pairing(mode_);
+  for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
+    clocks.push_back(clock_json(fmt::format("camera {}", k), c.cameras[k]));
+    const CameraStatistics s = devices.cameras()[k]->statistics();
+    all_verified = all_verified && c.verified[k];
+    cameras.push_back({{"verified", verifies_pairing(mode_) && c.verified[k]},
+                       {"acquisitions", c.sync.acquisitions[k]},
+                       {"losses",
+                        {{"missed_trigger", c.sync.missed_trigger[k]},
+                         {"lost", c.sync.lost[k]},
+                         {"pairing_pending", c.sync.acquiring[k]},
+                         {"contradictions", c.sync.contradictions[k]},
+                         {"late", c.sync.late[k]},
+                         {"duplicate", c.sync.duplicate[k]},
+                         {"absent", c.sync.absent[k]},
+                         {"incomplete", s.torn},
+                         {"underruns", s.underruns}}}});
+  }
+  if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
+  if (devices.ins() != nullptr) {
+    clocks.push_back(clock_json("INS", c.ins));
+    const InsStatistics s = devices.ins()->statistics();
+    ins = {{"lost", s.lost},
+           {"malformed", s.malformed},
+           {"restarts", s.restarts},
+           {"overruns", s.overruns},
+           {"dropped", c.dropped_readings}};
+  }
+  if (devices.trigger() != nullptr) {
+    const TriggerStatistics s = devices.trigger()->statistics();
+    board = {{"pulses", s.pulses},     {"lost", s.lost},       {"malformed", s.malformed},
+             {"overruns", s.overruns}, {"reboots", c.reboots}, {"starts", s.starts}};
+  }
+  const Json pairing = {{"mode", to_string(mode_)},
+                        {"message", proof_message(mode_)},
+                        {"verifiable", verifies_pairing(mode_)},
+                        {"verified", all_verified},
+                        {"worst_acquisition_s", rounded(c.sync.worst_acquisition.to_seconds())},
+                        {"pauses", c.pauses},
+                        {"pauses_refused", c.pauses_refused},
+                        {"sets",
+                         {{"complete", c.sync.complete},
+                          {"incomplete", c.sync.incomplete},
+                          {"ambiguous", c.sync.ambiguous},
+                          {"unreported", c.sync.unreported},
+                          {"pulses", c.pulses},
+                          {"pulses_missed", c.sync.missed},
+                          {"pushed_out", c.sync.pushed_out},
+                          {"overtaken", c.dropped_sets},
+                          {"incomplete", c.torn}}},
+                        {"cameras", cameras}};
+  return {{"clocks", clocks},
+          {"clock_resets", c.clock_resets},
+          {"worst_stamp_error_us", rounded(static_cast<double>(c.worst_stamp_error_ns) * 1e-3)},
+          {"pairing", pairing},
+          {"board", board},
+          {"ins", ins},
+          {"latency_ms", latency_json(latency_, virtual_)}};
+}
+
+}  // namespace vergence::app
