@@ -1,6 +1,6 @@
 // How far the decisions of the online calibration are from their bounds, on all recorded drives.
 //
-//   margin_bench [--only DRIVE] [--set KEY=VALUE]
+//   margin_bench [--only DRIVE] [--set KEY=VALUE]     six minutes
 //
 // Every statistic is divided by its bound: 1 decides. "Quiet" are the drives as they are and with
 // disturbances that are not a fault of the rig, given the published calibration and the one found
@@ -44,7 +44,7 @@ constexpr std::array<const char*, kDecisions> kNames = {"knock or drift, from ep
                                                         "calibration contradicted"};
 constexpr unsigned bit(Decision d) { return 1U << d; }
 
-/// A perturbation, the decisions that must follow from it, and those that must not.
+/// A perturbation, the decisions of which one must follow from it, and those that must not.
 struct Case {
   std::string_view variant;
   unsigned must = 0, must_not = 0;
@@ -52,20 +52,17 @@ struct Case {
   bool half_way = false;
 };
 
-constexpr unsigned kAlarms = bit(change) | bit(jump) | bit(lag) | bit(contradicted);
+constexpr unsigned kKnock = bit(change) | bit(jump);
+constexpr unsigned kAlarms = kKnock | bit(lag) | bit(contradicted);
 constexpr std::array kCases = {
     Case{"untouched", bit(verified), kAlarms | bit(uncertainty)},
     Case{"every second pair", 0, kAlarms},
-    Case{"30 % of the pairs lost", 0, kAlarms},
-    Case{"rain", 0, kAlarms},
     Case{"JPEG 20", 0, kAlarms},
-    Case{"flicker", 0, kAlarms},
     Case{"one frame 2.5 rows off", 0, kAlarms},
-    Case{"pitch 0.3° half-way", bit(change), bit(lag), true},
-    Case{"roll 0.5° half-way", bit(change), bit(lag), true},
-    Case{"yaw 0.3° half-way", bit(jump), bit(lag), true},
-    Case{"2 px to the side half-way", bit(jump), bit(lag), true},
-    Case{"right one frame late half-way", bit(lag), bit(change) | bit(jump), true},
+    Case{"pitch 0.3° half-way", kKnock, bit(lag), true},
+    Case{"roll 0.5° half-way", kKnock, bit(lag), true},
+    Case{"yaw 0.3° half-way", kKnock, bit(lag), true},
+    Case{"right one frame late half-way", bit(lag), kKnock, true},
     Case{"yaw 0.3° from the start", bit(contradicted), bit(verified)},
 };
 
@@ -117,28 +114,38 @@ struct Summary {
   std::string false_case = "–", miss_case = "–";
 };
 
+void add_quiet(const std::vector<Value>& values, std::size_t frames, const std::string& name,
+               Summary* s) {
+  for (const Value& v : values) s->quiet.push_back(v.value);
+  const Value most = largest(values, 0, frames);
+  if (most.value <= s->nearest_false) return;
+  s->nearest_false = most.value;
+  s->false_case = fmt::format("{}, frame {}", name, most.frame);
+}
+
+/// A fault counts for the decision that it shows in most.
+void add_fault(const Run& r, const Case& of, std::size_t frames, const std::string& name,
+               std::array<Summary, kDecisions>* all) {
+  const std::size_t from = of.half_way ? frames / 2 : 0;
+  Value most{from, -1};
+  std::size_t shown = 0;
+  for (std::size_t d = 0; d < kDecisions; ++d) {
+    if ((of.must & bit(static_cast<Decision>(d))) == 0) continue;
+    const Value v = largest(r[d], from, d < verified ? from + kFaultFrames : frames);
+    if (v.value > most.value) most = v, shown = d;
+  }
+  Summary& s = (*all)[shown];
+  if (of.must == 0 || most.value >= s.nearest_miss) return;
+  s.nearest_miss = most.value;
+  s.miss_case = fmt::format("{}, after {} frames", name, most.frame - from);
+}
+
 void add(const Run& r, const Case& of, std::size_t frames, const std::string& name,
          std::array<Summary, kDecisions>* all) {
-  const std::size_t from = of.half_way ? frames / 2 : 0;
-  for (std::size_t d = 0; d < kDecisions; ++d) {
-    Summary& s = (*all)[d];
-    const unsigned mask = bit(static_cast<Decision>(d));
-    if ((of.must_not & mask) != 0) {
-      for (const Value& v : r[d]) s.quiet.push_back(v.value);
-      const Value most = largest(r[d], 0, frames);
-      if (most.value > s.nearest_false) {
-        s.nearest_false = most.value;
-        s.false_case = fmt::format("{}, frame {}", name, most.frame);
-      }
-    }
-    if ((of.must & mask) != 0) {
-      const Value most = largest(r[d], from, d < verified ? from + kFaultFrames : frames);
-      if (most.value < s.nearest_miss) {
-        s.nearest_miss = most.value;
-        s.miss_case = fmt::format("{}, after {} frames", name, most.frame - from);
-      }
-    }
-  }
+  for (std::size_t d = 0; d < kDecisions; ++d)
+    if ((of.must_not & bit(static_cast<Decision>(d))) != 0)
+      add_quiet(r[d], frames, name, &(*all)[d]);
+  add_fault(r, of, frames, name, all);
 }
 
 double quantile(std::vector<double> values, double share) {
