@@ -133,13 +133,12 @@ void refuse_other_transforms(const YamlFile& file, const YAML::Node& node,
   struct Other {
     const char *key, *message;
   };
+  constexpr const char* kInverse =
+      "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is "
+      "[R^T, -R^T t] of it";
   constexpr std::array kOthers{
-      Other{"T_left_camera",
-            "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is "
-            "[R^T, -R^T t] of it"},
-      Other{"T_left_right",
-            "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is "
-            "[R^T, -R^T t] of it"},
+      Other{"T_left_camera", kInverse},
+      Other{"T_left_right", kInverse},
       Other{"T_right_left", "is called T_camera_left here: X_camera = R X_left + t"},
       Other{"T_cn_cnm1",
             "is Kalibr's: give the camchain itself with --calibration, or convert it with vergence "

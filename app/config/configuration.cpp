@@ -32,47 +32,39 @@ struct Entry {
   std::string origin;  // for the message: file:line, or the --set argument
 };
 
-/// Unfolds YAML trees into entries.
-class Flattener {
- public:
-  explicit Flattener(std::vector<Entry>* entries) : entries_(entries) {}
-
-  /// `origin`: for every entry instead of its file:line; empty: by file and line.
-  // NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
-  void add(const YamlFile& file, const YAML::Node& node, const std::string& name,
-           const std::string& origin, int depth = 0) {
-    const std::string here = origin.empty() ? file.at(node) : origin;
-    if (depth > kDeepest)
-      throw InputError(here + ": \"" + name.substr(0, 60) +
-                       "\" is nested too deeply; see docs/configuration.md");
-    if (entries_->size() >= kMaxEntries)
-      throw InputError(here + ": too many values; is this the right file?");
-    if (node.IsMap() && node.size() > 0) {
-      for (const auto& item : node) {
-        if (!item.first.IsScalar()) throw InputError(here + ": a key that is not a word");
-        add(file, item.second,
-            name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar(), origin,
-            depth + 1);
-      }
-    } else if (node.IsSequence() && node.size() > 0) {
-      std::size_t index = 0;
-      for (const auto& item : node)
-        add(file, item, name + "." + std::to_string(index++), origin, depth + 1);
-    } else {
-      const bool scalar = node.IsScalar() || node.IsNull();
-      entries_->push_back({name, node.IsScalar() ? node.Scalar() : std::string(), scalar, here});
+/// Unfolds a YAML tree into entries. `origin`: for every entry instead of its file:line; empty: by
+/// file and line.
+// NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
+void flatten(const YamlFile& file, const YAML::Node& node, const std::string& name,
+             const std::string& origin, std::vector<Entry>* entries, int depth = 0) {
+  const std::string here = origin.empty() ? file.at(node) : origin;
+  if (depth > kDeepest)
+    throw InputError(here + ": \"" + name.substr(0, 60) +
+                     "\" is nested too deeply; see docs/configuration.md");
+  if (entries->size() >= kMaxEntries)
+    throw InputError(here + ": too many values; is this the right file?");
+  if (node.IsMap() && node.size() > 0) {
+    for (const auto& item : node) {
+      if (!item.first.IsScalar()) throw InputError(here + ": a key that is not a word");
+      flatten(file, item.second,
+              name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar(), origin,
+              entries, depth + 1);
     }
+  } else if (node.IsSequence() && node.size() > 0) {
+    std::size_t index = 0;
+    for (const auto& item : node)
+      flatten(file, item, name + "." + std::to_string(index++), origin, entries, depth + 1);
+  } else {
+    const bool scalar = node.IsScalar() || node.IsNull();
+    entries->push_back({name, node.IsScalar() ? node.Scalar() : std::string(), scalar, here});
   }
-
- private:
-  std::vector<Entry>* entries_;
-};
+}
 
 void add_file(const YamlFile& file, std::vector<Entry>* entries) {
   if (file.root().IsNull()) return;
   if (!file.root().IsMap())
     file.fail(file.root(), "is not a configuration: groups of `key: value` are expected");
-  Flattener(entries).add(file, file.root(), "", "");
+  flatten(file, file.root(), "", "", entries);
   std::set<std::string_view> names;
   for (const Entry& entry : *entries)
     if (!names.insert(entry.name).second)
@@ -95,7 +87,7 @@ void add_argument(const std::string& argument, std::vector<Entry>* entries) {
     return;
   }
   const YamlFile file = YamlFile::parse(value, origin);
-  Flattener(entries).add(file, file.root(), name, origin);
+  flatten(file, file.root(), name, origin, entries);
 }
 
 bool is_group(const std::string& name) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <iterator>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -34,23 +35,16 @@ class Rows {
   template <class Integer>
   Rows& integer(const char* name, Integer Settings::*field, std::int64_t least, std::int64_t most,
                 const char* unit, const char* meaning) {
-    add(
+    return add<std::int64_t>(
         name, KeyType::integer, static_cast<double>(least), static_cast<double>(most), unit,
-        meaning,
-        [field](Settings& s, const KeyValue& v) {
-          s.*field = static_cast<Integer>(std::get<std::int64_t>(v));
-        },
-        [field](const Settings& s) -> KeyValue { return static_cast<std::int64_t>(s.*field); });
-    return *this;
+        meaning, [field](auto& s) -> auto& { return s.*field; });
   }
 
   Rows& number(const char* name, double Settings::*field, double least, double most,
                const char* unit, const char* meaning) {
-    add(
-        name, KeyType::number, least, most, unit, meaning,
-        [field](Settings& s, const KeyValue& v) { s.*field = std::get<double>(v); },
-        [field](const Settings& s) -> KeyValue { return s.*field; });
-    return *this;
+    return add<double>(
+        name, KeyType::number, least, most, unit,
+        meaning, [field](auto& s) -> auto& { return s.*field; });
   }
 
   /// A list: one key for each number, `name.0` and so on. The first one has the meaning.
@@ -58,37 +52,27 @@ class Rows {
   Rows& numbers(const char* name, std::array<double, N> Settings::*field, double least, double most,
                 const char* unit, const char* meaning) {
     for (std::size_t i = 0; i < N; ++i)
-      add(
+      add<double>(
           name + ("." + std::to_string(i)), KeyType::number, least, most, unit,
           i == 0 ? meaning : "Next element of the list.",
-          [field, i](Settings& s, const KeyValue& v) { (s.*field)[i] = std::get<double>(v); },
-          [field, i](const Settings& s) -> KeyValue { return (s.*field)[i]; });
+          [ field, i ](auto& s) -> auto& { return (s.*field)[i]; });
     return *this;
   }
 
   Rows& text(const char* name, std::string Settings::*field, std::size_t longest,
              const char* meaning) {
-    add(
-        name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
-        [field](Settings& s, const KeyValue& v) { s.*field = std::get<std::string>(v); },
-        [field](const Settings& s) -> KeyValue { return s.*field; });
-    return *this;
+    return add<std::string>(
+        name, KeyType::text, 0, static_cast<double>(longest), "",
+        meaning, [field](auto& s) -> auto& { return s.*field; });
   }
 
   /// A number that is chosen by its word: the first stands for 0.
   Rows& choice(const char* name, int Settings::*field, const std::vector<std::string>& words,
                const char* meaning) {
-    add(
-        name, KeyType::text, 0, 0, "", meaning,
-        [field, words](Settings& s, const KeyValue& v) {
-          s.*field = static_cast<int>(
-              std::find(words.begin(), words.end(), std::get<std::string>(v)) - words.begin());
-        },
-        [field, words](const Settings& s) -> KeyValue {
-          return words[static_cast<std::size_t>(s.*field)];
-        });
-    group_.keys.back().words = words;
-    return *this;
+    std::vector<std::pair<std::string, int>> choices;
+    for (const std::string& word : words)
+      choices.emplace_back(word, static_cast<int>(choices.size()));
+    return choice<int>(name, field, choices, meaning);
   }
 
   /// One of the values of an enumeration, by its word.
@@ -139,6 +123,20 @@ class Rows {
   [[nodiscard]] Group done() { return std::move(group_); }
 
  private:
+  /// `access` gives the field, of Settings const or not.
+  template <class Value, class Access>
+  Rows& add(const std::string& name, KeyType type, double least, double most, const char* unit,
+            const char* meaning, const Access& access) {
+    add(
+        name, type, least, most, unit, meaning,
+        [access](Settings& s, const KeyValue& v) {
+          auto& field = access(s);
+          field = static_cast<std::remove_reference_t<decltype(field)>>(std::get<Value>(v));
+        },
+        [access](const Settings& s) -> KeyValue { return static_cast<Value>(access(s)); });
+    return *this;
+  }
+
   void add(const std::string& name, KeyType type, double least, double most, const char* unit,
            const char* meaning, std::function<void(Settings&, const KeyValue&)> set,
            std::function<KeyValue(const Settings&)> get) {

@@ -70,8 +70,8 @@ void print_verdict(const SessionReport& report, bool quiet, Progress* progress) 
     return;
   }
   if (!report.failure.empty()) progress->print("vergence: " + report.failure);
-  if (!report.outcome.usable)
-    progress->print("vergence: do not use these poses: " + report.outcome.main_reason);
+  if (!report.outcome.assessment.usable)
+    progress->print("vergence: do not use these poses: " + report.outcome.assessment.main_reason);
 }
 
 }  // namespace vergence::app

@@ -356,7 +356,7 @@ ExitCode SessionRunner::run() {
   totals->reference = std::vector<StampedPose>();
   const SessionReport report = write_session_report(request_.out);
   ExitCode code = verdict(*totals, faults, &progress);
-  if (code == ExitCode::done && !report.outcome.usable) code = ExitCode::not_usable;
+  if (code == ExitCode::done && !report.outcome.assessment.usable) code = ExitCode::not_usable;
   print_verdict(report, request_.quiet, &progress);
   return signals_.stop_code().value_or(code);
 }
