@@ -16,8 +16,7 @@ namespace {
 
 /// The words as given; checked when the command runs.
 struct EvaluateArguments {
-  std::string estimate, reference;
-  bool json = false, estimate_ins_extrinsics = false;
+  EvaluationRequest request;
   std::optional<std::string> lengths;  // m
   std::optional<int> step;
   std::string associate = "interpolate";
@@ -92,17 +91,14 @@ EvaluationOptions make_options(const EvaluateArguments& a) {
   return options;
 }
 
-EvaluationRequest evaluate_request(const EvaluateArguments& a) {
-  EvaluationRequest r;
-  r.estimate = a.estimate;
-  r.reference = a.reference;
-  r.options = make_options(a);
-  r.usual_lengths = !a.lengths;
-  r.json = a.json;
-  r.estimate_ins_extrinsics = a.estimate_ins_extrinsics;
-  r.units = parse_pair<TimeUnit>("--time-unit", a.unit, "s, ms, us or ns", parse_time_unit);
+/// The rest of the request, checked when the command runs.
+const EvaluationRequest& complete(EvaluateArguments* a) {
+  EvaluationRequest& r = a->request;
+  r.options = make_options(*a);
+  r.usual_lengths = !a->lengths;
+  r.units = parse_pair<TimeUnit>("--time-unit", a->unit, "s, ms, us or ns", parse_time_unit);
   r.quaternions =
-      parse_pair<QuaternionOrder>("--quaternion", a.quaternion, "xyzw or wxyz", parse_order);
+      parse_pair<QuaternionOrder>("--quaternion", a->quaternion, "xyzw or wxyz", parse_order);
   return r;
 }
 
@@ -112,12 +108,12 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<EvaluateArguments>();
   CLI::App* command = root.add_subcommand(
       "evaluate", "Compare a trajectory with ground truth (ATE, segment errors)");
-  add_option(*command, "ESTIMATE", a->estimate, "Trajectory file, session or data-set directory",
-             "DIR|FILE")
+  add_option(*command, "ESTIMATE", a->request.estimate,
+             "Trajectory file, session or data-set directory", "DIR|FILE")
       ->required();
-  add_option(*command, "REFERENCE", a->reference,
+  add_option(*command, "REFERENCE", a->request.reference,
              "Trajectory file, KITTI or EuRoC directory, or ins.csv", "DIR|FILE");
-  command->add_flag("--json", a->json, "Print JSON");
+  command->add_flag("--json", a->request.json, "Print JSON");
   add_option(*command, "--lengths", a->lengths,
              "Segment lengths in metres [100,200 … 800; shorter on short paths]", "M,…");
   add_option(*command, "--step", a->step,
@@ -141,12 +137,12 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "--quaternion", a->quaternion,
              "Quaternion order of ESTIMATE[,REFERENCE]: xyzw, wxyz [by headings, or xyzw]",
              "ORDER");
-  command->add_flag("--estimate-ins-extrinsics", a->estimate_ins_extrinsics,
+  command->add_flag("--estimate-ins-extrinsics", a->request.estimate_ins_extrinsics,
                     "Estimate lever arm and boresight of the INS");
   command->footer(
       "Example: vergence evaluate sessions/monday truth.tum --json\n"
       "Exit codes: 0 success; 1 no result; 2 bad arguments or input.");
-  command->callback([a, exit_code] { *exit_code = run_evaluation(evaluate_request(*a)); });
+  command->callback([a, exit_code] { *exit_code = run_evaluation(complete(a.get())); });
 }
 
 }  // namespace vergence::app

@@ -10,21 +10,18 @@ namespace {
 
 struct SnapArguments {
   std::vector<std::string> set;
-  std::string configuration, out;
-  int count = 1;
-  double wait_s = 5;
+  std::string configuration;
+  SnapRequest request;
 };
 
-SnapRequest snap_request(const SnapArguments& a) {
-  if (a.count < 1 || a.count > 9999)
+/// The rest of the request, checked when the command runs.
+const SnapRequest& complete(SnapArguments* a) {
+  SnapRequest& r = a->request;
+  if (r.count < 1 || r.count > 9999)
     throw InputError("--count needs a number of sets from 1 to 9999");
-  if (!(a.wait_s > 0 && a.wait_s <= 3600))
+  if (!(r.wait_s > 0 && r.wait_s <= 3600))
     throw InputError("--wait needs seconds, more than 0 and at most 3600");
-  SnapRequest r;
-  r.configuration = load_configuration(a.configuration, a.set);
-  r.out = a.out;
-  r.count = a.count;
-  r.wait_s = a.wait_s;
+  r.configuration = load_configuration(a->configuration, a->set);
   return r;
 }
 
@@ -37,18 +34,18 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "CONFIG", a->configuration,
              "Configuration file; only its cameras and trigger are used", "FILE")
       ->required();
-  add_option(*command, "--out", a->out,
+  add_option(*command, "--out", a->request.out,
              "Directory for images and snap.json; must not exist, or be empty", "DIR")
       ->required();
-  add_option(*command, "--count", a->count, "Number of sets", "N");
-  add_option(*command, "--wait", a->wait_s, "Maximum wait for a set", "SECONDS");
+  add_option(*command, "--count", a->request.count, "Number of sets", "N");
+  add_option(*command, "--wait", a->request.wait_s, "Maximum wait for a set", "SECONDS");
   add_option(*command, "--set", a->set, "Set a configuration key; repeatable", "KEY=VALUE")
       ->allow_extra_args(false);
   command->footer(
       "Example: vergence snap app/config/gige.yaml --out first\n"
       "Exit codes: 0 success; 1 an image is unusable (black, overexposed, identical); "
       "2 bad arguments;\n3 a camera is missing or sent nothing.");
-  command->callback([a, exit_code] { *exit_code = capture_images(snap_request(*a)); });
+  command->callback([a, exit_code] { *exit_code = capture_images(complete(a.get())); });
 }
 
 }  // namespace vergence::app

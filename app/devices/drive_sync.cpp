@@ -3,10 +3,12 @@
 #include <pthread.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -106,19 +108,7 @@ bool is_mock(const CameraSettings& camera) {
   return camera.driver.empty() || camera.driver == "mock";
 }
 
-template <class Condition>
-void for_each_camera(const Configuration& c, int cameras, const Condition& condition) {
-  for (int k = 0; k < cameras; ++k) condition(k, c.cameras[static_cast<std::size_t>(k)]);
-}
-
-void check_board(const Configuration& c) {
-  if (c.trigger.driver == "none")
-    refuse(c,
-           "trigger.driver is none, so nothing reports the pulses; set trigger.driver to board, or "
-           "sync.mode to frame_counter (not verified)");
-}
-
-void check_ins_syncout(const Configuration& c, int cameras) {
+void check_ins_syncout(const Configuration& c) {
   if (c.ins.driver != "xsens")
     refuse(c, fmt::format("ins.driver is {}, which has no SyncOut; it takes xsens, its SyncOut "
                           "wired to the cameras",
@@ -129,90 +119,69 @@ void check_ins_syncout(const Configuration& c, int cameras) {
     refuse(c, fmt::format("trigger.rate is {} and ins.sync_out_hz {}; the INS triggers the "
                           "cameras, so both are one rate",
                           c.trigger.rate, c.ins.sync_out_hz));
-  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
-    if (is_mock(s))
-      refuse(c, fmt::format("cameras.{}.driver is mock, which no INS triggers; use mode board", k));
-  });
 }
 
-void check_master(const Configuration& c, int cameras) {
-  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
-    if (is_mock(s))
-      refuse(c, fmt::format("cameras.{}.driver is mock, whose cameras are triggered by the mock's "
-                            "board; use mode board",
-                            k));
-    if (k == 0 && s.trigger == CameraTrigger::hardware)
-      refuse(
-          c,
-          "cameras.0.trigger is hardware; camera 0 triggers the others, so it is free or software");
-    if (k > 0 && s.trigger != CameraTrigger::hardware)
-      refuse(c, fmt::format(
-                    "cameras.{}.trigger is {}; camera 0's strobe triggers it, so it is hardware", k,
-                    to_string(s.trigger)));
-  });
-}
-
-void check_bus(const Configuration& c, int cameras) {
-  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
-    if (s.driver != "iidc-1394")
-      refuse(c, fmt::format("cameras.{}.driver is {}; only cameras on one IEEE 1394 bus "
-                            "(iidc-1394) share its cycle timer",
-                            k, s.driver));
-  });
-}
-
-void check_ptp(const Configuration& c, int cameras) {
-  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
-    if (s.driver != "gige")
-      refuse(c, fmt::format("cameras.{}.driver is {}; PTP clocks are those of gige cameras", k,
-                            s.driver));
-    const auto* options = std::get_if<gige::Options>(&s.options);
-    if (options == nullptr || !options->ptp)
-      refuse(c, fmt::format(
-                    "cameras.{}.options does not contain ptp: on, so its clock is not synchronised",
-                    k));
-  });
-}
-
-void check_side_by_side(const Configuration& c, int cameras) {
-  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
-    if (s.half == ImageHalf::whole)
-      refuse(c, fmt::format("cameras.{}.image_half is whole, so it has its own frames; with both "
-                            "images in one frame it is left or right",
-                            k));
-  });
+/// Why camera k does not fit the mode, a message after `cameras.k.`; empty: it does.
+std::string misfit(SyncMode mode, int k, const CameraSettings& s) {
+  const auto* gige = std::get_if<gige::Options>(&s.options);
+  switch (mode) {
+    case SyncMode::ins_syncout:
+      return is_mock(s) ? "driver is mock, which no INS triggers; use mode board" : "";
+    case SyncMode::master_strobe:
+      if (is_mock(s))
+        return "driver is mock, whose cameras are triggered by the mock's board; use mode board";
+      if (k == 0 && s.trigger == CameraTrigger::hardware)
+        return "trigger is hardware; camera 0 triggers the others, so it is free or software";
+      if (k > 0 && s.trigger != CameraTrigger::hardware)
+        return fmt::format("trigger is {}; camera 0's strobe triggers it, so it is hardware",
+                           to_string(s.trigger));
+      return "";
+    case SyncMode::ieee1394_cycle_time:
+      if (s.driver == "iidc-1394") return "";
+      return fmt::format(
+          "driver is {}; only cameras on one IEEE 1394 bus (iidc-1394) share its "
+          "cycle timer",
+          s.driver);
+    case SyncMode::ptp:
+      if (s.driver != "gige")
+        return fmt::format("driver is {}; PTP clocks are those of gige cameras", s.driver);
+      return gige != nullptr && gige->ptp
+                 ? ""
+                 : "options does not contain ptp: on, so its clock is not synchronised";
+    case SyncMode::side_by_side:
+      if (s.half != ImageHalf::whole) return "";
+      return "image_half is whole, so it has its own frames; with both images in one frame it is "
+             "left or right";
+    case SyncMode::board:
+    case SyncMode::frame_counter:
+    case SyncMode::approximate_time:
+      return "";
+  }
+  return "";
 }
 
 void check_mode(const Configuration& c, int cameras) {
-  switch (c.sync.mode) {
-    case SyncMode::board:
-      return check_board(c);
-    case SyncMode::ins_syncout:
-      return check_ins_syncout(c, cameras);
-    case SyncMode::master_strobe:
-      return check_master(c, cameras);
-    case SyncMode::ieee1394_cycle_time:
-      return check_bus(c, cameras);
-    case SyncMode::ptp:
-      return check_ptp(c, cameras);
-    case SyncMode::side_by_side:
-      return check_side_by_side(c, cameras);
-    case SyncMode::frame_counter:
-      if (c.cameras[0].trigger == CameraTrigger::free)
-        throw InputError(
-            "cameras[].trigger is free: nothing makes the cameras expose together, so their "
-            "counters cannot pair the images; "
-            "trigger them, or set sync.mode to approximate_time (both in one frame: side_by_side)");
-      return;
-    case SyncMode::approximate_time:
-      return;
+  if (c.sync.mode == SyncMode::board && c.trigger.driver == "none")
+    refuse(c,
+           "trigger.driver is none, so nothing reports the pulses; set trigger.driver to board, or "
+           "sync.mode to frame_counter (not verified)");
+  if (c.sync.mode == SyncMode::ins_syncout) check_ins_syncout(c);
+  if (c.sync.mode == SyncMode::frame_counter && c.cameras[0].trigger == CameraTrigger::free)
+    throw InputError(
+        "cameras[].trigger is free: nothing makes the cameras expose together, so their counters "
+        "cannot pair the images; trigger them, or set sync.mode to approximate_time (both in one "
+        "frame: side_by_side)");
+  for (int k = 0; k < cameras; ++k) {
+    const std::string why = misfit(c.sync.mode, k, c.cameras[static_cast<std::size_t>(k)]);
+    if (!why.empty()) refuse(c, fmt::format("cameras.{}.{}", k, why));
   }
 }
 
 /// A pulse that comes while a camera still exposes is ignored without a word.
 void check_exposures(const Configuration& c, int cameras) {
   const double shortest_us = 1e6 / c.trigger.rate - c.trigger.dither_us;
-  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+  for (int k = 0; k < cameras; ++k) {
+    const CameraSettings& s = c.cameras[static_cast<std::size_t>(k)];
     const double busy_us = s.trigger_delay_us + s.exposure_us;
     if (busy_us > shortest_us)
       throw InputError(fmt::format(
@@ -224,7 +193,7 @@ void check_exposures(const Configuration& c, int cameras) {
               : "",
           shortest_us, c.trigger.rate,
           c.trigger.dither_us > 0 ? fmt::format(", dither_us {}", c.trigger.dither_us) : ""));
-  });
+  }
 }
 
 /// Default stamp jitter: the V4L2 kernel stamps by the host's clock, the
@@ -253,11 +222,10 @@ SyncOptions sync_options(const Configuration& c, int cameras) {
   o.hold = Duration::seconds(c.sync.timeout_ms * 1e-3);
   o.tolerance = Duration::seconds(c.sync.tolerance_ms * 1e-3);
   o.mode = c.sync.mode;
-  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
-    SyncCameraOptions& camera = o.camera[static_cast<std::size_t>(k)];
-    camera.delay = microseconds(s.trigger_delay_us);
-    camera.jitter = max_jitter(s);
-  });
+  for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
+    o.camera[k].delay = microseconds(c.cameras[k].trigger_delay_us);
+    o.camera[k].jitter = max_jitter(c.cameras[k]);
+  }
   if (const char* message = o.validate())
     throw InputError(fmt::format("sync.mode {}: {}", to_string(c.sync.mode), message));
   return o;
@@ -317,26 +285,21 @@ TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) 
 }
 
 const char* proof_message(SyncMode mode) noexcept {
-  switch (mode) {
-    case SyncMode::board:
-      return "pairs are verified by the board's numbered pulses";
-    case SyncMode::ins_syncout:
-      return "pairs are verified by the numbered pulses of the INS's SyncOut";
-    case SyncMode::master_strobe:
-      return "pairs are verified by the exposures of camera 0, which triggers the others";
-    case SyncMode::ieee1394_cycle_time:
-      return "pairs are verified by stamps of one bus clock";
-    case SyncMode::ptp:
-      return "pairs are verified by stamps of one PTP clock";
-    case SyncMode::side_by_side:
-      return "pairs are verified: both images are in one frame";
-    case SyncMode::frame_counter:
-      return "pairing is not verified: sync.mode is frame_counter (counters and stamps are "
-             "compared)";
-    case SyncMode::approximate_time:
-      return "pairing is not verified: sync.mode is approximate_time (nearest stamps)";
-  }
-  return "";
+  constexpr std::array kMessages{
+      std::pair{SyncMode::board, "pairs are verified by the board's numbered pulses"},
+      std::pair{SyncMode::ins_syncout,
+                "pairs are verified by the numbered pulses of the INS's SyncOut"},
+      std::pair{SyncMode::master_strobe,
+                "pairs are verified by the exposures of camera 0, which triggers the others"},
+      std::pair{SyncMode::ieee1394_cycle_time, "pairs are verified by stamps of one bus clock"},
+      std::pair{SyncMode::ptp, "pairs are verified by stamps of one PTP clock"},
+      std::pair{SyncMode::side_by_side, "pairs are verified: both images are in one frame"},
+      std::pair{SyncMode::frame_counter,
+                "pairing is not verified: sync.mode is frame_counter (counters and stamps are "
+                "compared)"}};
+  for (const auto& [known, message] : kMessages)
+    if (known == mode) return message;
+  return "pairing is not verified: sync.mode is approximate_time (nearest stamps)";
 }
 
 }  // namespace vergence::app

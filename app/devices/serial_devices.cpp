@@ -10,22 +10,9 @@
 namespace vergence::app {
 
 void refuse_device(DeviceStatus status, const std::string& message) {
-  switch (status) {
-    case DeviceStatus::unsupported:
-    case DeviceStatus::bad_configuration:
-    case DeviceStatus::no_bandwidth:
-      throw InputError(message);
-    case DeviceStatus::ok:
-    case DeviceStatus::timeout:
-    case DeviceStatus::stopped:
-    case DeviceStatus::ended:
-    case DeviceStatus::disconnected:
-    case DeviceStatus::not_found:
-    case DeviceStatus::no_permission:
-    case DeviceStatus::busy:
-    case DeviceStatus::failed:
-      break;
-  }
+  if (status == DeviceStatus::unsupported || status == DeviceStatus::bad_configuration ||
+      status == DeviceStatus::no_bandwidth)
+    throw InputError(message);
   throw DeviceError(message);
 }
 

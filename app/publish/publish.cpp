@@ -53,18 +53,22 @@ std::string read_token(const std::filesystem::path& file) {
 
 }  // namespace
 
-Publishing::Publishing(const Configuration& configuration) {
-  const PublishSettings& settings = configuration.publish;
+Publishing::Publishing(bool page, Configuration* configuration, SessionOptions* session) {
+  PublishSettings& settings = configuration->publish;
+  if (page && settings.http.empty()) settings.http = "127.0.0.1:8080";
   if (!settings.pose_stream.empty()) {
     const LineAddress address = parse_line_address(settings.pose_stream, "publish.pose_stream");
     try {
       lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.pose_stream"),
-                                               &requests_, configuration.calibration);
+                                               &requests_, configuration->calibration);
     } catch (const InputError& e) {
       fmt::print(stderr, "vergence: {}; the run continues without the pose stream\n", e.what());
     }
   }
-  if (!settings.http.empty()) open_page(configuration);
+  if (!settings.http.empty()) open_page(*configuration);
+  if (page_) session->observers.push_back(page_.get());
+  if (lines_) session->observers.push_back(lines_.get());
+  session->requests = &requests_;
 }
 
 void Publishing::open_page(const Configuration& configuration) {
@@ -80,26 +84,15 @@ void Publishing::open_page(const Configuration& configuration) {
     page_ = make_live_page(options, &requests_,
                            [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
     // Behind a # it is not part of a request, so it appears in no log.
-    link_ = settings.token_file.empty()
-                ? fmt::format("http://{}/#{}", options.address.link().text(), options.policy.token)
-                : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
-                              options.address.link().text(), settings.token_file);
+    fmt::print(
+        stderr, "live page: {}\n",
+        settings.token_file.empty()
+            ? fmt::format("http://{}/#{}", options.address.link().text(), options.policy.token)
+            : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
+                          options.address.link().text(), settings.token_file));
   } catch (const InputError& e) {
     fmt::print(stderr, "vergence: {}; the run continues without the live page\n", e.what());
   }
-}
-
-void page_by_default(Configuration* configuration) {
-  if (configuration->publish.http.empty()) configuration->publish.http = "127.0.0.1:8080";
-}
-
-void Publishing::attach(SessionOptions* session) {
-  if (page_) {
-    session->observers.push_back(page_.get());
-    fmt::print(stderr, "live page: {}\n", link_);
-  }
-  if (lines_) session->observers.push_back(lines_.get());
-  session->requests = &requests_;
 }
 
 }  // namespace vergence::app

@@ -1,6 +1,5 @@
 #pragma once
 #include <memory>
-#include <string>
 
 #include "app/config/configuration.hpp"
 #include "app/publish/line_publisher.hpp"
@@ -16,11 +15,9 @@ namespace vergence::app {
 /// directory), a message goes to stderr and the session runs without it.
 class Publishing {
  public:
-  explicit Publishing(const Configuration& configuration);
-
-  /// Adds its observers and viewers' requests to the session, and prints the page's address on
-  /// stderr.
-  void attach(SessionOptions* session);
+  /// With `page`, serves the live page on this machine if no address is configured. Gives *session
+  /// its observers and requests, and prints the page's address on stderr.
+  Publishing(bool page, Configuration* configuration, SessionOptions* session);
 
  private:
   void open_page(const Configuration& configuration);
@@ -28,10 +25,6 @@ class Publishing {
   SessionRequests requests_;
   std::unique_ptr<LinePublisher> lines_;  // outlives the page, which shows its latency
   std::unique_ptr<SessionObserver> page_;
-  std::string link_{};  // to the page, for a person to open
 };
-
-/// Enables the live page on this machine (`--live-page`) if no address is configured.
-void page_by_default(Configuration* configuration);
 
 }  // namespace vergence::app

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -105,30 +106,15 @@ std::vector<Line> thin(std::span<const double> x, std::span<const double> y,
 namespace {
 
 void append_escaped(std::string* out, std::string_view character) {
-  switch (character[0]) {
-    case '&':
-      *out += "&amp;";
+  constexpr std::array<std::pair<char, const char*>, 5> kEntities{
+      {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}}};
+  const char c = character[0];
+  for (const auto& [special, entity] : kEntities)
+    if (c == special) {
+      *out += entity;
       return;
-    case '<':
-      *out += "&lt;";
-      return;
-    case '>':
-      *out += "&gt;";
-      return;
-    case '"':
-      *out += "&quot;";
-      return;
-    case '\'':
-      *out += "&#39;";
-      return;
-    default:
-      break;
-  }
-  const auto c = static_cast<unsigned char>(character[0]);
-  if (c < 0x20 || c == 0x7f)
-    *out += ' ';
-  else
-    *out += character;
+    }
+  *out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? " " : character;
 }
 
 constexpr double kLargestCoordinate = 1e6;  // far outside every picture

@@ -27,31 +27,34 @@ void install(int number, void (*handler)(int), bool once, struct sigaction* form
   sigaction(number, &action, former);  // fails only for numbers that cannot be caught
 }
 
+struct Handled {
+  int number;
+  void (*handler)(int);
+  bool once;
+};
+// A reader of our output that goes, a file at its limit: the write that fails says so.
+const std::array<Handled, 7> kHandled{{{SIGHUP, record_signal, true},
+                                       {SIGINT, record_signal, true},
+                                       {SIGTERM, record_signal, true},
+                                       {SIGUSR1, record_calibration_request, false},
+                                       {SIGPIPE, SIG_IGN, false},
+                                       {SIGXFSZ, SIG_IGN, false},
+                                       {SIGUSR2, SIG_IGN, false}}};
+
 }  // namespace
 
 SignalGuard::SignalGuard() {
   caught.store(0);
   calibration_asked.store(false);
-  install(SIGINT, record_signal, true, &former_interrupt_);
-  install(SIGTERM, record_signal, true, &former_terminate_);
-  install(SIGHUP, record_signal, true, &former_hangup_);
-  if (former_hangup_.sa_handler == SIG_IGN)  // nohup: the drive is to outlive its terminal
+  for (std::size_t i = 0; i < kHandled.size(); ++i)
+    install(kHandled[i].number, kHandled[i].handler, kHandled[i].once, &former_[i]);
+  if (former_[0].sa_handler == SIG_IGN)  // nohup: the run is to outlive its terminal
     install(SIGHUP, SIG_IGN, false, nullptr);
-  install(SIGUSR1, record_calibration_request, false, &former_user_);
-  // A reader of our output that goes, a file at its limit: the write that fails says so.
-  install(SIGPIPE, SIG_IGN, false, &former_pipe_);
-  install(SIGXFSZ, SIG_IGN, false, &former_file_size_);
-  install(SIGUSR2, SIG_IGN, false, &former_user2_);
 }
 
 SignalGuard::~SignalGuard() {
-  sigaction(SIGINT, &former_interrupt_, nullptr);
-  sigaction(SIGTERM, &former_terminate_, nullptr);
-  sigaction(SIGHUP, &former_hangup_, nullptr);
-  sigaction(SIGUSR1, &former_user_, nullptr);
-  sigaction(SIGPIPE, &former_pipe_, nullptr);
-  sigaction(SIGXFSZ, &former_file_size_, nullptr);
-  sigaction(SIGUSR2, &former_user2_, nullptr);
+  for (std::size_t i = 0; i < kHandled.size(); ++i)
+    sigaction(kHandled[i].number, &former_[i], nullptr);
 }
 
 bool SignalGuard::stop_requested() const noexcept {

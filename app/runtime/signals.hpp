@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <csignal>
 #include <optional>
 
@@ -28,13 +29,7 @@ class SignalGuard {
   [[nodiscard]] bool poll_calibration_request() const noexcept;
 
  private:
-  struct sigaction former_interrupt_ {};
-  struct sigaction former_terminate_ {};
-  struct sigaction former_user_ {};
-  struct sigaction former_hangup_ {};
-  struct sigaction former_pipe_ {};
-  struct sigaction former_file_size_ {};
-  struct sigaction former_user2_ {};
+  std::array<struct sigaction, 7> former_{};  // in the order of their installation
 };
 
 }  // namespace vergence::app
