@@ -101,10 +101,6 @@ void CalibrationFrames::want(std::size_t frames) noexcept {
   wanted_ = std::max(std::min(most(), frames), logged_ + kNewFrames);
 }
 
-void CalibrationFrames::want_more() noexcept {
-  wanted_ = std::min(most(), std::max(solved_frames_ + least(), logged_));
-}
-
 std::size_t CalibrationFrames::most() const noexcept {
   return static_cast<std::size_t>(options_.max_frames);
 }

@@ -50,9 +50,6 @@ class CalibrationFrames {
   void want(std::size_t frames) noexcept;
   /// Makes the next solve wait until the log holds `frames` frames.
   void want_new(std::size_t frames) noexcept { wanted_ = logged_ - log_.size() + frames; }
-  /// Makes the next solve wait until it has least() frames more than the newest solve, or a full
-  /// segment.
-  void want_more() noexcept;
   void want_full() noexcept { wanted_ = most(); }
   [[nodiscard]] std::size_t most() const noexcept;
   /// Minimum number of frames of the first solve of an estimation.

@@ -306,7 +306,8 @@ void OnlineCalibrator::plan_refinement() noexcept {
     frames_.begin_segment(found.newest + 1);
     frames_.want_full();
   } else {
-    frames_.want_more();
+    // Sigmas fall with the root of the number of frames.
+    frames_.want(2 * frames_.solved_frames());
   }
 }
 
