@@ -261,7 +261,9 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
     MonitorResult v;
     if (!map_reset_pending_) {
       v = monitor_verdict(k, odometry, outcome, frame, found, moving);
-      rig.margins.change = std::max(rig.margins.change, v.statistic / options_.threshold);
+      // One frame over the threshold decides nothing until the next one confirms it.
+      if (!v.undecided)
+        rig.margins.change = std::max(rig.margins.change, v.statistic / options_.threshold);
     }
     // A lag moves matches off the epipolar lines, and changes disparities whenever the speed
     // changes. So no change of the rig is reported while cameras may be out of sync.
