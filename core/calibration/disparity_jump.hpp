@@ -36,7 +36,7 @@ struct DisparityJump {
 /// motion along the optical axis, proportional to d/Z. A constant calibration error also has
 /// residuals proportional to d/Z, which the fit absorbs, so the test works before the calibration
 /// is known. On recorded sequences 95 % of the shifts are below 0.26 px, the largest is 0.68 px and
-/// reverts (build/bench/calibration_bench jumps); 0.1° shift KITTI's disparities by 1.25 px. The
+/// reverts (build/bench/margin_bench); 0.1° shift KITTI's disparities by 1.25 px. The
 /// shift of a single distorted image reverts in the next frame.
 ///
 /// Memory   From the arena; tracks beyond `capacity` are left out.
