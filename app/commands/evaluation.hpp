@@ -15,7 +15,7 @@ struct EvaluationRequest {
   /// Empty if the estimate's session has an INS.
   std::filesystem::path reference;
   EvaluationOptions options{};
-  /// Of options.segments, uses the longest that fit into the path.
+  /// Uses the longest of options.segments that fit into the path.
   bool usual_lengths = true;
   bool json = false;
   bool estimate_ins_extrinsics = false;

@@ -37,7 +37,8 @@ struct RefinedPose {
   /// Standard deviation of the rotation in its worst direction, in rad, marginalised over the
   /// translation.
   double rotation_sigma = 0;
-  /// The same for the camera position, in metres; large values mean weak geometry.
+  /// Standard deviation of the camera position in its worst direction, in metres, marginalised over
+  /// the rotation; large values mean weak geometry.
   double translation_sigma = 0;
 
   /// Robust residual scale in input sigmas, ≥ min_scale.

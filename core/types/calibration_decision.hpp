@@ -78,7 +78,7 @@ struct CalibrationDecision {
   /// Log odds for the previous calibration over those that decide: Assessment::certainty.
   double certainty = 0;
   FocalMeasurement focal{};
-  ///
+  /// Time that the solve took on the solver's thread.
   double solve_ms = 0;
 };
 

@@ -134,7 +134,7 @@ ClockStep SampleCounter::next(std::uint16_t counter, std::int64_t expected_steps
   }
   const auto d = static_cast<std::uint16_t>(counter - last_);
   last_ = counter;
-  // Of the steps that the 16 bits allow, takes the one nearest to the elapsed time.
+  // Takes the step allowed by the 16 bits that is nearest to the elapsed time.
   constexpr std::int64_t kWrap = 65536, kTolerance = 2048;
   const std::int64_t wraps = (expected_steps - d + kWrap / 2) / kWrap;
   const std::int64_t steps = d + std::max<std::int64_t>(0, wraps) * kWrap;

@@ -37,9 +37,9 @@ struct Sentence {
   /// Heading of the body, clockwise from true north (HDT).
   std::optional<double> heading_deg;
   std::optional<double> hdop;
-  /// Of GST.
+  /// Standard deviations (GST).
   std::optional<double> latitude_sigma_m, longitude_sigma_m, altitude_sigma_m;
-  /// Of GGA: 0 none, 1 to 5 a fix, 6 dead reckoning, …
+  /// Fix quality (GGA): 0 none, 1 to 5 a fix, 6 dead reckoning, …
   std::uint8_t quality = 0;
   std::uint8_t satellites = 0;
   /// True for status A of RMC.

@@ -68,7 +68,7 @@ struct RosCameraInfo {
   RosCrop crop{};
   /// Phrase about why it is invalid for raw images; empty if valid.
   std::string fault{};
-  /// The same for rectified images.
+  /// Phrase about why it is invalid for rectified images; empty if valid.
   std::string fault_rectified{};
 };
 [[nodiscard]] std::optional<RosCameraInfo> read_ros_camera_info(

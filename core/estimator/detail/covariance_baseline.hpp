@@ -15,7 +15,7 @@ namespace vergence {
 /// report.
 ///
 /// Without faults no motion is more than 1.6 times as uncertain as the baseline on recorded
-/// sequences, and 2.3 times on the rendered street (build/bench/covariance_bench). Cameras out of
+/// sequences, and 2.3 times on the rendered street (build/bench/margin_bench). Cameras out of
 /// sync give more than 4 times, a tunnel 3 times (FaultPairs.imageLateAfterALostOneIsNotOk).
 ///
 /// Not thread-safe. Does not allocate.

@@ -86,7 +86,7 @@ struct Estimator::Parts {
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
   CovarianceBaseline usual{};
-  // Of the last frame.
+  // Margins of the decisions on the last frame.
   DecisionMargins margins{};
   DegradationLedger degradations{};
   // Standard deviation of all lengths, in percent, from the calibration in use.

@@ -39,7 +39,7 @@ class BlockCounter {
     wide_ = wide_ || id > static_cast<std::uint64_t>(kIds);
     auto ahead = static_cast<std::int64_t>(id - newest_);
     if (!wide_) {
-      // Of all values congruent to this 16-bit id, the nearest to the newest is taken.
+      // Takes the value congruent to this 16-bit id that is nearest to the newest one.
       ahead %= kIds;
       if (ahead > kIds / 2) ahead -= kIds;
       if (ahead < -(kIds / 2)) ahead += kIds;
