@@ -163,7 +163,8 @@ Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
 /// Pairs by the nearest times of recording; nothing where there are none, or they do not decide.
 std::vector<std::array<std::size_t, 2>> pair_by_recording(
     const std::array<std::vector<BagImage>, 2>& images, Duration interval) {
-  constexpr double kNear = 0.25;  // of the interval: far from both neighbours
+  // The share of the interval keeps clear of both neighbours.
+  constexpr double kNear = 0.25;
   auto pairs = pair_nearest(recorded(images[0]), recorded(images[1]),
                             Duration::seconds(kNear * interval.to_seconds()));
   if (2 * pairs.size() < std::min(images[0].size(), images[1].size())) pairs.clear();
@@ -175,7 +176,7 @@ std::vector<std::array<std::size_t, 2>> pair_by_recording(
 std::vector<std::array<std::size_t, 2>> pair_images(
     const fs::path& path, const Topics& topics, const std::array<std::vector<BagImage>, 2>& images,
     StereoSequence* sequence) {
-  constexpr double kHalf = 0.5;  // of the interval
+  constexpr double kHalf = 0.5;
   const std::array stamps{collect_stamps(images[0]), collect_stamps(images[1])};
   const Duration interval = usual_interval(stamps[0]);
   const Duration most = Duration::seconds(kMaxApart * interval.to_seconds());

@@ -9,10 +9,12 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kDecimals = 9;  // of a second in nanoseconds
-constexpr int kMaxExponent =
-    100;  // of a number as written; beyond, it is 0 or no time of this universe
-constexpr std::size_t kMaxText = 64;  // longer text is not a number
+// A second has this many decimals in nanoseconds.
+constexpr int kDecimals = 9;
+// A larger exponent means 0 or a time far outside of 64 bits.
+constexpr int kMaxExponent = 100;
+// Longer text is not a number.
+constexpr std::size_t kMaxText = 64;
 
 bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 
@@ -68,9 +70,11 @@ std::optional<std::int64_t> parse_decimal(std::string_view text, int decimals) n
   const std::optional<Digits> d = read_digits(text);
   if (!d) return std::nullopt;
   std::uint64_t ns = 0;
-  const int requested = d->point + decimals;  // digits before the point of the result
+  // Number of digits before the point of the result.
+  const int requested = d->point + decimals;
   for (int i = 0; i < requested; ++i) {
-    if (i >= d->count && ns == 0) break;  // only zeros follow zeros
+    // Only zeros follow zeros.
+    if (i >= d->count && ns == 0) break;
     if (!append(&ns, i < d->count ? d->digit[i] - '0' : 0)) return std::nullopt;
   }
   if (requested >= 0 && requested < d->count && d->digit[requested] >= '5' &&

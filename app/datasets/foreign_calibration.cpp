@@ -74,7 +74,8 @@ Transform to_transform(const Fact& fact) {
   Transform T;
   T.R << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
   T.t << v[3], v[7], v[11];
-  if (accept_rotation(T.R)) T.R = normalised(T.R);  // else find_implausible() judges it
+  // find_implausible() refuses other matrices.
+  if (accept_rotation(T.R)) T.R = normalised(T.R);
   return T;
 }
 
@@ -285,7 +286,8 @@ class RigReader {
   }
 
   void read_size(int k) {
-    constexpr double kLargest = 1 << 16;  // px
+    // In px.
+    constexpr double kLargest = 1 << 16;
     const Fact *width = find("width", k), *height = find("height", k), *size = find("size", k);
     if (width == nullptr || height == nullptr) width = size;
     std::vector<double> sides;
@@ -458,7 +460,8 @@ void add_named_files(std::vector<YamlFile>* files) {
 /// A lens in the middle of a half or a quarter of its image is one of binned images, whose file has
 /// the size of the sensor.
 void check_binning(const std::string& name, const Intrinsics& lens) {
-  constexpr double kNear = 0.12;  // of the image
+  // Share of the image.
+  constexpr double kNear = 0.12;
   const auto off = [&](double parts) {
     return std::max(std::abs(parts * lens.cx / lens.width - 0.5),
                     std::abs(parts * lens.cy / lens.height - 0.5));
@@ -494,7 +497,8 @@ namespace detail {
 std::vector<std::filesystem::path> split_files(const std::string& text, bool folder) {
   if (folder) return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
   std::error_code ignored;
-  if (fs::exists(text, ignored)) return {text};  // a name may have a comma, too
+  // A name may contain a comma.
+  if (fs::exists(text, ignored)) return {text};
   std::vector<fs::path> files;
   std::istringstream parts(text);
   for (std::string part; std::getline(parts, part, ',');) files.emplace_back(part);

@@ -157,7 +157,8 @@ ImageFileStatus FrameDecoder::read(const std::string& name, ImageSize size, std:
     if (const auto status = read_image_file(sequence_.root / name, &work->bytes);
         status != ImageFileStatus::ok)
       return status;
-  } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
+  } catch (const std::bad_alloc&) {
+    // The file does not fit this machine's memory.
     return ImageFileStatus::unreadable;
   }
   return decode_grey(work->bytes, size, out, stride, sequence_.deep_bits);

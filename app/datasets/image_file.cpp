@@ -16,8 +16,8 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr off_t kMaxFile = off_t{256}
-                           << 20;  // bytes; a 100-megapixel grey PNG that does not compress is less
+// In bytes. An incompressible grey PNG of 100 megapixels is smaller.
+constexpr off_t kMaxFile = off_t{256} << 20;
 
 /// Null: none that is read.
 const detail::ImageKind* detect_kind(Bytes bytes) noexcept {
@@ -46,7 +46,8 @@ ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
     const ssize_t n = ::read(in.get(), bytes->data() + got, bytes->size() - got);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return ImageFileStatus::unreadable;
-    if (n == 0) break;  // became shorter meanwhile: the checks of the content see it
+    // The file became shorter; the checks of the content detect it.
+    if (n == 0) break;
     got += static_cast<std::size_t>(n);
   }
   bytes->resize(got);

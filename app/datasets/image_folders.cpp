@@ -22,9 +22,12 @@ namespace fs = std::filesystem;
 
 /// The images of one camera, in order of their names, and where they lie.
 struct Camera {
-  std::string below{};               // the folder, relative to the drive's
-  std::vector<std::string> names{};  // with their folder
-  std::string side{};                // what in a name tells the camera, in small letters
+  // Directory relative to the data set.
+  std::string below{};
+  // Names with their directory.
+  std::vector<std::string> names{};
+  // Word in lower case that identifies the camera in a name.
+  std::string side{};
   [[nodiscard]] std::string in_folder(const std::string& file) const {
     return below.empty() ? file : below + "/" + file;
   }
@@ -106,7 +109,8 @@ std::vector<std::string> list_images(const fs::path& root, const std::string& be
   require_folder(folder, "images");
   std::vector<std::string> names = list_entries(folder, false);
   if (names.empty()) {
-    std::string advice;  // by the ending of a file that is none
+    // Advice by the extension of a file that cannot be read.
+    std::string advice;
     std::error_code error;
     for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
       if (const fs::path& file = it->path(); file.has_extension() && file.stem() != "")
@@ -309,10 +313,14 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
 
 /// Layout of a data set's times.
 struct Lists {
-  std::optional<fs::path> shared{};              // of both cameras
-  std::array<std::optional<fs::path>, 2> own{};  // of each
-  std::optional<TimeUnit> unit{};  // of times that do not count from 1970, where it is fixed
-  bool by_number = false;          // line N is of image N, counted from 0
+  // List of both cameras.
+  std::optional<fs::path> shared{};
+  // List of each camera.
+  std::array<std::optional<fs::path>, 2> own{};
+  // Fixed unit of times that do not count from 1970.
+  std::optional<TimeUnit> unit{};
+  // True if line N is that of image N, counted from 0.
+  bool by_number = false;
 };
 
 /// `name_of_euroc`: what EuRoC calls the list in a camera's folder; elsewhere it may be anything.
@@ -469,7 +477,8 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
 
 /// Interval assumed without a list of times. Motion is predicted by frames, so a wrong rate affects
 /// stamps and not poses.
-constexpr std::int64_t kAssumedStep = 100'000'000;  // ns
+// In ns.
+constexpr std::int64_t kAssumedStep = 100'000'000;
 
 std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* cameras,
                                            StereoSequence* sequence) {
@@ -571,7 +580,8 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
 /// The kind of pixels that a PNG says in its head.
 bool is_colour(const fs::path& file) {
   constexpr std::size_t kKindAt = 25;
-  constexpr std::uint8_t kColours = 2;  // bit of the kind
+  // Bit of the colour type.
+  constexpr std::uint8_t kColours = 2;
   std::vector<std::uint8_t> bytes;
   return read_image_file(file, &bytes) == ImageFileStatus::ok && bytes.size() > kKindAt &&
          bytes[0] == 0x89 && (bytes[kKindAt] & kColours) != 0;
@@ -590,7 +600,8 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   if (auto found = find_cameras(folder); found && !sequence.side_by_side)
     cameras = std::move(*found);
   else
-    for (std::size_t k = 0; k < 2; ++k)  // left and right are to be named as missing
+    // Left and right are reported as missing.
+    for (std::size_t k = 0; k < 2; ++k)
       cameras[k].below = sequence.side_by_side ? "both" : k == 0 ? "left" : "right";
   // Images in DRIVE/left and DRIVE/right below the folder: the calibration and the times are
   // theirs.

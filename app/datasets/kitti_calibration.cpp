@@ -23,7 +23,8 @@ class Text {
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored))
       refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
-    constexpr std::size_t kLargest = std::size_t{1} << 20U;  // bytes
+    // In bytes.
+    constexpr std::size_t kLargest = std::size_t{1} << 20U;
     text_ = read_text(file, kLargest);
     Lines lines(text_);
     for (std::string_view line; lines.next(&line);) {
@@ -74,7 +75,8 @@ class Text {
 
   [[nodiscard]] ImageSize size(const std::string& key) const {
     const auto v = numbers<2>(key);
-    constexpr int kWidest = 1 << 15;  // px
+    // In px.
+    constexpr int kWidest = 1 << 15;
     if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest))
       fail(key, "is no size of an image");
     return {static_cast<int>(v[0]), static_cast<int>(v[1])};
@@ -115,7 +117,8 @@ Intrinsics read_camera(const Text& text, int number, bool rectified, Transform* 
     lens = text.projection(key("P_rect", number), &T_camera_camera0->t);
   } else {
     const auto K = text.numbers<9>(key("K", number));
-    lens.distortion = text.numbers<5>(key("D", number));  // k1 k2 p1 p2 k3
+    // The order is k1 k2 p1 p2 k3.
+    lens.distortion = text.numbers<5>(key("D", number));
     lens.fx = K[0], lens.fy = K[4], lens.cx = K[2], lens.cy = K[5];
     if (!(lens.fx > 0 && lens.fy > 0) || K[1] != 0 || K[3] != 0 || K[8] != 1)
       text.fail(key("K", number), "is not [fx 0 cx; 0 fy cy; 0 0 1] with positive focal lengths");
@@ -180,7 +183,8 @@ KittiRawRig read_kitti_raw_rig(const KittiRawFolders& folders, const std::array<
   out.T_left_camera0 = T_camera_camera0[0];
   out.rig.T_camera_left[1] = T_camera_camera0[1] * T_camera_camera0[0].inverse();
   if (are_rectified)
-    out.rig.T_camera_left[1].R = Mat3::Identity();  // without the rounding of a product
+    // This avoids the rounding of the product.
+    out.rig.T_camera_left[1].R = Mat3::Identity();
   out.rig.baseline = out.rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&out.rig)) refuse(file, 0, bad->message);
   return out;

@@ -21,22 +21,32 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kFields = 30;
-constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;  // bytes
+// In bytes.
+constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;
 
 /// The columns of a packet that are read; order and units are those of the development kit (its
 /// dataformat.txt).
 enum Column : std::size_t {
-  latitude,                // deg
-  longitude,               // deg
-  altitude,                // m
-  roll,                    // rad, positive with the left side up
-  pitch,                   // rad, positive with the front down
-  yaw,                     // rad, 0 is east, counter-clockwise
-  to_north,                // m/s
-  to_east,                 // m/s
-  upward = 10,             // m/s, perpendicular to the earth's surface
-  position_accuracy = 23,  // m, north and east
-  velocity_accuracy = 24,  // m/s, north and east
+  // In degrees.
+  latitude,
+  longitude,
+  // In m.
+  altitude,
+  // In rad, positive with the left side up.
+  roll,
+  // In rad, positive with the front down.
+  pitch,
+  // In rad from east, counter-clockwise.
+  yaw,
+  // In m/s.
+  to_north,
+  to_east,
+  // In m/s, perpendicular to the ellipsoid.
+  upward = 10,
+  // In m, north and east.
+  position_accuracy = 23,
+  // In m/s, north and east.
+  velocity_accuracy = 24,
   navigation_status = 25,
   satellites = 26,
   position_mode = 27,
@@ -45,11 +55,11 @@ enum Column : std::size_t {
 // Specified accuracy of the unit, an RT3003 with two antennas: its packets have accuracies of place
 // and velocity alone.
 constexpr double kTiltSigma = 0.03 * kRadiansPerDegree, kHeadingSigma = 0.1 * kRadiansPerDegree;
-constexpr double kHeightOverPlace =
-    2;  // a receiver's height is about so much less accurate than its place
+// Heights of a receiver are less accurate than its horizontal position by about this factor.
+constexpr double kHeightOverPlace = 2;
 
-constexpr int kLocked =
-    4;  // navigation status of a unit whose figures are valid; below it is starting
+// Navigation status of a unit with valid data; lower values mean that it is starting.
+constexpr int kLocked = 4;
 
 /// Position modes of the unit's protocol (NCOM): 3 single point, 4 differential, 5 and 6 real-time
 /// kinematic, 7 to 9 and 13 to 18 further corrections. 0 none, 1 searching, 2 and 12 Doppler alone,
@@ -77,7 +87,8 @@ std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   s.position = {v[latitude], v[longitude], v[altitude]};
   const double largest = std::max({std::abs(v[roll]), std::abs(v[pitch]), std::abs(v[yaw])});
   if (!s.position.plausible() || largest > 3 * std::numbers::pi)
-    return std::nullopt;  // degrees, or other columns
+    // These are degrees, or other columns.
+    return std::nullopt;
   const int used = whole(v[satellites]), status = whole(v[navigation_status]),
             mode = whole(v[position_mode]);
   s.fix = to_fix_status(status, used, mode);
@@ -120,7 +131,8 @@ Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) 
     std::optional<InsRecord> reading;
     try {
       reading = parse_packet(read_text(data / name, kLongestPacket));
-    } catch (const InputError&) {  // not readable, or longer than a packet: one more that is broken
+    } catch (const InputError&) {
+      // A file that is unreadable or longer than a packet counts as damaged.
     }
     if (!reading) {
       if (out.broken++ == 0) out.first_broken = name;
@@ -171,7 +183,8 @@ bool is_drive(const fs::path& folder) {
 /// The folder itself, or what lies one or two folders below.
 std::vector<fs::path> drives_in(const fs::path& folder) {
   if (is_drive(folder)) return {folder};
-  constexpr std::size_t kMaxFolders = 1000;  // that are looked into
+  // Maximum number of searched directories.
+  constexpr std::size_t kMaxFolders = 1000;
   std::vector<fs::path> found;
   std::size_t looked = 0;
   std::error_code error;

@@ -19,10 +19,12 @@ namespace {
 namespace fs = std::filesystem;
 using detail::RosReader;
 
-constexpr std::size_t kMaxSmall = 65536;                       // bytes of a message that is none
-                                                               // of images
-constexpr std::size_t kMaxDescription = std::size_t{4} << 20;  // bytes
-constexpr std::size_t kMaxFrames = 4'000'000;                  // 37 hours at 30 Hz
+// Maximum size of a message without an image, in bytes.
+constexpr std::size_t kMaxSmall = 65536;
+// In bytes.
+constexpr std::size_t kMaxDescription = std::size_t{4} << 20;
+// 37 hours at 30 Hz.
+constexpr std::size_t kMaxFrames = 4'000'000;
 
 /// The check sum that ends a message is that of what stands before it.
 bool check(std::span<const std::uint8_t> bytes, RosReader* in) {
@@ -47,8 +49,10 @@ std::optional<FrameRecord> read_frame(std::span<const std::uint8_t> bytes) {
   for (std::uint32_t& crc : f.image_crc) crc = in.get<std::uint32_t>();
   f.recalibration_requested = in.get<std::uint8_t>() != 0;
   f.solver_done = in.get<std::uint8_t>() != 0;
-  for (int i = 0; i < 3; ++i) (void)in.get<std::uint8_t>();  // state, status, reason
-  (void)in.doubles<7>();                                     // the pose
+  // State, status and reason are skipped.
+  for (int i = 0; i < 3; ++i) (void)in.get<std::uint8_t>();
+  // The pose is skipped.
+  (void)in.doubles<7>();
   (void)in.get<std::int32_t>();
   (void)in.get<double>();
   (void)in.get<float>();
@@ -101,9 +105,11 @@ struct RecordedSession::Files {
 struct RecordedSession::Reader {
   RecordedSession* session;
   const fs::path& folder;
-  std::map<std::string, std::size_t> cameras{};  // topics of images
+  // Camera indices by image topic.
+  std::map<std::string, std::size_t> cameras{};
   bool described = false;
-  std::array<RecordedImage, kMaxCameras> newest{};  // not yet of a frame
+  // Newest images that do not belong to a frame yet.
+  std::array<RecordedImage, kMaxCameras> newest{};
   std::array<Stamp, kMaxCameras> newest_stamp{};
   std::size_t broken = 0, images_lost = 0;
 

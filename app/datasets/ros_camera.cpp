@@ -11,11 +11,12 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kSameRectification =
-    1e-6;  // relative: focal lengths of the two projection matrices
+// Relative difference of the focal lengths of the two projection matrices.
+constexpr double kSameRectification = 1e-6;
 
 struct Model {
-  std::string_view words;  // in small letters and digits
+  // Names in lower-case letters and digits.
+  std::string_view words;
   CameraModelKind kind;
 };
 constexpr std::array kModels{

@@ -15,7 +15,8 @@ namespace {
 
 // s: faster than any stereo camera; farther than motion can be predicted across
 constexpr double kShortestStep = 1e-3, kLongestStep = 10;
-constexpr std::size_t kSampledPairs = 5;  // pairs, spread over the drive: a tunnel is not all of it
+// The pairs are spread over the sequence, because a part of it may be dark.
+constexpr std::size_t kSampledPairs = 5;
 
 /// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
 std::optional<std::uint16_t> find_peak(const StereoSequence& s, const std::string& name,
@@ -32,7 +33,8 @@ std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_s
 
 void check_times(const StereoSequence& sequence) {
   // Half of what 64 bits hold: no difference of two stamps is beyond them.
-  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;  // ns: 1823 to 2116
+  // In ns: 1823 to 2116.
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
   const std::filesystem::path file = sequence.times.empty() ? sequence.root : sequence.times;
   for (const StereoPair& pair : sequence.pairs)
     if (pair.stamp.ns() > kFarthest || pair.stamp.ns() < -kFarthest)
@@ -41,7 +43,8 @@ void check_times(const StereoSequence& sequence) {
                          "years 1824 and 2116: are these other units, or is the line broken?",
                          pair.stamp.ns(), format_seconds(pair.stamp.ns())));
   if (sequence.pairs.size() < 3) return;
-  std::vector<double> steps;  // s, those forward
+  // Forward steps in s.
+  std::vector<double> steps;
   std::size_t backward = 0;
   for (std::size_t i = 1; i < sequence.pairs.size(); ++i) {
     const double step = (static_cast<double>(sequence.pairs[i].stamp.ns()) -
@@ -76,7 +79,8 @@ void check_times(const StereoSequence& sequence) {
          fmt::format("has pairs that follow one another after {:.4g} s (median); those of a drive "
                      "do after 1 ms to 10 s: are these times in other units?{}",
                      *middle,
-                     file.extension() == ".txt"  // else the format has its one unit
+                     // Other formats have a fixed unit.
+                     file.extension() == ".txt"
                          ? " Whole numbers are read as nanoseconds, numbers with a point as seconds"
                          : ""));
 }

@@ -126,7 +126,9 @@ std::vector<YamlFile> settings_trees(std::string text, const std::string& name) 
     text = from_ini(rest);
   if (text.starts_with("---")) text.replace(0, 3, 3, ' ');
   std::vector<YamlFile> trees;
-  std::string document;  // after as many ends of lines as stand before it
+  // The document follows as many line feeds as precede it in the file, so that line numbers are
+  // right.
+  std::string document;
   constexpr std::size_t kMaxDocuments = 16;
   rest = text;
   for (std::size_t documents = 1;; ++documents) {

@@ -34,7 +34,8 @@ std::optional<std::filesystem::path> find_log(const std::filesystem::path& folde
 }
 
 std::optional<Stamp> stamp_of(std::string_view seconds, std::string_view microseconds) noexcept {
-  constexpr std::int64_t kLatest = 9'000'000'000;  // s: what 64 bits of nanoseconds hold
+  // Maximum number of seconds that 64 bits of nanoseconds hold.
+  constexpr std::int64_t kLatest = 9'000'000'000;
   const auto s = parse_integer(seconds), us = parse_integer(microseconds);
   if (!s || !us || *s < 0 || *s > kLatest || *us < 0 || *us > 999'999) return std::nullopt;
   return Stamp(*s * 1'000'000'000 + *us * 1'000);
@@ -57,9 +58,9 @@ RigCalibration published_calibration() {
   right.fx = 1244.805048771648, right.fy = 1245.815687282771, right.cx = 506.635543659909,
   right.cy = 390.704813552426;
   Transform& T = rig.T_camera_left[1];
-  T.R << 0.999985020769994, 0.001356661749366, -0.005302612991045,  //
-      -0.001329315763428, 0.999985817981778, 0.005157204176297,     //
-      0.005309534370930, -0.005150078078314, 0.999972642396056;
+  T.R << 0.999985020769994, 0.001356661749366, -0.005302612991045, -0.001329315763428,
+      0.999985817981778, 0.005157204176297, 0.005309534370930, -0.005150078078314,
+      0.999972642396056;
   T.t = {-0.7506666877284111, -0.003857678457065100, 0.0030959446910902};
   rig.baseline = T.t.norm();
   return rig;
@@ -101,7 +102,8 @@ constexpr std::array kAxes{Axes{"north, west, up", {0, -1, 0, 1, 0, 0, 0, 0, 1}}
 /// Where a yaw of 0 points, and which way it grows.
 struct Yaw {
   const char* phrase;
-  double zero;  // rad from east
+  // Direction of a yaw of 0, in rad from east.
+  double zero;
   int sign;
   [[nodiscard]] double in_enu(double angle) const { return zero + sign * angle; }
 };
@@ -114,7 +116,8 @@ struct Conventions {
   Mat3 enu_of_velocity{};
   const char* axes = kAxes[0].phrase;
   Yaw yaw = kYaws[0];
-  bool pitch_first = false;  // fields 10 and 11 are pitch and roll
+  // True if fields 10 and 11 are pitch and roll.
+  bool pitch_first = false;
   bool nose_up_positive = false;
 };
 
@@ -123,23 +126,30 @@ Mat3 to_matrix(const Axes& axes) {
       .cast<double>();
 }
 
-constexpr double kFast = 5.0;            // m/s: above it the course is where the vehicle points
-constexpr double kApart = 1.0;           // s between the positions whose difference is the motion
-constexpr std::size_t kEnough = 100;     // samples: below, nothing is decided
-constexpr double kMinCorrelation = 0.3;  // correlation from which the slope decides about pitch
-constexpr std::size_t kMaxBroken = 100;  // one line in so many
+// In m/s. Above this speed the course is the heading.
+constexpr double kFast = 5.0;
+// Time in s between the positions whose difference gives the motion.
+constexpr double kApart = 1.0;
+// With fewer samples the axes are not determined.
+constexpr std::size_t kEnough = 100;
+// Minimum correlation at which the slope determines the pitch field.
+constexpr double kMinCorrelation = 0.3;
+// At most one line in this many may be damaged.
+constexpr std::size_t kMaxBroken = 100;
 
 /// One line as it stands.
 struct Line {
   Stamp stamp{};
   Geodetic place{};
-  Vec3 velocity, angles;  // fields 6 to 8, 9 to 11
+  // Fields 6 to 8 and 9 to 11.
+  Vec3 velocity, angles;
 };
 
 /// A sample with how its position moves, in the axes at the first place.
 struct Moving {
   const Line* line = nullptr;
-  Vec3 motion;  // m/s, east, north, up
+  // In m/s: east, north, up.
+  Vec3 motion;
 };
 
 bool parse_line(std::string_view text, Line* line) noexcept {
@@ -332,7 +342,8 @@ StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
   const std::string text = read_text(log);
   Lines lines(text);
   for (std::string_view line; lines.next(&line);)
-    if (line.find(".bmp") != std::string_view::npos)  // not the header
+    // The header names no image.
+    if (line.find(".bmp") != std::string_view::npos)
       sequence.pairs.push_back(read_pair(log, lines.number(), line, images));
   if (sequence.pairs.empty()) refuse(log, 0, "names no images");
   if (given) return sequence;
@@ -357,7 +368,8 @@ RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
   for (const Line& line : lines) {
     InsRecord reading;
     reading.sample = to_sample(line, conventions, ins.readings.size());
-    reading.quality.filter_valid = true;  // the log tells nothing else
+    // The log has no other quality data.
+    reading.quality.filter_valid = true;
     ins.readings.push_back(reading);
   }
   return ins;

@@ -12,7 +12,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;  // ns
+// In ns.
+constexpr std::int64_t kSecond = 1'000'000'000;
 
 /// Whole decimal number of just so many digits, at most `most`. −1: it is none.
 int digits(std::string_view text, int most) noexcept {
@@ -47,7 +48,8 @@ std::optional<int> parse_offset(std::string_view* text) noexcept {
 
 /// Seconds before the point and whole nanoseconds behind it.
 std::optional<Stamp> read_parts(std::string_view text) noexcept {
-  constexpr std::int64_t kMaxSeconds = 9'000'000'000;  // what 64 bits of nanoseconds hold
+  // Maximum that 64 bits of nanoseconds hold.
+  constexpr std::int64_t kMaxSeconds = 9'000'000'000;
   const std::size_t point = text.find('.');
   const auto s = parse_integer(text.substr(0, point));
   const auto ns = point == std::string_view::npos ? std::optional<std::int64_t>(0)
@@ -71,8 +73,10 @@ bool ascend(std::span<const std::string_view> times, const TimeForm& form) {
 /// of a drive in `relative` only.
 std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> times,
                                           TimeUnit relative) {
-  constexpr double kSpread = 0.05, kYear1973 = 1e8, kYear2286 = 1e10;  // s
-  constexpr double kShortest = 1e-4, kLongest = 10;                    // s, from time to time
+  // Times are in s.
+  constexpr double kSpread = 0.05, kYear1973 = 1e8, kYear2286 = 1e10;
+  // Shortest and longest step of a sequence in s.
+  constexpr double kShortest = 1e-4, kLongest = 10;
   std::vector<double> values, steps;
   for (const std::string_view text : times) {
     double v = 0;
@@ -138,7 +142,8 @@ std::optional<TimeUnit> parse_time_unit(std::string_view word) noexcept {
 
 std::optional<Stamp> parse_iso_time(std::string_view text) noexcept {
   constexpr std::string_view kForm = "0000-00-00 00:00:00";
-  constexpr std::size_t kBetween = 10;  // date and time
+  // Position between date and time.
+  constexpr std::size_t kBetween = 10;
   if (text.size() < kForm.size() || text.size() > 45) return std::nullopt;
   for (std::size_t i = 0; i < kForm.size(); ++i)
     // Names of files have no colons.

@@ -173,7 +173,8 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   if (const auto bag = bag_format_within(folder)) return bag;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   if (detail::holds_stereo_images(folder)) return SequenceFormat::folder;
-  if (has("mav0")) return SequenceFormat::euroc;  // which says what is missing
+  // The reader then reports what is missing.
+  if (has("mav0")) return SequenceFormat::euroc;
   return std::nullopt;
 }
 
@@ -181,7 +182,8 @@ RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path
                               const std::array<int, 2>& cameras, bool mount_wanted) {
   if (format == SequenceFormat::kitti_raw) return detail::read_oxts(folder, cameras, mount_wanted);
   if (format == SequenceFormat::st_lucia) return detail::read_st_lucia_ins(folder);
-  return {};  // bags have it in StereoSequence::ins
+  // The INS of a bag is in StereoSequence::ins.
+  return {};
 }
 
 ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

@@ -44,7 +44,8 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   const auto status = std::filesystem::status(file, ignored);
   if (std::filesystem::is_directory(status))
     refuse(file, 0, "is a folder where a file is expected");
-  if (std::filesystem::is_other(status))  // reading a pipe would wait for ever
+  // Reading a pipe would block indefinitely.
+  if (std::filesystem::is_other(status))
     refuse(file, 0, "is a pipe or a device where a file is expected");
   std::ifstream in(file, std::ios::binary);
   if (!in) {

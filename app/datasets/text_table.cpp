@@ -28,14 +28,15 @@ bool begins_row(std::string_view field) noexcept {
   const std::string_view before = field.substr(0, field.find(','));
   return nan || parse_number(before, &ignored) || parse_decimal(field, 0) ||
          parse_iso_time(field) ||
-         (field.size() == 10 && field[4] == '-' && field[7] == '-') ||  // a date, its time follows
-         is_image_name(field);
+         // This is a date that its time follows.
+         (field.size() == 10 && field[4] == '-' && field[7] == '-') || is_image_name(field);
 }
 
 }  // namespace
 
 TextTable::TextTable(std::string_view text) : rest_(text) {
-  constexpr std::size_t kMaxHeadings = 50;  // lines
+  // In lines.
+  constexpr std::size_t kMaxHeadings = 50;
   if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
   std::string_view headings;
   for (std::size_t others = 0;;) {
@@ -57,7 +58,8 @@ TextTable::TextTable(std::string_view text) : rest_(text) {
       break;
     }
     headings = line;
-    if (++others > kMaxHeadings) rest_ = {};  // this is no table
+    // The text is no table.
+    if (++others > kMaxHeadings) rest_ = {};
   }
   const char of_rows = separator_;
   if (headings.find(',') != std::string_view::npos) separator_ = ',';

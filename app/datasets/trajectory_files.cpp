@@ -23,9 +23,11 @@ namespace fs = std::filesystem;
 constexpr double kQuaternionLength = 0.02;
 // Tolerance of R Rᵀ − I: three decimals of a matrix stay within it.
 constexpr double kNearRotation = 5e-3;
-constexpr std::int64_t kRowStep = 100'000'000;  // ns: from row to row where a file has no times
+// In ns: step from row to row of a file without times.
+constexpr std::int64_t kRowStep = 100'000'000;
 constexpr std::int64_t kMaxPoses = 100'000'000;
-constexpr double kRounded = 1e-4;  // beyond, the numbers have lost digits, and it is said
+// A larger deviation means that digits were lost, and is reported.
+constexpr double kRounded = 1e-4;
 
 bool present(const fs::path& p) {
   std::error_code ignored;
@@ -39,10 +41,14 @@ enum class Layout : std::uint8_t { pose, matrix3x4, matrix4x4 };
 struct Columns {
   Layout layout = Layout::pose;
   std::optional<TimeColumns> time{};
-  bool counted = false;                    // what stands for a time is the number of the pose
-  std::array<std::size_t, 7> pose{};       // x y z, then the quaternion as it is written
-  std::size_t first = 0;                   // of a matrix
-  std::optional<QuaternionOrder> order{};  // from the headings
+  // True if the number of the pose stands in place of a time.
+  bool counted = false;
+  // Columns of x, y, z and of the quaternion as written.
+  std::array<std::size_t, 7> pose{};
+  // First column of a matrix.
+  std::size_t first = 0;
+  // Order by the headings.
+  std::optional<QuaternionOrder> order{};
   [[nodiscard]] std::size_t needed() const {
     std::size_t last = layout == Layout::pose        ? *std::max_element(pose.begin(), pose.end())
                        : layout == Layout::matrix3x4 ? first + 11
@@ -74,7 +80,8 @@ bool is_quaternion(const std::string& word) {
                           : word.starts_with("q") || contains(word, {"quat", "orient", "rot"});
 }
 bool is_position(const std::string& word) {
-  if (word.size() == 1) return true;  // x, y, z
+  // These are x, y and z.
+  if (word.size() == 1) return true;
   if (contains(word, {"vel", "acc", "gyr", "bias", "cov", "std", "sigma", "twist", "ang", "lin"}))
     return false;
   return word[0] == 'p' || word[0] == 't' || contains(word, {"pos", "trans"});
@@ -84,7 +91,8 @@ bool is_position(const std::string& word) {
 std::optional<Columns> columns_of_names(const std::vector<std::string_view>& names) {
   Columns c;
   std::array<std::optional<std::size_t>, 3> position;
-  std::array<std::optional<std::size_t>, 4> quaternion;  // x y z w
+  // Columns of x, y, z and w.
+  std::array<std::optional<std::size_t>, 4> quaternion;
   std::optional<std::size_t> exact, seconds, nanoseconds, stamp;
   const auto set_once = [](std::optional<std::size_t>* place, std::size_t i) {
     if (!*place) *place = i;
@@ -115,7 +123,8 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
   if (seconds == stamp) c.time->nanoseconds = nanoseconds;
   for (std::size_t k = 0; k < 3; ++k) c.pose[k] = *position[k];
   for (std::size_t k = 0; k < 4; ++k) c.pose[3 + k] = *quaternion[k];
-  c.order = QuaternionOrder::xyzw;  // as they stand in `pose`
+  // This is their order in `pose`.
+  c.order = QuaternionOrder::xyzw;
   return c;
 }
 
@@ -142,7 +151,8 @@ Mat3 to_rotation(const std::array<double, N>& v) {
 bool is_matrix(const std::vector<std::string_view>& fields, std::size_t first, Layout layout) {
   std::array<double, 16> v{};
   v[15] = 1;
-  constexpr double kRoughly = 0.1;  // the matrix is meant; rows that are off are refused one by one
+  // The tolerance only detects a matrix; inaccurate rows are refused one by one.
+  constexpr double kRoughly = 0.1;
   return finite_numbers(fields, first,
                         std::span(v).first(layout == Layout::matrix3x4 ? 12U : 16U)) &&
          off_rotation(to_rotation(v)) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
@@ -319,7 +329,8 @@ class Reader {
   }
 
   [[nodiscard]] std::size_t max_rows() const {
-    constexpr std::size_t kShortest = 15;  // bytes of eight numbers
+    // Minimum length of eight numbers in bytes.
+    constexpr std::size_t kShortest = 15;
     const auto ends = static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n'));
     return std::min(ends, text_.size() / kShortest) + 1;
   }
@@ -435,8 +446,10 @@ class Reader {
     if (options_.unit || options_.unit_option.empty() || !out_.timed || poses.size() < 3) return;
     std::vector<std::int64_t> steps(poses.size() - 1);
     for (std::size_t i = 0; i < steps.size(); ++i)
-      steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);  // halves do not overflow
-    constexpr double kLongest = 10;                                        // s
+      // Halves do not overflow.
+      steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);
+    // In s.
+    constexpr double kLongest = 10;
     if (const double step = 2e-9 * static_cast<double>(median(std::span(steps))); step > kLongest)
       refuse(
           file_, 0,

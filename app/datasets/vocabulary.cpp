@@ -51,9 +51,11 @@ constexpr std::array kWords{
     Vocabulary{"file", " calib camcalib "}};
 
 struct Program {
-  std::string_view key;  // at the root, or the beginning of one
+  // Key at the root; with a final underscore the beginning of one.
+  std::string_view key;
   std::string_view name;
-  std::string_view needs;  // nothing: its files are not read, whatever they hold
+  // Required parts; empty if files of the program are never supported.
+  std::string_view needs;
 };
 constexpr std::array kPrograms{
     Program{"value0", "Basalt", ""},
@@ -93,7 +95,8 @@ bool is_number(const std::string& token) { return token[0] >= '0' && token[0] <=
 /// Which camera a key or a group is of, as it counts; the token that says so is taken out.
 struct Side {
   std::optional<int> number{};
-  bool word = false;  // left or right: counted from 0
+  // True for left and right, which count from 0.
+  bool word = false;
 };
 Side extract_side(std::vector<std::string>* tokens) {
   const auto take = [&](std::size_t i, int number, bool word) {
@@ -258,7 +261,8 @@ class Walk {
 
   const YamlFile& file_;
   std::vector<Fact> facts_;
-  std::vector<std::size_t> counted_;  // facts whose camera is counted as the file counts
+  // Facts whose camera number counts as the file does.
+  std::vector<std::size_t> counted_;
 };
 
 }  // namespace

@@ -22,7 +22,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr unsigned kPatience = 4;  // s: for a request to arrive, for an answer to be read
+// Time in s for a request to arrive and for a response to be read.
+constexpr unsigned kPatience = 4;
 constexpr int kBacklog = 1024;
 
 /// Content security policy: nothing but the page's own content.

@@ -123,7 +123,8 @@ void LinePublisher::send(const FrameReport& report) {
   behind_pose_.add((sent - report.estimated).to_seconds() * 1e3);
   if (!tie) return;
   age_.add((tie->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
-  constexpr std::uint64_t kBetween = 64;  // lines: a percentile walks through thousands of bins
+  // In lines, because a percentile iterates over thousands of bins.
+  constexpr std::uint64_t kBetween = 64;
   if (lines_ % kBetween == 1) age_p99_ms_.store(age_.percentile(0.99), std::memory_order_relaxed);
 }
 

@@ -87,9 +87,12 @@ LineAddress parse_line_address(std::string_view text, std::string_view key) {
 
 namespace {
 
-constexpr std::size_t kReaders = 8;  // robots have a handful of programs that want the pose
-constexpr Duration kPatience = Duration::seconds(5);  // for a reader that does not read
-constexpr int kPending = 4;                           // connections that wait between two frames
+// Robots have a handful of programs that read the pose.
+constexpr std::size_t kReaders = 8;
+// Patience with a reader that does not read.
+constexpr Duration kPatience = Duration::seconds(5);
+// Connections that may wait between two frames.
+constexpr int kPending = 4;
 
 /// Waits for events; the first one is of an eventfd, which is reset.
 void wait_for(std::span<pollfd> events, Duration timeout) noexcept {
@@ -132,7 +135,8 @@ class UnixLineSocket final : public LineSocket {
     listener_ = FileDescriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     if (!listener_ ||
         ::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        ::chmod(address.sun_path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 ||  // whatever umask
+        // The mode must not depend on the umask.
+        ::chmod(address.sun_path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 ||
         ::listen(listener_.get(), kPending) != 0)
       throw InputError(fmt::format("{}: no socket at {} ({}); does its folder exist?", key, path,
                                    std::strerror(errno)));
@@ -199,12 +203,18 @@ class UnixLineSocket final : public LineSocket {
  private:
   struct Reader {
     FileDescriptor socket;
-    std::string rest;           // of lines that went out in part; the next one waits for it
-    bool greeted = false;       // has, or has in `rest`, the newest greeting
-    bool asks = true;           // has not closed its side
-    std::string asked;          // the beginning of a request
-    HostStamp progress{};       // when it last took something
-    Duration image_interval{};  // positive: it gets images and no lines
+    // Unsent rest of lines; the next line waits for it.
+    std::string rest;
+    // True if the newest greeting was sent or is in `rest`.
+    bool greeted = false;
+    // True until the reader closes its side.
+    bool asks = true;
+    // Incomplete request.
+    std::string asked;
+    // Time at which the reader last accepted data.
+    HostStamp progress{};
+    // If positive, the reader gets images instead of lines.
+    Duration image_interval{};
     HostStamp next_image{};
 
     [[nodiscard]] bool copies_images() const noexcept { return image_interval > Duration{}; }
@@ -285,7 +295,8 @@ class UnixLineSocket final : public LineSocket {
 
   /// Reads what a reader has sent, and answers whole lines.
   void hear(short events, const Answer& answer, Reader* reader) noexcept {
-    constexpr std::size_t kMaxRequest = 512;  // bytes
+    // In bytes.
+    constexpr std::size_t kMaxRequest = 512;
     std::array<char, kMaxRequest> bytes;
     const ssize_t n = reader->asks && reader->rest.empty()
                           ? ::recv(reader->socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT)

@@ -22,7 +22,8 @@
 #include "app/datasets/jpeg_writer.hpp"
 #include "app/publish/frame_images.hpp"
 #include "app/publish/live_state.hpp"
-#include "app/publish/page_parts.hpp"  // made by CMake from app/publish/page/
+// CMake generates this header from app/publish/page/.
+#include "app/publish/page_parts.hpp"
 #include "app/report/style.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/memory/ring.hpp"
@@ -43,7 +44,8 @@ std::string thumbnail(const ImageView& image) {
         sum += image.row(y * step + i / step)[x * step + i % step];
       means.push_back(static_cast<std::uint8_t>(sum / (step * step)));
     }
-  constexpr int kQuality = 70;  // grey blocks do not show beside the points
+  // Compression artefacts are hidden by the points.
+  constexpr int kQuality = 70;
   return grey_jpeg({means.data(), width, height, width}, kQuality);
 }
 
@@ -78,8 +80,10 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kBetweenImages{100};
-constexpr milliseconds kFarewell{500};  // for viewers to learn of the session's end
-constexpr int kNiceness = 5;            // beside the estimator's threads
+// Time for viewers to receive the end of the session.
+constexpr milliseconds kFarewell{500};
+// The estimator's threads take precedence.
+constexpr int kNiceness = 5;
 
 /// A point that the left camera followed, raw pixels, and where the right one saw it.
 struct LivePoint {
@@ -115,7 +119,8 @@ class LivePage final : public SessionObserver {
         thread_([this] {
           try {
             work();
-          } catch (const std::exception& e) {  // no memory: viewers lose the page, not the session
+          } catch (const std::exception& e) {
+            // Without memory viewers lose the page, but the session continues.
             fmt::print(stderr, "vergence: the live page has ended ({}); the run continues\n",
                        e.what());
           }
@@ -218,7 +223,8 @@ class LivePage final : public SessionObserver {
   [[nodiscard]] std::string state_since(const HttpRequest& request) {
     asked_ = Clock::now();
     drain();
-    if (!begun_) return "";  // the simulated world takes its time; viewers wait for the session
+    // Viewers wait for the session, because the simulated world starts slowly.
+    if (!begun_) return "";
     counts_.updates.fetch_add(1, std::memory_order_relaxed);
     const bool known = request.epoch == epoch_;
     std::uint64_t version = 0;
@@ -271,17 +277,22 @@ class LivePage final : public SessionObserver {
     std::atomic<std::uint64_t> updates{0}, dropped{0};
   } counts_;
   FrameImages images_;
-  FixedVector<LivePoint, 600> points_;  // of images_: as many as a page can show
+  // Points of the images in images_: the maximum that a page can show.
+  FixedVector<LivePoint, 600> points_;
   std::atomic<bool> started_{false}, ended_{false}, stop_{false};
-  SessionStart start_{};  // published by started_
+  // Published by started_.
+  SessionStart start_{};
 
   // Used by the page's thread only.
   LiveState state_;
   bool begun_ = false;
-  const std::string epoch_;  // tells a viewer that the program was started again
+  // Identifies this run, so that viewers detect a restart.
+  const std::string epoch_;
   nlohmann::json newest_images_{};
-  std::string newest_image_{};            // number of their frame
-  Clock::time_point asked_{}, wanted_{};  // for the state, for images
+  // Frame number of newest_images_.
+  std::string newest_image_{};
+  // Times of the last request for the state, and of the last one for images.
+  Clock::time_point asked_{}, wanted_{};
   HttpServer server_;
   std::thread thread_;
 };

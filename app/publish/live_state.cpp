@@ -44,7 +44,8 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
 
 // A status is old after this time without a frame, or after this many intervals between frames.
 constexpr double kSilenceSeconds = 1, kMaxIntervals = 3;
-constexpr double kSmoothing = 8;  // frames
+// In frames.
+constexpr double kSmoothing = 8;
 
 }  // namespace
 
@@ -114,7 +115,8 @@ json LiveState::frame_json(HostStamp now) const {
   json out{
       {"frame", p.frame},
       {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
-      {"since_s", rounded(silence, 1)},  // when it came
+      // Time since the frame arrived.
+      {"since_s", rounded(silence, 1)},
       {"silent", silence > std::max(kSilenceSeconds, kMaxIntervals * interval_s_)},
       {"state", to_string(p.state)},
       {"status", to_string(p.status)},
@@ -225,7 +227,8 @@ json LiveState::since(std::uint64_t version, HostStamp now, double line_age_ms) 
 
 namespace {
 
-constexpr float kMaxStep = 16;  // m: a map of longer ones shows no way any more
+// In m. With longer steps a map no longer shows the path.
+constexpr float kMaxStep = 16;
 
 float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);

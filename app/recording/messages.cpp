@@ -47,8 +47,10 @@ void put_crc(CdrWriter* out) noexcept {
 /// into the axes common to both.
 struct Rectification {
   Mat3 R = Mat3::Identity();
-  double focal = 0, cx = 0, cy = 0;  // px
-  double baseline_x = 0;             // m: 0 for the left camera, −|baseline| for the other
+  // In px.
+  double focal = 0, cx = 0, cy = 0;
+  // In m: 0 for the left camera, −|baseline| for the other one.
+  double baseline_x = 0;
 };
 
 /// Rectification of `camera` in the pair with camera 0; camera 0 itself is that with
@@ -106,7 +108,8 @@ void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,
   const double fy = calibrated ? r.focal : lens.fy;
   out->items(std::array{r.focal, 0.0, r.cx, r.focal * r.baseline_x, 0.0, fy, r.cy, 0.0, 0.0, 0.0,
                         1.0, 0.0});
-  for (int i = 0; i < 6; ++i) out->put(std::uint32_t{0});  // binning, region of interest: all
+  // Binning and region of interest are 0 for the full sensor.
+  for (int i = 0; i < 6; ++i) out->put(std::uint32_t{0});
   out->boolean(false);
 }
 
@@ -135,7 +138,8 @@ void write_imu(CdrWriter* out, const InsSample& s) noexcept {
   out->items(s.attitude_valid ? std::array{tilt, 0.0, 0.0, 0.0, tilt, 0.0, 0.0, 0.0,
                                            s.heading_sigma * s.heading_sigma}
                               : kNotMeasured);
-  for (int i = 0; i < 2; ++i) {  // rates, accelerations
+  // Rates and accelerations are not measured.
+  for (int i = 0; i < 2; ++i) {
     put_vector(out, Vec3::Zero());
     out->items(kNotMeasured);
   }
@@ -170,7 +174,8 @@ void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept {
     odometry.pose = sample.T_world_left;
   else
     odometry.pose_covariance[0] = -1.0;
-  odometry.twist_covariance[0] = -1.0;  // the speed is not measured
+  // The twist is not measured.
+  odometry.twist_covariance[0] = -1.0;
   write_odometry(out, sample.stamp, "world", "left", odometry);
 }
 
@@ -249,7 +254,8 @@ namespace {
 /// Fields of the packages common_interfaces and geometry2 as of ROS 2 Humble, without their
 /// comments and constants.
 struct Definition {
-  std::string_view name;  // without /msg/, as fields name it
+  // Name without /msg/, as in fields.
+  std::string_view name;
   std::string_view fields;
 };
 constexpr std::array kDefinitions{

@@ -25,6 +25,7 @@ Enum to_enum(const std::array<const char*, N>& words, const std::string& word,
 }  // namespace
 
 std::string to_json(const SessionDescription& d) {
+  // Names need not be UTF-8.
   return nlohmann::json{{"version", SessionDescription::kVersion},
                         {"program", d.program},
                         {"calibration", d.calibration},
@@ -37,7 +38,7 @@ std::string to_json(const SessionDescription& d) {
                         {"mount_source", d.mount_source},
                         {"settings", d.settings},
                         {"cameras", d.cameras}}
-      .dump(1, ' ', false, nlohmann::json::error_handler_t::replace);  // names need not be UTF-8
+      .dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 SessionDescription parse_session_description(std::string_view json, const std::string& name) {

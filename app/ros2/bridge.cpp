@@ -17,9 +17,12 @@ namespace {
 using nlohmann::json;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double kUnknownVariance = 1e6;  // m², rad², and of speeds: a filter ignores the value
-constexpr std::size_t kImages = 2;        // cameras whose images are published
-constexpr double kLongestStep = 1;        // s between two poses that a speed is measured from
+// In m², rad² and for speeds: large enough for a filter to ignore the value.
+constexpr double kUnknownVariance = 1e6;
+// Cameras whose images are published.
+constexpr std::size_t kImages = 2;
+// Maximum time in s between two poses for a measured speed.
+constexpr double kLongestStep = 1;
 
 /// Factor on the standard deviations of a degraded pose (docs/ros2.md).
 double widening_of(std::string_view reason) {

@@ -158,7 +158,8 @@ struct DdsNode::Parts : dds::DataReaderListener {
   std::size_t gid_bytes = 16;
   std::vector<rtps::GUID_t> node_readers, node_writers;
 
-  std::mutex mutex;  // guards requests
+  // Guards requests.
+  std::mutex mutex;
   std::deque<std::shared_ptr<const Request>> requests;
 
   ~Parts() override {

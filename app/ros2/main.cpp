@@ -235,7 +235,8 @@ ExitCode run(int argc, char** argv) {
   declare(&app, &options);
   try {
     app.parse(argc, argv);
-  } catch (const CLI::Success& asked) {  // --help, --version
+  } catch (const CLI::Success& asked) {
+    // These are --help and --version.
     app.exit(asked);
     return ExitCode::done;
   } catch (const CLI::ParseError& error) {

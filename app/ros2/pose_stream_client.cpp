@@ -46,7 +46,8 @@ bool PoseStreamClient::read(const OnLine& on_line, const OnImage& on_image) {
   std::string_view rest = rest_;
   for (;;) {
     const std::size_t end = image_size_ > 0 ? image_size_ : rest.find('\n');
-    if (end > rest.size()) break;  // npos, too
+    // This includes npos.
+    if (end > rest.size()) break;
     if (image_size_ > 0) {
       image_size_ = 0;
       on_image(rest.substr(0, end));

@@ -23,11 +23,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxFiles = 100'000;  // of a minute each: ten weeks
-constexpr std::size_t kMaxImages =
-    4'000'000;  // of all topics: a day and a half at 30 Hz, 320 MB of index
-constexpr std::size_t kMaxAttitudes = 8'000'000;  // of all topics: five hours at 400 Hz, 460 MB
-constexpr std::size_t kMaxBytes = 65536;          // of a CameraInfo and of a reading
+// Files of a minute each: ten weeks.
+constexpr std::size_t kMaxFiles = 100'000;
+// Images of all topics: a day and a half at 30 Hz, 320 MB of index.
+constexpr std::size_t kMaxImages = 4'000'000;
+// Samples of all topics: five hours at 400 Hz, 460 MB.
+constexpr std::size_t kMaxAttitudes = 8'000'000;
+// Size of a CameraInfo and of an INS sample.
+constexpr std::size_t kMaxBytes = 65536;
 
 struct Container {
   BagFormat format;
@@ -196,8 +199,8 @@ class Indexer {
             !__builtin_sub_overflow(image.log_time, image.image.stamp.ns(), &delay))
           delays.push_back(delay);
     std::int64_t usual = 0;
-    constexpr std::int64_t kLongestDelay =
-        10'000'000'000;  // ns: else the clocks are different ones
+    // In ns. A longer delay means that the clocks differ.
+    constexpr std::int64_t kLongestDelay = 10'000'000'000;
     if (!delays.empty()) usual = median(std::span(delays));
     if (std::abs(usual) >= kLongestDelay) usual = 0;
     for (BagImage& image : topic->images) {
@@ -230,7 +233,8 @@ class Indexer {
 
   const fs::path& path_;
   BagIndex bag_{};
-  std::size_t file_ = 0;  // in hand
+  // Index of the file that is being scanned.
+  std::size_t file_ = 0;
   std::size_t images_ = 0, readings_ = 0, attitudes_ = 0;
 };
 

@@ -9,7 +9,8 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr Duration kMaxGap = Duration::milliseconds(100);  // between two orientations
+// Maximum distance of two orientations that are interpolated.
+constexpr Duration kMaxGap = Duration::milliseconds(100);
 
 template <typename Topics>
 std::vector<std::string> usable(const Topics& topics) {

@@ -9,7 +9,8 @@ namespace {
 // Where things stand: the file header of 14 bytes, then the information header.
 constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28,
                       kCompression = 30, kColours = 46;
-constexpr std::size_t kBmpHead = 26;  // bytes up to the end of the size
+// Size of the header up to the image size, in bytes.
+constexpr std::size_t kBmpHead = 26;
 constexpr std::size_t kFileHeader = 14, kMinHeader = 40, kWholeHead = kFileHeader + kMinHeader;
 
 std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
@@ -53,7 +54,8 @@ bool is_bmp(ImageBytes bytes) noexcept {
 ImageFileStatus bmp_size(ImageBytes b, ImageSize* size) noexcept {
   if (b.size() < kBmpHead) return ImageFileStatus::truncated;
   if (u32(b, kHeaderSize) < kMinHeader)
-    return ImageFileStatus::not_an_image;  // an older kind, or no BMP at all
+    // This is an older kind, or no BMP.
+    return ImageFileStatus::not_an_image;
   const std::uint32_t width = u32(b, kWidth),
                       height = top_down(b) ? 0U - u32(b, kHeight) : u32(b, kHeight);
   return accept_size(width, height, size);
@@ -63,7 +65,8 @@ ImageFileStatus check_bmp(ImageBytes b) noexcept {
   ImageSize size;
   if (const auto status = bmp_size(b, &size); status != ImageFileStatus::ok) return status;
   if (b.size() < kWholeHead) return ImageFileStatus::truncated;
-  if (!is_plain(b) || u16(b, kBits) > 32) return ImageFileStatus::ok;  // the decoder refuses it
+  // The decoder refuses these kinds.
+  if (!is_plain(b) || u16(b, kBits) > 32) return ImageFileStatus::ok;
   const std::size_t pixels = u32(b, kPixelsAt);
   const std::size_t needed = row_bytes(static_cast<std::uint32_t>(size.width), u16(b, kBits)) *
                              static_cast<std::size_t>(size.height);

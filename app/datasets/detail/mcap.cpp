@@ -12,11 +12,14 @@ namespace vergence::app::detail {
 namespace {
 
 constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
-constexpr std::uint64_t kRecordHead = 9;    // opcode u8, length u64
-constexpr std::uint64_t kMessageHead = 22;  // channel u16, sequence u32, log and publish time u64
-constexpr std::uint64_t kChunkHead =
-    32;  // start, end, unpacked size u64, check sum u32, length of the compression's name u32
-constexpr std::uint64_t kMaxCompression = 16;  // bytes of a compression's name
+// Opcode u8, length u64.
+constexpr std::uint64_t kRecordHead = 9;
+// Channel u16, sequence u32, log time and publish time u64.
+constexpr std::uint64_t kMessageHead = 22;
+// Start, end and unpacked size u64, checksum u32, length of the compression's name u32.
+constexpr std::uint64_t kChunkHead = 32;
+// Maximum length of a compression's name, in bytes.
+constexpr std::uint64_t kMaxCompression = 16;
 
 enum class Opcode : std::uint8_t {
   footer = 2,
@@ -29,8 +32,10 @@ enum class Opcode : std::uint8_t {
 
 struct Record {
   Opcode opcode{};
-  std::uint64_t content = 0;  // offset
-  std::uint64_t size = 0;     // bytes of the content
+  // Offset of the content.
+  std::uint64_t content = 0;
+  // Size of the content in bytes.
+  std::uint64_t size = 0;
 };
 
 /// The record at `offset`; nothing: it is not all there.
@@ -46,10 +51,13 @@ std::optional<Record> record_at(const ByteSource& bytes, std::uint64_t offset) n
 /// Head of a chunk's records.
 struct ChunkHead {
   std::uint64_t unpacked = 0;
-  std::uint32_t crc = 0;  // of the unpacked records; 0: not given
+  // Checksum of the unpacked records; 0 if there is none.
+  std::uint32_t crc = 0;
   std::string compression;
-  std::uint64_t records = 0;  // offset in the file
-  std::uint64_t packed = 0;   // bytes from there
+  // Offset of the records in the file.
+  std::uint64_t records = 0;
+  // Size of the records in the file, in bytes.
+  std::uint64_t packed = 0;
 };
 
 std::optional<ChunkHead> chunk_head(const ByteSource& file, const Record& record) {
@@ -184,7 +192,8 @@ class Scanner {
       ++scan_.orphans;
       return;
     }
-    (void)in.u32();  // sequence
+    // The sequence number is skipped.
+    (void)in.u32();
     const std::uint64_t log_time = in.u64();
     ++scan_.messages;
     each_({&channel->second,
@@ -197,8 +206,10 @@ class Scanner {
   const ByteSource& file_;
   const BagVisitor& each_;
   BagScan scan_;
-  std::vector<std::uint8_t> records_;           // of the chunk in hand
-  std::map<std::uint16_t, std::string> types_;  // by schema
+  // Unpacked records of the current chunk.
+  std::vector<std::uint8_t> records_;
+  // Types by schema.
+  std::map<std::uint16_t, std::string> types_;
   std::map<std::uint16_t, BagChannel> channels_;
 };
 

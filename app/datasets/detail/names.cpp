@@ -101,7 +101,8 @@ std::string lower(std::string_view text) {
 }
 
 std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::string>& names) {
-  std::map<std::string, std::string> there;  // by small letters
+  // Names by their lower-case form.
+  std::map<std::string, std::string> there;
   for (const std::string& name : names) there.emplace(lower(name), name);
   std::vector<std::array<std::string, 2>> pairs;
   for (const Sides& sides : all_sides()) {

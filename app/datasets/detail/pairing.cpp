@@ -100,7 +100,8 @@ std::string describe(const PairOffset& offset) {
 
 bool is_suspicious(const PairOffset& offset, Duration interval) {
   constexpr Duration kSuspicious = Duration::milliseconds(5);
-  constexpr double kSuspiciousShare = 0.1;  // of the interval
+  // Share of the interval.
+  constexpr double kSuspiciousShare = 0.1;
   const Duration far = std::max({offset.median, -offset.median, offset.farthest});
   return far > kSuspicious || far.to_seconds() > kSuspiciousShare * interval.to_seconds();
 }
@@ -121,7 +122,8 @@ std::vector<std::size_t> ascending(std::span<const Stamp> stamps) {
     before[i] = place == ends.begin() ? i : *(place - 1);
     if (place == ends.end())
       ends.push_back(i);
-    else if (stamps[i] < stamps[*place])  // of equal ones the first stays
+    else if (stamps[i] < stamps[*place])
+      // The first of equal stamps stays.
       *place = i;
   }
   std::vector<std::size_t> kept(ends.size());

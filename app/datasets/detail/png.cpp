@@ -10,7 +10,8 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr std::size_t kPngHead = 33;  // bytes of the signature and the whole IHDR chunk
+// Size of the signature and the whole IHDR chunk, in bytes.
+constexpr std::size_t kPngHead = 33;
 constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
 std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
@@ -96,7 +97,8 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
     return false;
   for (int pass = 0; pass < passes; ++pass)
     for (std::uint32_t y = 0; y < height; ++y) png_read_row(png, out + y * stride, nullptr);
-  png_read_end(png, nullptr);  // with the last check sums
+  // This also verifies the last checksums.
+  png_read_end(png, nullptr);
   return true;
 }
 
@@ -112,14 +114,16 @@ ImageFileStatus png_size(ImageBytes b, ImageSize* size) noexcept {
 }
 
 bool is_deep_png(ImageBytes b) noexcept {
-  constexpr std::size_t kDepthAt = 24;  // of the header
+  // Offset of the bit depth in the header.
+  constexpr std::size_t kDepthAt = 24;
   return b.size() > kDepthAt && b[kDepthAt] == 16;
 }
 
 ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
                            DeepSamples* deep) noexcept {
   const Reader reader;
-  if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
+  // libpng had no memory.
+  if (reader.info == nullptr) return ImageFileStatus::undecodable;
   Source source{bytes};
   return read_rows(reader, &source, size, out, stride, deep) ? ImageFileStatus::ok
                                                              : ImageFileStatus::truncated;

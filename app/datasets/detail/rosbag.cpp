@@ -11,9 +11,12 @@ namespace vergence::app::detail {
 namespace {
 
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
-constexpr std::uint64_t kLength = 4;        // bytes of a length
-constexpr std::uint64_t kUsualHead = 128;   // bytes: a message's header with both lengths is 46
-constexpr std::uint64_t kMaxHeader = 4096;  // bytes of a record's header
+// Size of a length field in bytes.
+constexpr std::uint64_t kLength = 4;
+// In bytes. A message's header with both lengths has 46.
+constexpr std::uint64_t kUsualHead = 128;
+// Maximum size of a record's header, in bytes.
+constexpr std::uint64_t kMaxHeader = 4096;
 
 enum class Opcode : std::uint8_t { message = 2, bag_header = 3, chunk = 5, connection = 7 };
 
@@ -21,9 +24,12 @@ enum class Opcode : std::uint8_t { message = 2, bag_header = 3, chunk = 5, conne
 struct Header {
   std::optional<std::uint8_t> op{};
   std::optional<std::uint32_t> connection{};
-  std::optional<std::uint32_t> size{};  // unpacked, of a chunk
-  std::uint64_t index = 0;              // where the index begins; 0: there is none
-  std::int64_t time = 0;                // ns, when a message was recorded
+  // Unpacked size of a chunk.
+  std::optional<std::uint32_t> size{};
+  // Offset of the index; 0 if there is none.
+  std::uint64_t index = 0;
+  // Recording time of a message in ns.
+  std::int64_t time = 0;
   std::string compression{}, topic{}, type{};
 };
 
@@ -40,7 +46,8 @@ void set_field(std::string_view name, std::string_view value, Header* header) {
   if (name == "conn") header->connection = narrow(number(value, 4));
   if (name == "size") header->size = narrow(number(value, 4));
   if (name == "time")
-    if (const auto parts = number(value, 8))  // seconds, then nanoseconds
+    // The value holds seconds, then nanoseconds.
+    if (const auto parts = number(value, 8))
       header->time = static_cast<std::int64_t>(*parts & 0xFFFFFFFFU) * 1'000'000'000 +
                      static_cast<std::int64_t>(*parts >> 32U);
   if (name == "index_pos") header->index = number(value, 8).value_or(0);
@@ -67,9 +74,12 @@ bool parse_fields(std::span<const std::uint8_t> bytes, Header* header) {
 
 struct Record {
   Header header{};
-  bool sound = false;      // the header is one
-  std::uint64_t data = 0;  // offset
-  std::uint32_t size = 0;  // bytes of the data
+  // True if the header is valid.
+  bool sound = false;
+  // Offset of the data.
+  std::uint64_t data = 0;
+  // Size of the data in bytes.
+  std::uint32_t size = 0;
 };
 
 std::uint32_t u32_at(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
@@ -150,7 +160,8 @@ class Scanner {
 
  private:
   void read_chunk(const Record& chunk, std::uint64_t here) {
-    if (chunk.size == 0 && chunk.header.size.value_or(0) == 0) return;  // its recorder had it open
+    // The recorder never closed this chunk.
+    if (chunk.size == 0 && chunk.header.size.value_or(0) == 0) return;
     if (chunk.header.compression == "none" || chunk.header.compression.empty())
       return walk(file_, chunk.data, chunk.data + chunk.size, BagPlace::kNoChunk, here);
     if (const std::string why = unpack(file_, chunk, &records_); !why.empty())
@@ -212,7 +223,8 @@ class Scanner {
   const ByteSource& file_;
   const BagVisitor& each_;
   BagScan scan_;
-  std::vector<std::uint8_t> records_;  // of the chunk in hand
+  // Unpacked records of the current chunk.
+  std::vector<std::uint8_t> records_;
   std::map<std::uint32_t, BagChannel> channels_;
 };
 

@@ -11,7 +11,8 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr unsigned kRowBits = 32;  // below them the offset in a row's bytes
+// The lower bits are the offset in a row's bytes, the upper ones the row.
+constexpr unsigned kRowBits = 32;
 
 /// A file's name as SQLite's URI has it.
 std::string to_uri(const std::filesystem::path& file) {
