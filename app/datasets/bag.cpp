@@ -19,14 +19,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A camera's topics have its namespace in common; that of packed images ends with another word.
+/// Namespace that the topics of a camera share. Topics of compressed images end with another word.
 std::string camera_of(std::string_view topic) {
   if (topic.ends_with("/compressed")) topic.remove_suffix(std::string_view("/compressed").size());
   const std::size_t slash = topic.rfind('/');
   return std::string(topic.substr(0, slash == std::string_view::npos ? 0 : slash));
 }
 
-/// The CameraInfo of an image's topic: beside it, or below where the topic is the camera's name.
+/// Topic of the CameraInfo: next to the image topic, or below it if that topic is the camera's
+/// name.
 std::string topic_summary(const BagIndex& bag, const std::string& topic) {
   const std::string below = topic + "/camera_info";
   return bag.infos.contains(below) ? below : camera_of(topic) + "/camera_info";
@@ -87,7 +88,7 @@ int merit(const BagIndex& bag, const Topics& topics, bool given) {
   return sum;
 }
 
-/// Topics that do not differ by their side alone, where one says left and one says right.
+/// Topics that differ by more than their side, if exactly one is named left and one right.
 std::optional<Topics> only_named(const std::vector<std::string>& names,
                                  const BagTopics& requested) {
   Topics found{requested.left, requested.right};
@@ -102,7 +103,7 @@ std::optional<Topics> only_named(const std::vector<std::string>& names,
   return found;
 }
 
-/// The pair that the user names, or the best of those with the usual names.
+/// The pair that the user names, or the best one with the usual names.
 Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& requested, bool given) {
   require_topic(path, bag, requested.left, "left");
   require_topic(path, bag, requested.right, "right");
@@ -141,7 +142,7 @@ std::vector<Stamp> collect_stamps(const std::vector<BagImage>& images) {
   return stamps;
 }
 
-/// The times at which they were recorded; empty: the bag does not say all of them.
+/// Recording times of the images; empty if the bag lacks some of them.
 std::vector<Stamp> recorded(const std::vector<BagImage>& images) {
   constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
   std::vector<Stamp> log;
@@ -160,7 +161,7 @@ Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
   return log[0].empty() || log[1].empty() ? Duration{} : pair_offset(log[0], log[1], pairs).median;
 }
 
-/// Pairs by the nearest times of recording; nothing where there are none, or they do not decide.
+/// Pairs by the nearest recording times; empty if these do not decide.
 std::vector<std::array<std::size_t, 2>> pair_by_recording(
     const std::array<std::vector<BagImage>, 2>& images, Duration interval) {
   // The share of the interval keeps clear of both neighbours.
@@ -171,8 +172,8 @@ std::vector<std::array<std::size_t, 2>> pair_by_recording(
   return pairs;
 }
 
-/// Pairs of the nearest stamps, and what is to be said of how far these are apart. Where stamps do
-/// not tell which images belong together, the times at which they were recorded do.
+/// Pairs images by the nearest stamps and adds remarks about their distance. If the stamps do not
+/// determine the pairs, the recording times do.
 std::vector<std::array<std::size_t, 2>> pair_images(
     const fs::path& path, const Topics& topics, const std::array<std::vector<BagImage>, 2>& images,
     StereoSequence* sequence) {
@@ -244,7 +245,7 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
   return is_rectified(topic) ? rectified(camera) : camera;
 }
 
-/// Two cameras' mosaics in JPEG: what the packing smears, no demosaicing brings back.
+/// Adds remarks about mosaics: JPEG mixes their colours, which no demosaicing restores.
 void remark_mosaics(const BagIndex& bag, const std::string& topic, StereoSequence* sequence) {
   const ImageTopic& of_topic = bag.images.at(topic);
   const BagImage& image = of_topic.images.front();

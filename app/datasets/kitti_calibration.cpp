@@ -15,10 +15,10 @@
 namespace vergence::app {
 namespace {
 
-/// The lines of such a file by their keys.
+/// Lines of such a file by their keys.
 class Text {
  public:
-  /// `without`: what a message about a missing file goes on with.
+  /// `without` ends the message about a missing file.
   Text(const std::filesystem::path& file, const char* without) : file_(file) {
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored))
@@ -82,8 +82,8 @@ class Text {
     return {static_cast<int>(v[0]), static_cast<int>(v[1])};
   }
 
-  /// The camera that a rectified projection P = K [I | t] describes, without its image's size, and
-  /// where it sits: X_k = X_rectified + *t.
+  /// Camera of a rectified projection P = K [I | t], without its image size, and its position: X_k
+  /// = X_rectified + *t.
   [[nodiscard]] Intrinsics projection(const std::string& key, Vec3* t) const {
     const auto P = numbers<12>(key);
     if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1 || !(P[0] > 0 && P[5] > 0))
@@ -108,11 +108,11 @@ class Text {
 
 std::string key(const char* name, int camera) { return fmt::format("{}_{:02d}", name, camera); }
 
-/// Where a camera sits, from camera 00 before rectification, and how it sees.
+/// Intrinsics of a camera and its transform from camera 00 before rectification.
 Intrinsics read_camera(const Text& text, int number, bool rectified, Transform* T_camera_camera0) {
   Intrinsics lens;
   if (rectified) {
-    // All were turned into the axes of camera 00 as it became.
+    // All cameras were rotated into the axes of the rectified camera 00.
     T_camera_camera0->R = text.rotation(key("R_rect", 0));
     lens = text.projection(key("P_rect", number), &T_camera_camera0->t);
   } else {
@@ -132,8 +132,8 @@ Intrinsics read_camera(const Text& text, int number, bool rectified, Transform* 
 }  // namespace
 
 bool accept_rotation(const Mat3& written) noexcept {
-  // Between seven digits (1.5e-7 in KITTI's poses) and a matrix that is no rotation (1e-3 would
-  // bend a kilometre by a metre).
+  // Lies between the rounding of seven digits (1.5e-7 in KITTI's poses) and a matrix that is no
+  // rotation (1e-3 bends a kilometre by a metre).
   constexpr double kOrthonormality = 1e-4;
   const double error = (written * written.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
   return error <= kOrthonormality && written.determinant() > 0;

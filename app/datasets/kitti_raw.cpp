@@ -24,8 +24,7 @@ constexpr std::size_t kFields = 30;
 // In bytes.
 constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;
 
-/// The columns of a packet that are read; order and units are those of the development kit (its
-/// dataformat.txt).
+/// Used columns of a packet; order and units are those of the development kit (dataformat.txt).
 enum Column : std::size_t {
   // In degrees.
   latitude,
@@ -52,8 +51,8 @@ enum Column : std::size_t {
   position_mode = 27,
 };
 
-// Specified accuracy of the unit, an RT3003 with two antennas: its packets have accuracies of place
-// and velocity alone.
+// Specified accuracy of the unit, an RT3003 with two antennas, because packets have only the
+// accuracies of position and velocity.
 constexpr double kTiltSigma = 0.03 * kRadiansPerDegree, kHeadingSigma = 0.1 * kRadiansPerDegree;
 // Heights of a receiver are less accurate than its horizontal position by about this factor.
 constexpr double kHeightOverPlace = 2;
@@ -73,7 +72,7 @@ FixStatus to_fix_status(int status, int satellites_used, int mode) noexcept {
 
 int whole(double v) noexcept { return std::abs(v) < 1e6 ? static_cast<int>(std::lround(v)) : -1; }
 
-/// Nothing: fewer numbers than there are columns, or a place that is none.
+/// Returns nothing for missing numbers or an invalid position.
 std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   std::array<std::string_view, kFields> fields;
   Lines lines(text);
@@ -110,8 +109,7 @@ std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   return r;
 }
 
-/// The packets that lines of timestamps.txt are of, and how many of them, and of those that are
-/// left out.
+/// Packets of the lines of timestamps.txt, and the number of skipped ones.
 struct Packets {
   std::vector<InsRecord> readings{};
   std::vector<Stamp> stamps{};
@@ -171,7 +169,7 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
                          ins->readings.size()));
 }
 
-/// A folder with a camera's images and their list, or with the INS's packets.
+/// True for a directory with a camera's images and their list, or with the INS's packets.
 bool is_drive(const fs::path& folder) {
   std::error_code ignored;
   for (int camera = 0; camera < 4; ++camera)
@@ -180,7 +178,7 @@ bool is_drive(const fs::path& folder) {
   return fs::is_directory(folder / "oxts", ignored);
 }
 
-/// The folder itself, or what lies one or two folders below.
+/// Drives in the directory: itself, or one or two levels below.
 std::vector<fs::path> drives_in(const fs::path& folder) {
   if (is_drive(folder)) return {folder};
   // Maximum number of searched directories.
@@ -220,11 +218,11 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
                        found.size() > kMaxNamed ? ", …" : ""));
   }
   std::error_code ignored;
-  // `.` and a name that ends in a slash have a folder above, too.
+  // `.` and a name that ends in a slash also have a parent directory.
   fs::path lexical = fs::absolute(found[0], ignored).lexically_normal();
   if (!lexical.has_filename()) lexical = lexical.parent_path();
   KittiRawFolders out{found[0], lexical.parent_path()};
-  // A drive may be a link to where it is kept, its calibration beside the one or the other.
+  // A drive may be a symbolic link, with its calibration next to the link or next to its target.
   for (const fs::path& other : {out.drive, fs::weakly_canonical(out.drive, ignored).parent_path()})
     if (!fs::exists(out.calibration / kKittiRawCalibration, ignored) &&
         fs::exists(other / kKittiRawCalibration, ignored))

@@ -26,7 +26,7 @@ constexpr std::size_t kMaxDescription = std::size_t{4} << 20;
 // 37 hours at 30 Hz.
 constexpr std::size_t kMaxFrames = 4'000'000;
 
-/// The check sum that ends a message is that of what stands before it.
+/// Verifies the checksum at the end of a message.
 bool check(std::span<const std::uint8_t> bytes, RosReader* in) {
   const std::size_t end = in->position();
   const auto crc = in->get<std::uint32_t>();
@@ -238,7 +238,8 @@ bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::
   const auto width = static_cast<std::size_t>(image.width);
   const auto size = width * static_cast<std::size_t>(image.height);
   const detail::ByteSource& file = *files_->list[image.file].bytes;
-  // In one piece, so that the check sum is one; then the rows move apart, the last one first.
+  // The pixels are read in one piece for the checksum. Then the rows are moved apart, the last one
+  // first.
   if (!file.read(image.offset, {out, size})) return false;
   if (crc32_of({out, size}) != frame.given.image_crc[camera]) return false;
   if (stride != width)

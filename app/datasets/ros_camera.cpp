@@ -33,7 +33,7 @@ double off_middle(double x, double y, const ImageSize& size) {
   return std::max(std::abs(x / size.width - 0.5), std::abs(y / size.height - 0.5));
 }
 
-/// Rows of pixels minus an offset, divided by a binning.
+/// Subtracts an offset from pixel coordinates and divides them by a binning.
 struct ToImage {
   double x = 0, y = 0, binning_x = 1, binning_y = 1;
   void apply(RosCamera* c) const {

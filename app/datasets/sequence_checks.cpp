@@ -13,12 +13,13 @@
 namespace vergence::app {
 namespace {
 
-// s: faster than any stereo camera; farther than motion can be predicted across
+// In s. No stereo camera is faster than the first, and motion cannot be predicted across the
+// second.
 constexpr double kShortestStep = 1e-3, kLongestStep = 10;
 // The pairs are spread over the sequence, because a part of it may be dark.
 constexpr std::size_t kSampledPairs = 5;
 
-/// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
+/// Empty for other images; 0 for a missing, truncated or black image.
 std::optional<std::uint16_t> find_peak(const StereoSequence& s, const std::string& name,
                                        std::vector<std::uint8_t>* bytes) {
   if (name.empty()) return std::uint16_t{0};
@@ -32,8 +33,8 @@ std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_s
 }  // namespace
 
 void check_times(const StereoSequence& sequence) {
-  // Half of what 64 bits hold: no difference of two stamps is beyond them.
-  // In ns: 1823 to 2116.
+  // Half of the 64-bit range in ns, 1823 to 2116, so that differences of two stamps do not
+  // overflow.
   constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
   const std::filesystem::path file = sequence.times.empty() ? sequence.root : sequence.times;
   for (const StereoPair& pair : sequence.pairs)
@@ -67,7 +68,7 @@ void check_times(const StereoSequence& sequence) {
                        "and {} stand still; are the lines in the order "
                        "of the images, the oldest first?",
                        all, backward, still));
-  // The lower middle: a gap is no unit.
+  // The lower middle is used, because a gap does not indicate the unit.
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   if (*middle >= kShortestStep && *middle <= kLongestStep) return;
@@ -106,7 +107,7 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
                 (sequence.side_by_side ? " (twice its width, side by side)" : "") +
                 "; use the calibration that belongs to these images";
     }
-  // Single images of another size cost their frames.
+  // Single images of another size are skipped as frames.
   if (bad > good) throw InputError(message);
 }
 

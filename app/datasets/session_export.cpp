@@ -56,14 +56,13 @@ class Truth {
   static constexpr Duration kWidestHole = Duration::milliseconds(200);
   static constexpr Duration kBeyond = Duration::milliseconds(1);
 
-  /// From one pose to the end and on.
+  /// Extrapolates from one pose beyond the end.
   [[nodiscard]] static std::optional<Transform> carried_on(const StampedPose& from,
                                                            const StampedPose& end, Stamp stamp) {
     const double beyond = std::abs((stamp - end.stamp).to_seconds()),
                  step = std::abs((end.stamp - from.stamp).to_seconds());
     if (beyond > kBeyond.to_seconds() || step > kWidestHole.to_seconds()) return std::nullopt;
-    // The arc from one rotation to the other has no end at the second one: a share above 1 is on
-    // it.
+    // A share above 1 continues the arc from one rotation to the other.
     return interpolate(from.T_world_body, end.T_world_body, 1 + beyond / step);
   }
 
@@ -97,7 +96,7 @@ std::string projections(const RigCalibration& rig) {
   return text;
 }
 
-/// KITTI has no place for distortion and turned cameras.
+/// KITTI cannot store distortion and rotated cameras.
 void check_rectified(const RigCalibration& rig) {
   const Transform& T = rig.T_camera_left[1];
   if (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
@@ -107,7 +106,7 @@ void check_rectified(const RigCalibration& rig) {
         "or folder");
 }
 
-/// Where images go, and what the text files of the layout hold.
+/// Writes the images and text files of a layout.
 class Writer {
  public:
   explicit Writer(const ExportRequest& request) : request_(request) {
@@ -121,7 +120,7 @@ class Writer {
   }
   void add(Stamp stamp) { stamps_.push_back(stamp); }
 
-  /// Text files, when all images are there.
+  /// Writes the text files after all images.
   void finish(const Truth& truth, ExportResult* result) const {
     const fs::path& out = request_.out;
     switch (request_.format) {
@@ -215,7 +214,7 @@ bool has_pair(const RecordedFrame& frame) {
   return frame.images[0].offset != 0 && frame.images[1].offset != 0;
 }
 
-/// The first frame of which both images were recorded.
+/// First frame with both images.
 const RecordedFrame& init_features(const RecordedSession& session) {
   const auto& frames = session.frames();
   const auto first = std::find_if(frames.begin(), frames.end(), has_pair);
@@ -224,7 +223,7 @@ const RecordedFrame& init_features(const RecordedSession& session) {
   return *first;
 }
 
-/// A data set with a calibration for images of another size is one that no program takes.
+/// Throws InputError if the calibration is for images of another size.
 void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration) {
   for (std::size_t k = 0; k < 2; ++k) {
     const RecordedImage& image = frame.images[k];
@@ -237,7 +236,7 @@ void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration)
   }
 }
 
-/// False: one of the pair is not there.
+/// Returns false if one image of the pair is missing.
 bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
                std::array<std::vector<std::uint8_t>, 2>* pixels) {
   for (std::size_t k = 0; k < 2; ++k) {

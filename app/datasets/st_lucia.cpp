@@ -43,7 +43,7 @@ std::optional<Stamp> stamp_of(std::string_view seconds, std::string_view microse
 
 constexpr std::string_view kImageLog = "_MultiCamera0.log";
 
-/// The calibration published with the data set, metres: X_right = R X_left + t. Its lens has no
+/// Calibration published with the data set, in m: X_right = R X_left + t. Its cameras have no
 /// distortion.
 RigCalibration published_calibration() {
   RigCalibration rig;
@@ -66,7 +66,7 @@ RigCalibration published_calibration() {
   return rig;
 }
 
-/// A log names images with or without the folder in front; they lie in one folder.
+/// A log names images with or without their directory; all are in one.
 std::string image_name(const std::string& images, std::string_view path) {
   return images + "/" + std::string(path.substr(path.find_last_of('/') + 1));
 }
@@ -89,9 +89,9 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
 
 /// `PREFIX_Ins0.log` has twelve fields a line: seconds, microseconds (not padded), latitude and
 /// longitude in degrees, height above the ellipsoid and above the sea, velocity along three axes,
-/// roll, pitch and yaw in radians. The format does not define the axes, so they are decided from
-/// the drive: an axis that fits how the position moves is that axis. Along which axes a velocity
-/// is: rows make east, north, up of it.
+/// roll, pitch and yaw in radians. The format does not define the axes, so those are used that
+/// agree with the motion of the position. The rows of `to_enu` convert a velocity to east, north,
+/// up.
 struct Axes {
   const char* phrase;
   std::array<int, 9> to_enu;
@@ -99,7 +99,7 @@ struct Axes {
 constexpr std::array kAxes{Axes{"north, west, up", {0, -1, 0, 1, 0, 0, 0, 0, 1}},
                            Axes{"north, east, down", {0, 1, 0, 1, 0, 0, 0, 0, -1}},
                            Axes{"east, north, up", {1, 0, 0, 0, 1, 0, 0, 0, 1}}};
-/// Where a yaw of 0 points, and which way it grows.
+/// Direction and sign of the yaw.
 struct Yaw {
   const char* phrase;
   // Direction of a yaw of 0, in rad from east.
@@ -137,7 +137,7 @@ constexpr double kMinCorrelation = 0.3;
 // At most one line in this many may be damaged.
 constexpr std::size_t kMaxBroken = 100;
 
-/// One line as it stands.
+/// One line of the log.
 struct Line {
   Stamp stamp{};
   Geodetic place{};
@@ -145,7 +145,7 @@ struct Line {
   Vec3 velocity, angles;
 };
 
-/// A sample with how its position moves, in the axes at the first place.
+/// A sample and the motion of its position, in ENU axes at the first position.
 struct Moving {
   const Line* line = nullptr;
   // In m/s: east, north, up.
@@ -202,8 +202,7 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   return out;
 }
 
-/// Latitude is the field that stays within 90; south and east of Brisbane both columns are places
-/// of their own only one way round.
+/// Swaps the columns if latitude exceeds 90 in all lines.
 void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
                   std::vector<std::string>* remarks) {
   const bool exchanged = std::all_of(lines->begin(), lines->end(), [](const Line& l) {
@@ -238,8 +237,9 @@ std::vector<Moving> motions(const std::vector<Line>& lines) {
   return out;
 }
 
-/// The axes in which the velocities are nearest to how the position moves, and the yaw that points
-/// where the vehicle goes; it goes backwards now and then, so the mean of the cosines counts.
+/// Selects the velocity axes that agree best with the motion of the position, and the yaw that
+/// agrees best with the course. The mean cosine is used, because the vehicle may also drive
+/// backwards.
 void decide_axes(const std::vector<Moving>& moving, const std::vector<Moving>& fast,
                  Conventions* c) {
   double least = 1e300, most = -1e300;
@@ -270,7 +270,8 @@ double correlation(const std::vector<Moving>& fast, const std::vector<double>& s
   return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : 0;
 }
 
-/// The angle that follows the slope of the path is pitch. False: neither does.
+/// Selects as pitch the angle that correlates with the slope of the path. Returns false if neither
+/// does.
 bool decide_pitch(const std::vector<Moving>& fast, Conventions* c) {
   std::vector<double> slopes;
   for (const Moving& m : fast) {

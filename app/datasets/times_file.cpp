@@ -16,7 +16,7 @@ bool is_number(std::string_view field) {
   return parse_number(field, &ignored) || parse_decimal(field, 0);
 }
 
-/// The name of an image in its folder: lists have it with or without the folder.
+/// Name of an image in its directory; lists have it with or without the directory.
 std::string name_in(const std::filesystem::path& file, std::size_t line, std::string_view field) {
   const std::string_view name = field.substr(field.rfind('/') + 1);
   if (name.empty() || field.find("..") != std::string_view::npos || name == ".")
@@ -107,7 +107,7 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
     const Fields& fields = rows[i];
     const auto stamp = read_time(fields, columns, form);
     if (!stamp) refuse(file, lines[i], fmt::format("`{}` is not a time", times[i].substr(0, 40)));
-    // Names before the time or behind it; each may have a time of its own (`time left time right`).
+    // Names may precede or follow the time; each may have its own time (`time left time right`).
     Fields names(fields.begin() + (columns.counted ? 1 : 0),
                  fields.begin() + static_cast<std::ptrdiff_t>(columns.time));
     for (std::size_t k = columns.last() + 1; k < fields.size(); ++k) names.push_back(fields[k]);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_table.hpp"
 #include "app/datasets/times_file.hpp"
@@ -18,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Two decimals of a quaternion already keep its length within this; columns that are no quaternion
-// rarely do.
+// Two decimals of a quaternion keep its length within this tolerance, which other columns rarely
+// do.
 constexpr double kQuaternionLength = 0.02;
 // Tolerance of R Rᵀ − I: three decimals of a matrix stay within it.
 constexpr double kNearRotation = 5e-3;
@@ -37,7 +38,7 @@ bool present(const fs::path& p) {
 /// Meaning of a row's numbers.
 enum class Layout : std::uint8_t { pose, matrix3x4, matrix4x4 };
 
-/// Which column is what.
+/// Meaning of the columns.
 struct Columns {
   Layout layout = Layout::pose;
   std::optional<TimeColumns> time{};
@@ -61,10 +62,8 @@ struct Columns {
 /// Letters and digits of a heading in lower case, without its unit: `p_RS_R_x [m]` → `prsrx`.
 std::string plain(std::string_view heading) {
   std::string word;
-  for (const char c : heading.substr(0, heading.find_first_of("[("))) {
-    const char small = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c;
-    if ((small >= 'a' && small <= 'z') || (small >= '0' && small <= '9')) word.push_back(small);
-  }
+  for (const char c : detail::lower(heading.substr(0, heading.find_first_of("[("))))
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) word.push_back(c);
   return word;
 }
 
@@ -73,8 +72,7 @@ bool contains(const std::string& word, std::initializer_list<const char*> parts)
                      [&](const char* part) { return word.find(part) != std::string::npos; });
 }
 
-/// The column whose heading is the axis of a quaternion; its words are those of all programs that
-/// head their columns.
+/// True if the heading is an axis of a quaternion, in the words of common programs.
 bool is_quaternion(const std::string& word) {
   return word.size() == 2 ? word[0] == 'q'
                           : word.starts_with("q") || contains(word, {"quat", "orient", "rot"});
@@ -87,7 +85,7 @@ bool is_position(const std::string& word) {
   return word[0] == 'p' || word[0] == 't' || contains(word, {"pos", "trans"});
 }
 
-/// By the headings, if these name all of a pose.
+/// Columns by the headings, if these name a complete pose.
 std::optional<Columns> columns_of_names(const std::vector<std::string_view>& names) {
   Columns c;
   std::array<std::optional<std::size_t>, 3> position;
@@ -128,7 +126,8 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
   return c;
 }
 
-/// The numbers of a row from `first` on. False: they are not all there and finite.
+/// Parses the numbers of a row from `first` on. Returns false unless all of them exist and are
+/// finite.
 bool finite_numbers(const std::vector<std::string_view>& fields, std::size_t first,
                     std::span<double> out) {
   if (first + out.size() > fields.size()) return false;
@@ -166,7 +165,8 @@ bool is_unit(const std::vector<std::string_view>& fields, std::size_t first) {
              kQuaternionLength;
 }
 
-/// By the numbers of a row that has them all. Nothing: it has not. `time`: by all rows.
+/// Columns by the numbers of a complete row; empty for other rows. `time` was inferred from all
+/// rows.
 std::optional<Columns> columns_of_row(const std::vector<std::string_view>& fields,
                                       const TimeColumns& time) {
   Columns c;
@@ -177,7 +177,7 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
     if (first > time.last() + 1 || !is_matrix(fields, first, layout)) continue;
     c.layout = layout;
     c.first = first;
-    // A small whole number before a matrix is that of its frame.
+    // A small integer before a matrix is the number of its frame.
     const auto number = parse_integer(fields[0]);
     c.counted = first == 1 && number && *number >= 0 && *number < kMaxPoses;
     if (c.counted)
@@ -189,7 +189,7 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
   const auto pose_from = [&c](std::size_t first) {
     for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = first + k;
   };
-  // A count of eight columns is a stamp of its own.
+  // In a row of eight columns a counter is the stamp.
   for (const TimeColumns& times : {time, TimeColumns{}, TimeColumns{.time = 1}})
     if (n >= times.last() + 8 && is_unit(fields, times.last() + 4)) {
       c.time = times;
@@ -201,7 +201,7 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
   return c;
 }
 
-/// The first rows of a file, from which it is told how all are written.
+/// First rows of a file, from which the format is inferred.
 struct Sample {
   std::vector<std::vector<std::string_view>> rows{};
   TimeColumns time{};
@@ -225,7 +225,7 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
   if (auto named = columns_of_names(sample.names)) return *named;
   for (const auto& row : sample.rows)
     if (auto found = columns_of_row(row, sample.time)) return *found;
-  // None is as it should be: the rows say for themselves what is wrong.
+  // If no row matches, reading the rows gives more specific messages.
   const std::size_t n = sample.rows.front().size();
   Columns c;
   if (n == 12 || n == 13) {
@@ -261,7 +261,7 @@ void sort_by_stamp(Trajectory* poses) {
   poses->erase(std::unique(poses->begin(), poses->end(), same), poses->end());
 }
 
-/// One file, read twice: how it is written, and its rows. Memory: its text and its poses.
+/// Reads one file in two passes: its format, then its rows. Memory holds its text and its poses.
 class Reader {
  public:
   Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
@@ -314,7 +314,7 @@ class Reader {
     out_.order_reported = columns_.order || options_.quaternion || columns_.layout != Layout::pose;
     out_.order = columns_.order.value_or(QuaternionOrder::xyzw);
     if (!columns_.order && columns_.layout == Layout::pose) {
-      // EuRoC and those who write as it does (VINS): w first, commas, whole nanoseconds.
+      // EuRoC and VINS write w first, with commas and whole nanoseconds.
       const bool csv = sample_.separator != ' ' && form_.unit == TimeUnit::nanoseconds;
       if (csv) out_.order = QuaternionOrder::wxyz;
       if (csv && !euroc_ && !options_.quaternion)
@@ -323,7 +323,7 @@ class Reader {
             "commas");
     }
     if (!options_.quaternion) return;
-    // The user speaks of the columns as they stand in the file.
+    // The user's order refers to the columns as they are in the file.
     out_.order = *options_.quaternion;
     std::sort(columns_.pose.begin() + 3, columns_.pose.end());
   }
@@ -335,7 +335,7 @@ class Reader {
     return std::min(ends, text_.size() / kShortest) + 1;
   }
 
-  /// False: the row is the last, and its writer stopped in it.
+  /// Returns false if the row is the last one and incomplete.
   bool read_row(const TextTable& table) {
     const auto& fields = table.fields();
     if (fields.size() < columns_.needed()) {
@@ -357,7 +357,7 @@ class Reader {
     return true;
   }
 
-  /// False: the row has no number there. InputError: it has something else.
+  /// Returns false if the field has no value. Throws InputError for other text.
   bool read_field(std::string_view field, std::size_t line, double* value) const {
     if (parse_number(field, value)) return true;
     if (is_no_value(field)) return false;
@@ -473,10 +473,9 @@ class Reader {
           "rotations have few decimals, they are up to {:.1g} off orthonormal", roughest_));
   }
 
-  /// NaN and infinity in all their spellings, and an empty field.
+  /// True for NaN and infinity in all spellings, and for an empty field.
   static bool is_no_value(std::string_view field) {
-    std::string word;
-    for (const char c : field.substr(0, 12)) word.push_back(static_cast<char>(c | 0x20));
+    std::string word = detail::lower(field.substr(0, 12));
     if (word.starts_with('-') || word.starts_with('+')) word.erase(0, 1);
     return word.empty() || word.starts_with("nan") || word == "inf" || word == "infinity" ||
            word == "null" || word == "none" || word == "n/a";
@@ -498,14 +497,14 @@ fs::path parent_folder(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
-/// The first of these files that is there.
+/// First of these files that exists.
 std::optional<fs::path> first_present(std::initializer_list<fs::path> candidates) {
   for (const fs::path& candidate : candidates)
     if (present(candidate)) return candidate.lexically_normal();
   return std::nullopt;
 }
 
-/// Row k at times[k], or frame k.
+/// Assigns times[k] to row k, or to frame k.
 void set_times(const fs::path& file, std::span<const Stamp> times, const std::string& times_name,
                TrajectoryFile* trajectory) {
   Trajectory& poses = trajectory->poses;
@@ -570,7 +569,7 @@ Trajectory read_kitti(const fs::path& poses_file, std::span<const Stamp> times) 
 }
 
 std::optional<TruthFiles> find_truth(const fs::path& folder) {
-  // `sequences/06/` with a slash at its end has no name of its own.
+  // `sequences/06/` with a trailing slash has no file name.
   const fs::path sequence = (folder.has_filename() ? folder : folder.parent_path()).filename();
   for (const fs::path& poses :
        {folder / "poses.txt", folder / ".." / ".." / "poses" / (sequence.string() + ".txt")})

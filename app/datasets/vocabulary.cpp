@@ -12,7 +12,7 @@ namespace {
 struct Vocabulary {
   std::string_view part, words;
 };
-/// The last part of a key in small letters without signs, the camera's words and number taken off.
+/// Last part of a key in lower-case letters, without the words and number of the camera.
 constexpr std::array kWords{
     Vocabulary{"matrix",
                " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
@@ -72,7 +72,8 @@ constexpr std::array kPrograms{
     Program{"projection_matrix", "ROS", "camera_info of both cameras, with P"},
     Program{"cam0", "Kalibr", "T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) of both"}};
 
-/// Parts of a key: letters and digits apart, capitals inside a word begin the next.
+/// Splits a key into parts: digits are separate from letters, and a capital inside a word begins a
+/// new part.
 std::vector<std::string> tokens_of(std::string_view key) {
   std::vector<std::string> tokens;
   enum { sign, digit, small, capital } before = sign;
@@ -92,7 +93,7 @@ std::vector<std::string> tokens_of(std::string_view key) {
 
 bool is_number(const std::string& token) { return token[0] >= '0' && token[0] <= '9'; }
 
-/// Which camera a key or a group is of, as it counts; the token that says so is taken out.
+/// Camera of a key or group as counted in the file. The token that identifies it is removed.
 struct Side {
   std::optional<int> number{};
   // True for left and right, which count from 0.
@@ -128,7 +129,7 @@ const Vocabulary* find_part(const std::string& word) {
   });
 }
 
-/// k1 … k6, p1 or p2 of a scalar, whose number is no camera's; empty: another key.
+/// k1 to k6, p1 or p2 of a scalar, whose number is not that of a camera; empty for other keys.
 std::string_view find_coefficient(const std::vector<std::string>& tokens) {
   if (tokens.size() < 2) return {};
   constexpr std::array<std::string_view, 8> kNames{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
@@ -207,7 +208,7 @@ class Walk {
       tokens.resize(tokens.size() - 2);
       side = extract_side(&tokens);
     } else if (!parse_transform(tokens, &fact)) {
-      // Numbers in these names are no camera's.
+      // Numbers in these names are not those of cameras.
       const std::string whole = joined(tokens);
       if (whole == "tcncnm1")
         tokens.pop_back();
@@ -224,7 +225,7 @@ class Walk {
     facts_.push_back(std::move(fact));
   }
 
-  /// `T_c1_c2`, `T_cam1_cam0`, `T_right_left`, `Tlr`: between two cameras that the key names.
+  /// Parses a transform between two named cameras: `T_c1_c2`, `T_cam1_cam0`, `T_right_left`, `Tlr`.
   static bool parse_transform(const std::vector<std::string>& tokens, Fact* fact) {
     const std::string word = joined(tokens);
     std::vector<int> cameras;
@@ -242,7 +243,7 @@ class Walk {
     return true;
   }
 
-  /// `KL` is K of the left camera, `stereo_R` is R.
+  /// Finds the part of a key: `KL` is K of the left camera, `stereo_R` is R.
   static bool find_fact(const std::vector<std::string>& tokens,
                         const std::vector<std::string>& groups, Side* side, Fact* fact) {
     std::string word = joined(tokens);

@@ -52,8 +52,8 @@ void LinePublisher::on_pose(const FrameReport& report) noexcept {
   wake();
 }
 
-// A session has fewer alignments and calibrations in a second than their rings hold; one that finds
-// no room is replaced by the next one.
+// The rings hold more alignments and calibrations than a session has per second. One that finds no
+// room is superseded by the next one.
 void LinePublisher::on_enu_alignment(const EnuAlignment& alignment,
                                      const Geodetic& origin) noexcept {
   (void)alignments_.push({alignment, origin});
@@ -80,8 +80,8 @@ void LinePublisher::on_event(const EventRecord& event) noexcept {
 
 void LinePublisher::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-lines");
-  // A tenth of a percent of a core, for which a reader waits: before other work, where the system
-  // lets us.
+  // The thread uses a tenth of a percent of a core, and readers wait for it. So it gets priority
+  // where the system permits.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   for (;;) {
     const bool last = stop_.load(std::memory_order_acquire);

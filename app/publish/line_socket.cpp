@@ -25,7 +25,7 @@ namespace vergence::app {
 
 namespace {
 
-/// Names of this machine for other computers.
+/// Name of this machine for other computers.
 std::string machine_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 && name[0] != 0 ? name.data()
@@ -94,7 +94,7 @@ constexpr Duration kPatience = Duration::seconds(5);
 // Connections that may wait between two frames.
 constexpr int kPending = 4;
 
-/// Waits for events; the first one is of an eventfd, which is reset.
+/// Waits for events. The first one is that of an eventfd, which is reset.
 void wait_for(std::span<pollfd> events, Duration timeout) noexcept {
   const auto ms = std::max<std::int64_t>(timeout.ns() / 1'000'000 + 1, 0);
   if (::poll(events.data(), events.size(), static_cast<int>(ms)) < 0)
@@ -103,7 +103,7 @@ void wait_for(std::span<pollfd> events, Duration timeout) noexcept {
   if (events[0].revents != 0) (void)::eventfd_read(events[0].fd, &ignored);
 }
 
-/// Takes away a stale socket file, left by a program that was killed.
+/// Removes a stale socket file of a killed program.
 void remove_stale(const sockaddr_un& address, std::string_view key) {
   struct stat status {};
   if (::lstat(address.sun_path, &status) != 0) return;
@@ -115,7 +115,8 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
       errno == EAGAIN)
     throw InputError(fmt::format("{}: another program sends its lines to {}; name another path",
                                  key, address.sun_path));
-  // Only this shows that no program listens: a socket of datagrams or one of another user may live.
+  // Only ECONNREFUSED proves that no program listens. A datagram socket or one of another user may
+  // be in use.
   if (errno == ECONNREFUSED)
     (void)::unlink(address.sun_path);
   else if (errno != ENOENT)
@@ -123,8 +124,8 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
                                  key, address.sun_path, std::strerror(errno)));
 }
 
-/// A stream, not datagrams: readers come and go as they like without an address of their own, any
-/// number up to kReaders, and a line is what ends with a line feed.
+/// A stream socket, so that up to kReaders readers can connect and disconnect without own
+/// addresses. A line ends with a line feed.
 class UnixLineSocket final : public LineSocket {
  public:
   UnixLineSocket(const std::string& path, std::string_view key) : path_(path) {
@@ -168,7 +169,7 @@ class UnixLineSocket final : public LineSocket {
       Reader& reader = readers_[i];
       if (reader.copies_images() && !reader.rest.empty() && now - reader.progress >= kPatience)
         close(&reader);
-      // One request after the other: the next one when the answer to the last one is out.
+      // A reader's next request is read after the response to the previous one was sent.
       const short event = !reader.rest.empty() ? POLLOUT : reader.asks ? POLLIN : short{0};
       events[2 + i] = {reader.socket.get(), event, 0};
     }
@@ -191,7 +192,7 @@ class UnixLineSocket final : public LineSocket {
     for (Reader& reader : readers_) {
       if (!reader.image_due(now)) continue;
       reader.rest = bytes;
-      // The rate holds on average; a long delay is not made up for.
+      // The rate holds on average, but a long delay is not compensated.
       reader.next_image =
           std::max(reader.next_image + reader.image_interval, now + reader.image_interval / 2);
       ++counters_.images;
@@ -229,7 +230,7 @@ class UnixLineSocket final : public LineSocket {
           ::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
       const HostStamp now = monotonic_now();
       if (!socket) {
-        // Without descriptors to spare the connection would wake this thread for ever.
+        // Without free descriptors the pending connection would wake this thread continuously.
         if (errno != EAGAIN && errno != EINTR) accept_again_ = now + Duration::seconds(1);
         return;
       }
@@ -248,7 +249,7 @@ class UnixLineSocket final : public LineSocket {
     }
   }
 
-  /// Bytes that went out; −1: the reader is gone.
+  /// Returns the number of sent bytes; −1 if the reader has disconnected.
   static ssize_t write(const Reader& reader, std::string_view bytes) noexcept {
     const ssize_t n =
         ::send(reader.socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
@@ -256,7 +257,7 @@ class UnixLineSocket final : public LineSocket {
     return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
   }
 
-  /// Sends pending data as far as the reader has room: the rest of a line, then a greeting.
+  /// Sends pending data while the reader has room: the rest of a line, then a greeting.
   void flush(HostStamp now, Reader* reader) noexcept {
     while (!reader->rest.empty() || !reader->greeted) {
       if (reader->rest.empty()) {
@@ -293,7 +294,7 @@ class UnixLineSocket final : public LineSocket {
     reader->socket.reset();
   }
 
-  /// Reads what a reader has sent, and answers whole lines.
+  /// Reads a reader's requests and answers complete lines.
   void hear(short events, const Answer& answer, Reader* reader) noexcept {
     // In bytes.
     constexpr std::size_t kMaxRequest = 512;

@@ -85,7 +85,7 @@ constexpr milliseconds kFarewell{500};
 // The estimator's threads take precedence.
 constexpr int kNiceness = 5;
 
-/// A point that the left camera followed, raw pixels, and where the right one saw it.
+/// Point tracked by the left camera in raw pixels, and its position in the right image.
 struct LivePoint {
   std::array<float, 2> left{}, right{};
   bool both = false;
@@ -107,7 +107,8 @@ struct Posed {
 /// Errors   The constructor throws InputError (HttpServer), std::system_error.
 class LivePage final : public SessionObserver {
  public:
-  /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
+  /// `requests` must outlive it. `line_age_ms` returns the 99th percentile of the pose lines' age;
+  /// negative if there are none.
   LivePage(const LivePageOptions& options, SessionRequests* requests,
            std::function<double()> line_age_ms)
       : requests_(requests),
@@ -188,7 +189,7 @@ class LivePage final : public SessionObserver {
   }
   void work() {
     (void)pthread_setname_np(pthread_self(), "vergence-page");
-    // On Linux a thread has a niceness of its own.
+    // On Linux each thread has its own niceness.
     (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
     while (!stop_.load(std::memory_order_acquire)) {
       server_.step(milliseconds(100));
@@ -204,7 +205,7 @@ class LivePage final : public SessionObserver {
       state_.begin(start_);
       begun_ = true;
     }
-    // Before the rings: what is in them by then is all of the drive.
+    // The flag is read before the rings, which then contain the rest of the session.
     const bool ended = ended_.load(std::memory_order_acquire);
     for (Item item; items_.pop(&item);)
       std::visit([this](const auto& record) { add(record); }, item);
@@ -255,7 +256,7 @@ class LivePage final : public SessionObserver {
           {{"width", image.width}, {"height", image.height}, {"jpeg", base64(thumbnail(image))}});
     }
     auto& points = out["points"] = nlohmann::json::array();
-    // Tenths of pixels, as integers: half the bytes.
+    // Tenths of pixels as integers halve the size.
     const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
     for (const LivePoint& p : points_) {
       nlohmann::json point{tenths(p.left[0]), tenths(p.left[1])};
@@ -271,7 +272,7 @@ class LivePage final : public SessionObserver {
   SessionRequests* requests_;
   std::function<double()> line_age_ms_;
 
-  // From the estimator's thread to the page's.
+  // Passed from the estimator's thread to the page's.
   Ring<Item, 256> items_;
   struct Counts {
     std::atomic<std::uint64_t> updates{0}, dropped{0};

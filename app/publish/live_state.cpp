@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A number with as many digits as a page needs; none for what is no number.
+/// Rounds to the digits that a page needs; null if the number is not finite.
 json rounded(double value, double digits) {
   if (!std::isfinite(value)) return nullptr;
   const double scale = std::pow(10.0, digits);
@@ -49,7 +49,7 @@ constexpr double kSmoothing = 8;
 
 }  // namespace
 
-/// A gap counts as twice the interval at most: an outage does not make the next one unseen.
+/// A gap counts at most as twice the interval, so that one outage does not hide the next one.
 void LiveState::add_interval(HostStamp estimated) noexcept {
   const double gap = (estimated - newest_->estimated).to_seconds();
   if (interval_s_ <= 0) interval_s_ = gap;
@@ -240,7 +240,7 @@ void LiveTrail::add(const Place& place) {
   if (places_.size() == kMax) thin(place.version);
   if (places_.empty() || distance(place.world, places_.back().world) >= min_step_m_)
     return places_.push_back(place);
-  // A rig that stands for weeks uses up no places, whatever its status does.
+  // A rig that stands still for weeks uses no further points, regardless of its status.
   Place& last = places_.back();
   if (place.status <= last.status) return;
   last.status = place.status;

@@ -106,7 +106,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A line of its type with `fields`. Names may hold bytes that are no UTF-8.
+/// A line of its type with `fields`. Names may contain invalid UTF-8.
 std::string format_line(const char* type, const json& fields) {
   json line{{"version", kPoseStreamVersion}, {"type", type}};
   line.update(fields);

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMinToken = 16, kMaxToken = 128;
 
-/// 128 bits of the kernel's, in hexadecimal digits.
+/// 128 random bits of the kernel as hexadecimal digits.
 std::string new_token() {
   std::array<std::uint8_t, 16> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
@@ -83,7 +83,7 @@ void Publishing::open_page(const Configuration& configuration) {
   try {
     page_ = make_live_page(options, &requests_,
                            [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
-    // Behind a # it is not part of a request, so it appears in no log.
+    // The fragment after # is not part of a request, so the token appears in no log.
     fmt::print(
         stderr, "live page: {}\n",
         settings.token_file.empty()

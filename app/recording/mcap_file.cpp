@@ -38,7 +38,7 @@ class SystemDisk final : public Disk {
   [[nodiscard]] int truncate(int fd, std::uint64_t size) noexcept override {
     return ::ftruncate(fd, static_cast<off_t>(size)) == 0 ? 0 : -errno;
   }
-  // Not every file system can: the pages then wait as those of any other file.
+  // Where the file system does not support it, pages are written as those of any other file.
   void start_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept override {
     (void)::sync_file_range(fd, static_cast<off64_t>(offset), static_cast<off64_t>(size),
                             SYNC_FILE_RANGE_WRITE);
@@ -93,7 +93,7 @@ enum class Opcode : std::uint8_t {
   data_end = 0x0F
 };
 
-/// A record whose length is known when its content is written.
+/// Writes a record whose length is determined by its content.
 template <class Content>
 void put_record(ByteWriter* out, Opcode opcode, const Content& content) noexcept {
   out->put(static_cast<std::uint8_t>(opcode));
@@ -127,7 +127,7 @@ McapMessageHead McapMessageHead::read(std::span<const std::uint8_t, kSize> in) n
   return head;
 }
 
-/// Small records behind each other through a buffer, with the check sum that a summary has.
+/// Appends small records through a buffer, with the checksum of a summary.
 class McapFile::Appender {
  public:
   explicit Appender(McapFile* file) noexcept : file_(file), out_(file->scratch_) {}
@@ -140,7 +140,7 @@ class McapFile::Appender {
     put_record(&out_, opcode, content);
   }
   void bytes(const void* data, std::size_t size) noexcept { out_.bytes(data, size); }
-  /// From here on.
+  /// The checksum begins here.
   void begin_crc() noexcept {
     flush();
     crc_ = 0;
@@ -251,7 +251,7 @@ int McapFile::append(iovec* pieces, int count) noexcept {
   return 0;
 }
 
-/// Where each message of a chunk is, and the check sum over all of them.
+/// Lists the positions of a chunk's messages, and computes its checksum.
 void McapFile::index_messages(std::span<const std::span<const std::uint8_t>> parts,
                               ChunkIndex* chunk, std::uint32_t* crc) noexcept {
   entries_.clear();
@@ -324,7 +324,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   return 0;
 }
 
-/// The disk writes this chunk while the next one is gathered; the one before is there by now.
+/// The disk writes this chunk while the next one is gathered; the previous one is written by now.
 void McapFile::write_back(const ChunkIndex& chunk) noexcept {
   disk_.start_writeback(fd_, chunk.offset, end_ - chunk.offset);
   if (chunk.offset > writeback_) {
@@ -335,7 +335,7 @@ void McapFile::write_back(const ChunkIndex& chunk) noexcept {
   waiting_ += entries_.size();
 }
 
-/// The kernel does not report which pages failed: all that waited may be missing.
+/// The kernel does not report which pages failed, so all pending messages may be missing.
 void McapFile::record_unwritten(int error) noexcept {
   if (error == 0) return;
   if (unwritten_.error == 0) unwritten_.error = error;
@@ -412,7 +412,7 @@ int McapFile::finish() noexcept {
         w->put(group.start);
         w->put(group.end - group.start);
       });
-  // The check sum covers the footer up to itself.
+  // The checksum covers the footer up to itself.
   std::array<std::uint8_t, kRecordHead + 16> footer{};
   ByteWriter w(footer);
   w.put(static_cast<std::uint8_t>(Opcode::footer));

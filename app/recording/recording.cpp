@@ -87,8 +87,8 @@ constexpr std::size_t kSpare = std::size_t{1} << 20;
 // Poses take precedence; recorded data wait in memory.
 constexpr int kNice = 5;
 
-/// Fill limit of a queue that is not written: a producer that does not wait finds room for an
-/// image; one that waits (`hurried`) for anything that fits at all.
+/// Fill limit of a queue while nothing is written. A producer that does not wait finds room for an
+/// image; one that waits (`hurried`) finds room for anything that fits.
 std::size_t room_left_at(const RecordRing& ring, bool hurried) noexcept {
   return hurried ? ring.capacity() / 4 : ring.capacity() / 8 * 7;
 }
@@ -157,7 +157,7 @@ void Recording::work() noexcept {
   for (bool last = false; !last;) {
     bool hurried = false;
     {
-      // Looks by the clock: a producer that had to wake it would pay a system call a message.
+      // The thread polls, because waking it would cost the producer a system call per message.
       std::unique_lock lock(mutex_);
       (void)wake_.wait_for(lock, kPollInterval, [this] { return stop_ || hurry_; });
       last = stop_;
@@ -227,7 +227,7 @@ void Recording::drop_oldest(RecordRing* ring) noexcept {
   counts_.lost.fetch_add(1, std::memory_order_relaxed);
 }
 
-/// While the disk takes nothing: the newest are worth more than the oldest.
+/// While the disk accepts nothing, the oldest messages are dropped in favour of new ones.
 void Recording::make_room(bool hurried) noexcept {
   for (const auto& q : queues_)
     while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring);

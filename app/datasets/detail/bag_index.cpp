@@ -67,7 +67,7 @@ std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
   if (files.size() > kMaxFiles)
     refuse(bag, 0,
            fmt::format("holds {} {} files; at most {} are read", files.size(), ending, kMaxFiles));
-  // Recorders count without leading zeros: drive_2.mcap stands before drive_10.mcap.
+  // Recorders count without leading zeros: drive_2.mcap precedes drive_10.mcap.
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return in_name_order(a.filename().string(), b.filename().string());
   });
@@ -155,7 +155,8 @@ class Indexer {
     ++(image ? topic.left_out.other_size : topic.left_out.unreadable);
   }
 
-  /// Recorders may compress message by message, which leaves nothing of a message's own head.
+  /// Refuses recordings that are compressed message by message, because the heads of their messages
+  /// are not readable.
   void refuse_packed(std::span<const std::uint8_t> head) const {
     constexpr std::array<std::uint8_t, 4> kZstd{0x28, 0xB5, 0x2F, 0xFD};
     if (head.size() >= kZstd.size() && std::equal(kZstd.begin(), kZstd.end(), head.begin()))
@@ -190,7 +191,8 @@ class Indexer {
     topic->readings.push_back(*reading);
   }
 
-  /// Drivers that set no stamp leave 0: the time of recording less the topic's usual delay.
+  /// Replaces stamps of 0, which some drivers write, by the recording time minus the topic's usual
+  /// delay.
   static void replace_zero_stamps(ImageTopic* topic) {
     std::vector<std::int64_t> delays;
     for (const BagImage& image : topic->images)
@@ -210,7 +212,7 @@ class Indexer {
     }
   }
 
-  /// Leaves out the images whose stamps do not go forward.
+  /// Drops the images whose stamps do not increase.
   void put_in_order(ImageTopic* topic) {
     replace_zero_stamps(topic);
     std::vector<Stamp> stamps;

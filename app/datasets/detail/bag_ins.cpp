@@ -59,8 +59,8 @@ InsRecord to_reading(const RosFix& fix, std::size_t number) {
   return r;
 }
 
-/// Orientation at the fix's time from those around it; *next: the first that is not before, of the
-/// fix before on entry. False: none is near.
+/// Interpolates the orientation at the fix's time. *next is the index of the first orientation that
+/// is not before the previous fix, and is advanced to this one. Returns false if none is near.
 bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, InsRecord* r) {
   const Stamp stamp = r->sample.stamp;
   while (*next < attitudes.size() && attitudes[*next].stamp < stamp) ++*next;

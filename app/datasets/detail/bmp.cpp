@@ -6,7 +6,7 @@
 namespace vergence::app::detail {
 namespace {
 
-// Where things stand: the file header of 14 bytes, then the information header.
+// Offsets of the fields: the file header has 14 bytes, the information header follows.
 constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28,
                       kCompression = 30, kColours = 46;
 // Size of the header up to the image size, in bytes.
@@ -20,9 +20,9 @@ std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
   return u16(b, at) | u16(b, at + 2) << 16U;
 }
 
-/// A negative height says that the first row is the top one.
+/// A negative height means that the first row is the top one.
 bool top_down(ImageBytes b) noexcept { return (u32(b, kHeight) & 0x80000000U) != 0; }
-/// Rows of pixels. With bit fields, 32 bits are blue, green, red as everywhere.
+/// True for uncompressed rows. With bit fields, 32 bits are blue, green, red as usual.
 bool is_plain(ImageBytes b) noexcept {
   constexpr std::uint32_t kBitFields = 3;
   return u32(b, kCompression) == 0 || (u32(b, kCompression) == kBitFields && u16(b, kBits) == 32);
@@ -31,7 +31,7 @@ std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
   return (std::size_t{width} * bits + 31) / 32 * 4;
 }
 
-/// The grey value of one pixel (blue, green, red).
+/// Grey value of one pixel (blue, green, red).
 std::uint8_t to_grey(const std::uint8_t* bgr) noexcept { return luminance(bgr[2], bgr[1], bgr[0]); }
 
 /// Grey levels of the palette's indices; without a palette the indices are grey levels.

@@ -23,7 +23,7 @@ bool is_frame_header(std::uint8_t marker) noexcept {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }
 
-/// libjpeg's error handler and progress monitor, and where they leave to.
+/// State of libjpeg's error handler and progress monitor, and the point to which they jump.
 struct Decoder {
   jpeg_decompress_struct jpeg{};
   jpeg_error_mgr errors{};
@@ -36,7 +36,7 @@ Decoder* decoder_of(j_common_ptr jpeg) noexcept { return static_cast<Decoder*>(j
 
 [[noreturn]] void fail(j_common_ptr jpeg) { std::longjmp(decoder_of(jpeg)->leave, 1); }
 
-/// The decoder goes on after these with grey blocks, or blocks in the wrong place.
+/// After these warnings the decoder continues with grey or misplaced blocks.
 bool is_damage(int code) noexcept {
   switch (code) {
     case JWRN_HIT_MARKER:
@@ -62,7 +62,7 @@ void count_scans(j_common_ptr jpeg) {
   if (decoder_of(jpeg)->jpeg.input_scan_number > kMaxScans) fail(jpeg);
 }
 
-/// Between setjmp and the handlers' longjmp nothing may stand that has a destructor.
+/// No object with a destructor may be created between setjmp and the handlers' longjmp.
 bool read_rows(Decoder* d, ImageBytes bytes, ImageSize size, std::uint8_t* out,
                std::size_t stride) noexcept {
   if (setjmp(d->leave) != 0) return false;

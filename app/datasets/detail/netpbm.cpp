@@ -25,7 +25,8 @@ struct Header {
 
 bool is_blank(std::uint8_t c) noexcept { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-/// Three whole numbers after the two letters, between them blanks and comments, then one blank.
+/// Reads three integers after the two letters. They are separated by blanks and comments, and one
+/// blank follows them.
 ImageFileStatus read_header(ImageBytes bytes, Header* header) noexcept {
   std::array<std::uint32_t, 3> numbers{};
   std::size_t at = 2;

@@ -12,7 +12,7 @@
 namespace vergence::app::detail {
 namespace {
 
-/// At most what 64 bits hold: the stamps are whatever a file says.
+/// Distance of two stamps, limited to 64 bits because files may have arbitrary stamps.
 std::int64_t apart(Stamp a, Stamp b) {
   const auto later = static_cast<std::uint64_t>(std::max(a, b).ns()),
              earlier = static_cast<std::uint64_t>(std::min(a, b).ns());
@@ -20,7 +20,7 @@ std::int64_t apart(Stamp a, Stamp b) {
   return static_cast<std::int64_t>(std::min(later - earlier, kMax));
 }
 
-/// Stamps by time, whatever their order.
+/// Stamps ordered by time.
 class Sorted {
  public:
   explicit Sorted(std::span<const Stamp> stamps) : stamps_(stamps), order_(stamps.size()) {
@@ -28,7 +28,7 @@ class Sorted {
     std::stable_sort(order_.begin(), order_.end(),
                      [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
   }
-  /// Index of the nearest; the earlier of two. Precondition: there is one.
+  /// Index of the nearest stamp; the earlier one of two. Precondition: there is one.
   [[nodiscard]] std::size_t nearest(Stamp to) const {
     const auto after = std::lower_bound(order_.begin(), order_.end(), to,
                                         [&](std::size_t i, Stamp s) { return stamps_[i] < s; });

@@ -34,7 +34,7 @@ void read_on(png_structp png, png_bytep to, std::size_t n) {
 [[noreturn]] void fail(png_structp png, png_const_charp /*what*/) { png_longjmp(png, 1); }
 void ignore(png_structp /*png*/, png_const_charp /*what*/) noexcept {}
 
-/// libpng's two structures, released together.
+/// The two structures of libpng, which are released together.
 struct Reader {
   png_structp png = nullptr;
   png_infop info = nullptr;
@@ -47,7 +47,7 @@ struct Reader {
   Reader& operator=(const Reader&) = delete;
 };
 
-/// A row of 16-bit grey, big endian, to 8 bits in its place.
+/// Converts a row of big-endian 16-bit grey to 8 bits in place.
 void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
   if (row->bit_depth != 16) return;
   auto* deep = static_cast<DeepSamples*>(png_get_user_transform_ptr(png));
@@ -58,7 +58,7 @@ void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
   }
 }
 
-/// Everything to 8-bit grey.
+/// Requests the conversion to 8-bit grey.
 void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
   const int colours = png_get_color_type(png, info), depth = png_get_bit_depth(png, info);
   if (depth == 16 && (colours & PNG_COLOR_MASK_COLOR) != 0) {
@@ -75,8 +75,8 @@ void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
     png_set_expand_gray_1_2_4_to_8(png);
 }
 
-/// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the
-/// caller's.
+/// No object with a destructor may be created between setjmp and libpng's longjmp, so all of them
+/// are the caller's.
 bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_t* out,
                std::size_t stride, DeepSamples* deep) noexcept {
   png_structp png = reader.png;

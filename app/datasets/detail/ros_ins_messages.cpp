@@ -12,7 +12,7 @@ constexpr double kUnitLength = 1e-2;
 // Standard deviation in m of a height that is not measured.
 constexpr double kUnknownHeight = 1000;
 
-/// From the variances of two axes, or of one twice.
+/// Standard deviation from the variances of two axes, or of one axis twice.
 double sigma(double a, double b) noexcept {
   const double variance = (a + b) / 2;
   return a >= 0 && b >= 0 && variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : 0;
