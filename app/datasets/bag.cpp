@@ -71,9 +71,8 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
   const auto found = bag.images.find(requested);
   if (found == bag.images.end() || found->second.images.empty())
     refuse(path, 0,
-           fmt::format("has no image on {} that can be read; choose with --{}-topic; topics of "
-                       "images: {}",
-                       requested, side, list_of_image_topics(bag)));
+           "has no image on {} that can be read; choose with --{}-topic; topics of images: {}",
+           requested, side, list_of_image_topics(bag));
 }
 
 /// Ranks a pair of topics: a CameraInfo for both (or a supplied calibration) counts most, then
@@ -129,10 +128,10 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
   if (best.empty())
     if (const auto only = only_named(names, requested)) return *only;
   refuse(path, 0,
-         fmt::format("has {} pairs of topics of images with the names of a left and a right camera "
-                     "(left/right, infra1/infra2, cam0/cam1, image_0/image_1 …); choose with "
-                     "--left-topic and --right-topic; topics of images: {}",
-                     best.size(), list_of_image_topics(bag)));
+         "has {} pairs of topics of images with the names of a left and a right camera "
+         "(left/right, infra1/infra2, cam0/cam1, image_0/image_1 …); choose with --left-topic and "
+         "--right-topic; topics of images: {}",
+         best.size(), list_of_image_topics(bag));
 }
 
 std::vector<Stamp> collect_stamps(const std::vector<BagImage>& images) {
@@ -189,17 +188,16 @@ std::vector<std::array<std::size_t, 2>> pair_images(
       ambiguous ? pair_by_recording(images, interval) : pair_nearest(stamps[0], stamps[1], most);
   if (pairs.empty() && !near.empty())
     refuse(path, 0,
-           fmt::format("{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the "
-                       "association of images is ambiguous; correct the stamps of one topic",
-                       topics[1], 1e3 * std::abs(offset.median.to_seconds()),
-                       offset.median > Duration{} ? "later" : "earlier", topics[0],
-                       1e3 * interval.to_seconds()));
+           "{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the association of "
+           "images is ambiguous; correct the stamps of one topic",
+           topics[1], 1e3 * std::abs(offset.median.to_seconds()),
+           offset.median > Duration{} ? "later" : "earlier", topics[0],
+           1e3 * interval.to_seconds());
   if (pairs.empty())
     refuse(path, 0,
-           fmt::format("has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no "
-                       "two are within {:.0f} % of the interval of each other",
-                       topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(),
-                       100 * kMaxApart));
+           "has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no two are within "
+           "{:.0f} % of the interval of each other",
+           topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(), 100 * kMaxApart);
   const PairOffset kept = pair_offset(stamps[0], stamps[1], pairs);
   sequence->assumptions.push_back(fmt::format(
       "images are paired by the nearest {}, right ones are later by {}",
@@ -220,8 +218,7 @@ void remark_left_out(const std::string& name, const LeftOut& out,
   if (out.first.empty()) return;
   remarks->push_back(
       fmt::format("{}: left out were {} images that cannot be read, {} of another size than the "
-                  "first and {} whose stamps do not go "
-                  "forward; the first in {}",
+                  "first and {} whose stamps do not go forward; the first in {}",
                   name, out.unreadable, out.other_size, out.backwards, out.first));
 }
 
@@ -231,13 +228,12 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
   const auto found = bag.infos.find(name);
   if (found == bag.infos.end())
     refuse(path, 0,
-           fmt::format("has no CameraInfo on {}, where that of {} is expected; give a calibration "
-                       "with --calibration",
-                       name, topic));
+           "has no CameraInfo on {}, where that of {} is expected; give a calibration with "
+           "--calibration",
+           name, topic);
   const RosCameraInfo& info = found->second;
   const std::string& fault = is_rectified(topic) ? info.fault_rectified : info.fault;
-  if (!fault.empty())
-    refuse(path, 0, fmt::format("{}: {}; give a calibration with --calibration", name, fault));
+  if (!fault.empty()) refuse(path, 0, "{}: {}; give a calibration with --calibration", name, fault);
   RosCamera camera = info.camera;
   const ImageSize size = bag.images.at(topic).images.front().image.size;
   if (const std::string taken = apply_crop(info.crop, size, &camera); !taken.empty())
@@ -296,17 +292,16 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
   for (const std::string& name : chosen) remark_mosaics(bag, name, &sequence);
   if (!given && topic_summary(bag, chosen[0]) == topic_summary(bag, chosen[1]))
     refuse(path, 0,
-           fmt::format("has no CameraInfo of its own for each of {} and {}, only {}; give a "
-                       "calibration with --calibration",
-                       chosen[0], chosen[1], topic_summary(bag, chosen[0])));
+           "has no CameraInfo of its own for each of {} and {}, only {}; give a calibration with "
+           "--calibration",
+           chosen[0], chosen[1], topic_summary(bag, chosen[0]));
   if (!given) {
     const std::array cameras{camera_info(path, bag, chosen[0], &sequence),
                              camera_info(path, bag, chosen[1], &sequence)};
     if (const std::string fault = set_ros_rig(cameras[0], cameras[1], &sequence.calibration);
         !fault.empty())
-      refuse(path, 0,
-             fmt::format("{}/camera_info: P {}; give a calibration with --calibration",
-                         camera_of(chosen[1]), fault));
+      refuse(path, 0, "{}/camera_info: P {}; give a calibration with --calibration",
+             camera_of(chosen[1]), fault);
     sequence.calibration_source =
         "CameraInfo of " + camera_of(chosen[0]) + " and " + camera_of(chosen[1]);
   }
@@ -316,8 +311,8 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
     if (images[k].back().image.stamp.ns() == 0)
       refuse(path, 0,
              chosen[k] +
-                 " has neither stamps (header.stamp is 0) nor times of recording that "
-                 "could stand instead");
+                 " has neither stamps (header.stamp is 0) nor times of recording that could stand "
+                 "instead");
   const auto pairs = pair_images(path, chosen, images, &sequence);
   const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
   if (alone > 0)

@@ -124,10 +124,10 @@ std::string join_names(const std::vector<YamlFile>& files) {
     if (const std::string program = find_program(file, &never); !program.empty())
       throw InputError(
           fmt::format("{}: {} is missing; the file {}", join_names(files), what, program));
-  throw InputError(fmt::format(
-      "{}: {} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS camera_info, "
-      "OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
-      join_names(files), what));
+  throw InputError(
+      fmt::format("{}: {} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS "
+                  "camera_info, OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
+                  join_names(files), what));
 }
 
 /// Reads intrinsics and transforms of one calibration.
@@ -236,10 +236,10 @@ class RigReader {
       const bool stated = of_rays || fact->key.find("odel") != std::string::npos ||
                           fact->key.find("amera.type") != std::string::npos;
       if (!kind && stated)
-        fail(*fact, fmt::format(" is \"{}\"; lenses that are read are pinhole with radtan "
-                                "(plumb_bob) or equidistant (fisheye, Kannala-Brandt) "
-                                "distortion, or none",
-                                word.substr(0, 60)));
+        fail(*fact,
+             fmt::format(" is \"{}\"; lenses that are read are pinhole with radtan (plumb_bob) or "
+                         "equidistant (fisheye, Kannala-Brandt) distortion, or none",
+                         word.substr(0, 60)));
       if (none != nullptr)
         *none = *none || word == "none" || word == "Rectified" || (word.empty() && of_rays);
       if (kind && !(found && word.empty())) found = kind;
@@ -295,9 +295,9 @@ class RigReader {
     if (width == nullptr && size_)
       sides = {static_cast<double>(size_->width), static_cast<double>(size_->height)};
     else if (width == nullptr)
-      throw InputError(join_names(files_) +
-                       ": holds no image size, as OpenCV's sample writes none; add --size "
-                       "WIDTHxHEIGHT");
+      throw InputError(
+          join_names(files_) +
+          ": holds no image size, as OpenCV's sample writes none; add --size WIDTHxHEIGHT");
     else
       sides = width == size ? read_numbers(*size, 2, "[width, height]")
                             : std::vector{number_of(*width), number_of(*height)};

@@ -468,11 +468,10 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
           "there are fewer pairs than times: an image belongs to the line of its number");
   }
   if (pairs.size() != times.size())
-    refuse(
-        folder, 0,
-        fmt::format("has {} left images, {} right ones and {} lines in its list of times; one of "
-                    "each a pair is expected (a line may name its image: stamp,file)",
-                    left, right, times.size()));
+    refuse(folder, 0,
+           "has {} left images, {} right ones and {} lines in its list of times; one of each a "
+           "pair is expected (a line may name its image: stamp,file)",
+           left, right, times.size());
   for (std::size_t i = 0; i < times.size(); ++i) pairs[i].stamp = times[i].stamp;
   return pairs;
 }
@@ -497,10 +496,10 @@ std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* came
   const auto &of_left = (*cameras)[0].names, &of_right = (*cameras)[1].names;
   if (!named && of_left.size() != of_right.size())
     refuse(folder, 0,
-           fmt::format("has {} left images and {} right ones, whose names have no numbers in "
-                       "common; give the images of a pair one name, or write a times.txt whose "
-                       "lines name them: stamp,left file,right file",
-                       of_left.size(), of_right.size()));
+           "has {} left images and {} right ones, whose names have no numbers in common; give the "
+           "images of a pair one name, or write a times.txt whose lines name them: stamp,left "
+           "file,right file",
+           of_left.size(), of_right.size());
   std::vector<StereoPair> pairs = named ? std::move(*named) : pair_in_order(*cameras);
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kAssumedStep);
@@ -619,11 +618,11 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   sequence.times = folder / "times.txt";
   pair_cameras(&cameras, find_lists(folder, cameras), &sequence);
   if (const auto& left = cameras[0].names, &right = cameras[1].names; left.size() != right.size())
-    sequence.remarks.push_back(fmt::format(
-        "there are {} left images and {} right ones: where one camera lost an image without "
-        "leaving a gap in the names or in times.txt, all pairs after it are a frame off; check "
-        "that the names of a pair belong together",
-        left.size(), right.size()));
+    sequence.remarks.push_back(
+        fmt::format("there are {} left images and {} right ones: where one camera lost an image "
+                    "without leaving a gap in the names or in times.txt, all pairs after it are a "
+                    "frame off; check that the names of a pair belong together",
+                    left.size(), right.size()));
   if (!given) read_own_calibration(use, cameras, &sequence);
   return sequence;
 }
@@ -669,10 +668,9 @@ StereoSequence open_kitti(const fs::path& folder, bool given) {
 StereoSequence open_kitti_raw(const fs::path& folder, bool given,
                               const std::array<int, 2>& numbers) {
   if (numbers[0] == numbers[1])
-    refuse(
-        folder, 0,
-        fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
-                    numbers[0]));
+    refuse(folder, 0,
+           "kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
+           numbers[0]);
   const KittiRawFolders folders = find_kitti_raw(folder);
   StereoSequence sequence;
   sequence.root = folders.drive;

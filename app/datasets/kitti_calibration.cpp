@@ -22,7 +22,7 @@ class Text {
   Text(const std::filesystem::path& file, const char* without) : file_(file) {
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored))
-      refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
+      refuse(file, 0, "is missing: unpack the date's calibration there{}", without);
     // In bytes.
     constexpr std::size_t kLargest = std::size_t{1} << 20U;
     text_ = read_text(file, kLargest);
@@ -47,7 +47,7 @@ class Text {
   [[nodiscard]] std::array<double, N> numbers(const std::string& key) const {
     const auto found = found_.find(key);
     if (found == found_.end())
-      refuse(file_, 0, fmt::format("has no line `{}:`, {} numbers are expected there", key, N));
+      refuse(file_, 0, "has no line `{}:`, {} numbers are expected there", key, N);
     std::array<std::string_view, N> fields;
     const std::size_t count = split(found->second.rest, ' ', fields);
     if (count != N) fail(key, fmt::format("has {} numbers where {} are expected", count, N));

@@ -157,8 +157,7 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
   };
   add_remark(packets.missing, "packets are missing, the first is " + packets.first_missing);
   add_remark(packets.broken,
-             fmt::format("packets are not the {} numbers of one and are left out, the "
-                         "first is {}",
+             fmt::format("packets are not the {} numbers of one and are left out, the first is {}",
                          kFields, packets.first_broken));
   add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are left out");
   add_remark(disordered, "stamps go back or repeat one; their packets are left out");
@@ -213,9 +212,8 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
     std::string names;
     for (std::size_t i = 0; i < std::min(kMaxNamed, found.size()); ++i)
       names += (i > 0 ? ", " : "") + found[i].filename().string();
-    refuse(folder, 0,
-           fmt::format("holds {} drives ({}{}): name one of them", found.size(), names,
-                       found.size() > kMaxNamed ? ", …" : ""));
+    refuse(folder, 0, "holds {} drives ({}{}): name one of them", found.size(), names,
+           found.size() > kMaxNamed ? ", …" : "");
   }
   std::error_code ignored;
   // `.` and a name that ends in a slash also have a parent directory.
@@ -244,8 +242,8 @@ RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
   const Packets packets = read_packets(data, read_times_file(oxts / "timestamps.txt").lines);
   if (packets.readings.empty())
     refuse(data / (packets.broken > 0 ? packets.first_broken : packets.first_missing), 0,
-           fmt::format("{}, and so is every other packet: {} numbers each are expected",
-                       packets.broken > 0 ? "is no packet of the INS" : "is missing", kFields));
+           "{}, and so is every other packet: {} numbers each are expected",
+           packets.broken > 0 ? "is no packet of the INS" : "is missing", kFields);
   const std::vector<std::size_t> kept = ascending(packets.stamps);
   for (const std::size_t i : kept) ins.readings.push_back(packets.readings[i]);
   add_remarks(packets, packets.readings.size() - kept.size(), &ins);

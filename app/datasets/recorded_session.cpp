@@ -155,7 +155,7 @@ struct RecordedSession::Reader {
       return;
     }
     if (session->frames_.size() == kMaxFrames)
-      refuse(folder, 0, fmt::format("has a recording of more than {} frames", kMaxFrames));
+      refuse(folder, 0, "has a recording of more than {} frames", kMaxFrames);
     RecordedFrame frame{*record, {}, session->readings_.size()};
     for (std::size_t k = 0; k < static_cast<std::size_t>(record->cameras); ++k) {
       if ((record->images_present >> k & 1U) == 0) continue;
@@ -175,7 +175,7 @@ struct RecordedSession::Reader {
       return;
     }
     if (session->readings_.size() == kMaxReadings)
-      refuse(folder, 0, fmt::format("has a recording of more than {} readings", kMaxReadings));
+      refuse(folder, 0, "has a recording of more than {} readings", kMaxReadings);
     session->readings_.push_back(*reading);
   }
 };
@@ -204,8 +204,8 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
   }
   if (!reader.described)
     refuse(folder, 0,
-           "holds no recording of a session: its .mcap files are another program's, which "
-           "--format mcap replays");
+           "holds no recording of a session: its .mcap files are another program's, which --format "
+           "mcap replays");
   if (session.frames_.empty())
     refuse(folder, 0,
            "has a recording without a complete frame; the run was too short, or the file is "

@@ -40,9 +40,9 @@ void check_times(const StereoSequence& sequence) {
   for (const StereoPair& pair : sequence.pairs)
     if (pair.stamp.ns() > kFarthest || pair.stamp.ns() < -kFarthest)
       refuse(file, 0,
-             fmt::format("has the stamp {} ns, {} s from 1970; those of a drive are between the "
-                         "years 1824 and 2116: are these other units, or is the line broken?",
-                         pair.stamp.ns(), format_seconds(pair.stamp.ns())));
+             "has the stamp {} ns, {} s from 1970; those of a drive are between the years 1824 and "
+             "2116: are these other units, or is the line broken?",
+             pair.stamp.ns(), format_seconds(pair.stamp.ns()));
   if (sequence.pairs.size() < 3) return;
   // Forward steps in s.
   std::vector<double> steps;
@@ -58,16 +58,15 @@ void check_times(const StereoSequence& sequence) {
   }
   const std::size_t all = sequence.pairs.size() - 1, still = all - backward - steps.size();
   if (2 * steps.size() < all && still > backward)
-    refuse(file, 0,
-           fmt::format("has times of which {} of {} repeat the one before: they were written with "
-                       "too few digits",
-                       still, all));
+    refuse(
+        file, 0,
+        "has times of which {} of {} repeat the one before: they were written with too few digits",
+        still, all);
   if (2 * steps.size() < all)
     refuse(file, 0,
-           fmt::format("has times that do not go forward: of {} steps from pair to pair {} go back "
-                       "and {} stand still; are the lines in the order "
-                       "of the images, the oldest first?",
-                       all, backward, still));
+           "has times that do not go forward: of {} steps from pair to pair {} go back and {} "
+           "stand still; are the lines in the order of the images, the oldest first?",
+           all, backward, still);
   // The lower middle is used, because a gap does not indicate the unit.
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
@@ -77,13 +76,13 @@ void check_times(const StereoSequence& sequence) {
            "has times that count the pairs (1, 2, 3 …), as numbers of frames do, and no times: "
            "leave the file out, and pairs are taken to be 0.1 s apart");
   refuse(file, 0,
-         fmt::format("has pairs that follow one another after {:.4g} s (median); those of a drive "
-                     "do after 1 ms to 10 s: are these times in other units?{}",
-                     *middle,
-                     // Other formats have a fixed unit.
-                     file.extension() == ".txt"
-                         ? " Whole numbers are read as nanoseconds, numbers with a point as seconds"
-                         : ""));
+         "has pairs that follow one another after {:.4g} s (median); those of a drive do after 1 "
+         "ms to 10 s: are these times in other units?{}",
+         *middle,
+         // Other formats have a fixed unit.
+         file.extension() == ".txt"
+             ? " Whole numbers are read as nanoseconds, numbers with a point as seconds"
+             : "");
 }
 
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {

@@ -230,8 +230,8 @@ void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration)
     const Intrinsics& lens = calibration.rig.intrinsics[k];
     if (image.width != lens.width || image.height != lens.height)
       throw InputError(fmt::format(
-          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; "
-          "use the calibration that belongs to these images",
+          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; use the "
+          "calibration that belongs to these images",
           k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
   }
 }

@@ -183,8 +183,8 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   }
   if (out.empty() || broken > 1 + out.size() / kMaxBroken)
     refuse(log, first_broken,
-           fmt::format("and {} more lines are not twelve numbers; this is not the log of the INS",
-                       broken > 0 ? broken - 1 : 0));
+           "and {} more lines are not twelve numbers; this is not the log of the INS",
+           broken > 0 ? broken - 1 : 0);
   if (broken > 0)
     remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers were left out",
                                    log.filename().string(), broken));
@@ -211,9 +211,8 @@ void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
   for (Line& line : *lines) {
     if (exchanged) std::swap(line.place.latitude_deg, line.place.longitude_deg);
     if (!line.place.plausible())
-      refuse(log, 0,
-             fmt::format("has a place that is none: {} {} {}", line.place.latitude_deg,
-                         line.place.longitude_deg, line.place.height_m));
+      refuse(log, 0, "has a place that is none: {} {} {}", line.place.latitude_deg,
+             line.place.longitude_deg, line.place.height_m);
   }
   if (exchanged) remarks->push_back("longitude stands before latitude in the log of the INS");
 }

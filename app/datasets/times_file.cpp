@@ -20,8 +20,7 @@ bool is_number(std::string_view field) {
 std::string name_in(const std::filesystem::path& file, std::size_t line, std::string_view field) {
   const std::string_view name = field.substr(field.rfind('/') + 1);
   if (name.empty() || field.find("..") != std::string_view::npos || name == ".")
-    refuse(file, line,
-           fmt::format("`{}` is no name of an image in its folder", field.substr(0, 40)));
+    refuse(file, line, "`{}` is no name of an image in its folder", field.substr(0, 40));
   return std::string(name);
 }
 
@@ -106,7 +105,7 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Fields& fields = rows[i];
     const auto stamp = read_time(fields, columns, form);
-    if (!stamp) refuse(file, lines[i], fmt::format("`{}` is not a time", times[i].substr(0, 40)));
+    if (!stamp) refuse(file, lines[i], "`{}` is not a time", times[i].substr(0, 40));
     // Names may precede or follow the time; each may have its own time (`time left time right`).
     Fields names(fields.begin() + (columns.counted ? 1 : 0),
                  fields.begin() + static_cast<std::ptrdiff_t>(columns.time));
@@ -114,8 +113,8 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
     if (names.size() == 3 && is_number(names[1])) names.erase(names.begin() + 1);
     if (names.size() > 2)
       refuse(file, lines[i],
-             fmt::format("has {} columns; a time, and one name of an image or two, are expected",
-                         fields.size()));
+             "has {} columns; a time, and one name of an image or two, are expected",
+             fields.size());
     TimesLine entry{*stamp, {}};
     for (std::size_t k = 0; k < 2 && !names.empty(); ++k)
       entry.name[k] = name_in(file, lines[i], names[std::min(k, names.size() - 1)]);

@@ -236,11 +236,10 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
     c.time = TimeColumns{};
     for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = 1 + k;
   } else {
-    refuse(
-        file, first_line,
-        fmt::format("has {} columns where a pose has 8, stamp tx ty tz qx qy qz qw, or the 12 of "
-                    "a 3x4 matrix row by row",
-                    n));
+    refuse(file, first_line,
+           "has {} columns where a pose has 8, stamp tx ty tz qx qy qz qw, or the 12 of a 3x4 "
+           "matrix row by row",
+           n);
   }
   return c;
 }
@@ -343,9 +342,8 @@ class Reader {
         out_.remarks.emplace_back("the last row is unfinished and left out");
         return false;
       }
-      refuse(file_, table.line(),
-             fmt::format("has {} columns where the other rows have {}", fields.size(),
-                         columns_.needed()));
+      refuse(file_, table.line(), "has {} columns where the other rows have {}", fields.size(),
+             columns_.needed());
     }
     StampedPose pose;
     if (!read_stamp(fields, table.line(), &pose.stamp) ||
@@ -361,7 +359,7 @@ class Reader {
   bool read_field(std::string_view field, std::size_t line, double* value) const {
     if (parse_number(field, value)) return true;
     if (is_no_value(field)) return false;
-    refuse(file_, line, fmt::format("`{}` is not a finite number", field.substr(0, 40)));
+    refuse(file_, line, "`{}` is not a finite number", field.substr(0, 40));
   }
 
   bool read_stamp(const std::vector<std::string_view>& fields, std::size_t line, Stamp* stamp) {
@@ -374,15 +372,14 @@ class Reader {
     if (columns_.counted) {
       const auto number = parse_integer(field);
       if (!number || *number < 0 || *number > kMaxPoses)
-        refuse(file_, line, fmt::format("`{}` is not the number of a pose", field.substr(0, 40)));
+        refuse(file_, line, "`{}` is not the number of a pose", field.substr(0, 40));
       max_number_ = std::max(max_number_, static_cast<std::size_t>(*number));
       *stamp = Stamp(*number * kRowStep);
       return true;
     }
     const auto read = read_time(fields, *columns_.time, form_);
     if (!read)
-      refuse(file_, line,
-             fmt::format("`{}` is not a stamp in {}", field.substr(0, 40), to_string(form_.unit)));
+      refuse(file_, line, "`{}` is not a stamp in {}", field.substr(0, 40), to_string(form_.unit));
     *stamp = *read;
     return true;
   }
@@ -406,20 +403,18 @@ class Reader {
       if (q.norm() == 0) return false;
       if (!(std::abs(q.norm() - 1.0) <= kQuaternionLength))
         refuse(file_, line,
-               fmt::format("the quaternion has length {:.6f} and not 1: check the order of the "
-                           "columns",
-                           q.norm()));
+               "the quaternion has length {:.6f} and not 1: check the order of the columns",
+               q.norm());
       *T = {q.normalized().toRotationMatrix(), {v[0], v[1], v[2]}};
       return true;
     }
     const Mat3 written = to_rotation(v);
     const double off = off_rotation(written);
     if (!(off <= kNearRotation))
-      refuse(
-          file_, line,
-          fmt::format("the matrix is not a rotation: it is off orthonormal by more than {:g}, or "
-                      "it is a reflection",
-                      kNearRotation));
+      refuse(file_, line,
+             "the matrix is not a rotation: it is off orthonormal by more than {:g}, or it is a "
+             "reflection",
+             kNearRotation);
     roughest_ = std::max(roughest_, off);
     *T = {normalised(written), {v[3], v[7], v[11]}};
     return true;
@@ -435,14 +430,13 @@ class Reader {
     repeated_ = all - poses.size();
     if (all > 2 && poses.size() == 1)
       refuse(file_, 0,
-             fmt::format("has the same stamp in all of its {} rows: times were written with too "
-                         "few digits, or this column is no time",
-                         all));
+             "has the same stamp in all of its {} rows: times were written with too few digits, or "
+             "this column is no time",
+             all);
     if (2 * repeated_ > all)
       refuse(file_, 0,
-             fmt::format("has only {} different stamps in {} rows: times were written with too few "
-                         "digits",
-                         poses.size(), all));
+             "has only {} different stamps in {} rows: times were written with too few digits",
+             poses.size(), all);
     if (options_.unit || options_.unit_option.empty() || !out_.timed || poses.size() < 3) return;
     std::vector<std::int64_t> steps(poses.size() - 1);
     for (std::size_t i = 0; i < steps.size(); ++i)
@@ -451,11 +445,10 @@ class Reader {
     // In s.
     constexpr double kLongest = 10;
     if (const double step = 2e-9 * static_cast<double>(median(std::span(steps))); step > kLongest)
-      refuse(
-          file_, 0,
-          fmt::format("has poses that follow one another after {:.6g} (median), read as seconds: "
-                      "say the unit of its times with {}",
-                      step, options_.unit_option));
+      refuse(file_, 0,
+             "has poses that follow one another after {:.6g} (median), read as seconds: say the "
+             "unit of its times with {}",
+             step, options_.unit_option);
   }
 
   void add_remarks() {
@@ -509,9 +502,8 @@ void set_times(const fs::path& file, std::span<const Stamp> times, const std::st
                TrajectoryFile* trajectory) {
   Trajectory& poses = trajectory->poses;
   if (trajectory->numbered ? trajectory->rows > times.size() : trajectory->rows != times.size())
-    refuse(file, 0,
-           fmt::format("has {} poses, but {} has {} times", trajectory->rows, times_name,
-                       times.size()));
+    refuse(file, 0, "has {} poses, but {} has {} times", trajectory->rows, times_name,
+           times.size());
   for (StampedPose& pose : poses)
     pose.stamp = times[static_cast<std::size_t>(pose.stamp.ns() / kRowStep)];
   sort_by_stamp(&poses);

@@ -184,8 +184,8 @@ LineResponse LinePublisher::answer(std::string_view request) {
   }
   if (!start_.can_recalibrate)
     return refuse(
-        "this session does not recalibrate on request; use a live session with "
-        "calibration.online: on");
+        "this session does not recalibrate on request; use a live session with calibration.online: "
+        "on");
   requests_->recalibrate.store(true, std::memory_order_relaxed);
   return {response_line(name, true, "recalibration starts at the next frame"), {}};
 }

@@ -33,10 +33,9 @@ std::string read_token(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line(kMaxToken + 2, '\0');
   if (!in)
-    throw InputError(
-        fmt::format("publish.token_file: {} cannot be read; write a line of letters "
-                    "and digits into it",
-                    file.string()));
+    throw InputError(fmt::format(
+        "publish.token_file: {} cannot be read; write a line of letters and digits into it",
+        file.string()));
   in.getline(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(std::strlen(line.c_str()));
   const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
@@ -44,10 +43,9 @@ std::string read_token(const std::filesystem::path& file) {
            c == '_';
   });
   if (line.size() < kMinToken || line.size() > kMaxToken || !plain)
-    throw InputError(
-        fmt::format("publish.token_file: the first line of {} is no token: {} to {} "
-                    "letters, digits, - and _",
-                    file.string(), kMinToken, kMaxToken));
+    throw InputError(fmt::format(
+        "publish.token_file: the first line of {} is no token: {} to {} letters, digits, - and _",
+        file.string(), kMinToken, kMaxToken));
   return line;
 }
 

@@ -122,10 +122,10 @@ std::optional<Bridge::Response> Bridge::add(std::string_view text) {
   try {
     const json line = json::parse(text);
     if (const json& version = line.at("version"); version != kVersion)
-      throw InputError(fmt::format(
-          "pose stream: vergence sends version {}, vergence-ros2 reads version {}; install both "
-          "packages in the same version",
-          version.dump(), kVersion));
+      throw InputError(
+          fmt::format("pose stream: vergence sends version {}, vergence-ros2 reads version {}; "
+                      "install both packages in the same version",
+                      version.dump(), kVersion));
     const std::string& type = line.at("type").get_ref<const std::string&>();
     if (type == "pose") on_pose(line);
     if (type == "calibration" && text != calibration_text_) {

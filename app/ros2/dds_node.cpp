@@ -171,10 +171,10 @@ struct DdsNode::Parts : dds::DataReaderListener {
   template <class Entity>
   Entity* required(Entity* entity, std::string_view what) const {
     if (entity == nullptr)
-      throw InputError(fmt::format(
-          "ROS_DOMAIN_ID: domain {} cannot be joined (no {}); check the network, the ports from {} "
-          "on and the Fast DDS profile",
-          domain, what, 7400 + 250 * domain));
+      throw InputError(
+          fmt::format("ROS_DOMAIN_ID: domain {} cannot be joined (no {}); check the network, the "
+                      "ports from {} on and the Fast DDS profile",
+                      domain, what, 7400 + 250 * domain));
     return entity;
   }
 

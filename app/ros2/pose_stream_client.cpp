@@ -17,8 +17,8 @@ PoseStreamClient::PoseStreamClient(std::string_view address) {
   if (address.starts_with(kUnix)) path_ = address.substr(kUnix.size());
   if (!path_.starts_with('/') || path_.size() >= sizeof(sockaddr_un::sun_path))
     throw InputError(
-        fmt::format("--socket: \"{}\" is not unix:///PATH of at most {} bytes; give "
-                    "the address of publish.pose_stream",
+        fmt::format("--socket: \"{}\" is not unix:///PATH of at most {} bytes; give the address of "
+                    "publish.pose_stream",
                     address.substr(0, 120), sizeof(sockaddr_un::sun_path) - 1));
 }
 

@@ -65,8 +65,7 @@ std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
   if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
   if (files.size() > kMaxFiles)
-    refuse(bag, 0,
-           fmt::format("holds {} {} files; at most {} are read", files.size(), ending, kMaxFiles));
+    refuse(bag, 0, "holds {} {} files; at most {} are read", files.size(), ending, kMaxFiles);
   // Recorders count without leading zeros: drive_2.mcap precedes drive_10.mcap.
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return in_name_order(a.filename().string(), b.filename().string());
@@ -107,9 +106,7 @@ class Indexer {
     const BagFile& file = bag_.files[file_];
     const auto scan =
         scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { read_message(m); });
-    if (!scan)
-      refuse(path_, 0,
-             fmt::format("{} is not {}", file.name, find_container(bag_.format).beginning));
+    if (!scan) refuse(path_, 0, "{} is not {}", file.name, find_container(bag_.format).beginning);
     scan->remark(file.name, &bag_.remarks);
   }
 
@@ -145,7 +142,7 @@ class Indexer {
         image && !topic.images.empty() && image->size != topic.images.front().image.size;
     if (image && !other_size) {
       if (++images_ > kMaxImages)
-        refuse(path_, 0, fmt::format("brings more than {} images; cut the bag", kMaxImages));
+        refuse(path_, 0, "brings more than {} images; cut the bag", kMaxImages);
       topic.images.push_back(
           {*image, message.log_time, message.place, static_cast<std::uint32_t>(file_)});
       return;
@@ -160,11 +157,10 @@ class Indexer {
   void refuse_packed(std::span<const std::uint8_t> head) const {
     constexpr std::array<std::uint8_t, 4> kZstd{0x28, 0xB5, 0x2F, 0xFD};
     if (head.size() >= kZstd.size() && std::equal(kZstd.begin(), kZstd.end(), head.begin()))
-      refuse(
-          path_, 0,
-          "has messages that are compressed one by one (compression_mode: MESSAGE), which is not "
-          "read: unpack them with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml has "
-          "`output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
+      refuse(path_, 0,
+             "has messages that are compressed one by one (compression_mode: MESSAGE), which is "
+             "not read: unpack them with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml has "
+             "`output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
   }
 
   void read_info(const BagMessage& message) {
@@ -185,9 +181,8 @@ class Indexer {
     constexpr bool kAttitude = std::is_same_v<Reading, RosAttitude>;
     constexpr std::size_t kMax = kAttitude ? kMaxAttitudes : kMaxReadings;
     if (++(kAttitude ? attitudes_ : readings_) > kMax)
-      refuse(path_, 0,
-             fmt::format("brings more than {} {}; cut the bag", kMax,
-                         kAttitude ? "orientations" : "readings of an INS"));
+      refuse(path_, 0, "brings more than {} {}; cut the bag", kMax,
+             kAttitude ? "orientations" : "readings of an INS");
     topic->readings.push_back(*reading);
   }
 

@@ -115,9 +115,9 @@ void require(const std::filesystem::path& path, const BagIndex& bag, const std::
              const std::string& requested, const std::vector<std::string>& there) {
   if (requested.empty() || std::find(there.begin(), there.end(), requested) != there.end()) return;
   refuse(path, 0,
-         fmt::format("has no reading on {} that can be used as {} says; of NavSatFix are {}, of "
-                     "Imu with an orientation {}",
-                     requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes))));
+         "has no reading on {} that can be used as {} says; of NavSatFix are {}, of Imu with an "
+         "orientation {}",
+         requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes)));
 }
 
 }  // namespace
@@ -140,10 +140,10 @@ RecordedIns bag_ins(const std::filesystem::path& path, const BagIndex& bag,
     ins.remarks.push_back("the NavSatFix of " + fix +
                           " has no matching Imu orientation: nothing can be compared");
   } else {
-    ins.remarks.push_back(fmt::format(
-        "several topics could be the INS, nothing is compared; choose with --ins-topic and "
-        "--imu-topic; topics of NavSatFix: {}; of Imu with an orientation: {}",
-        joined(fixes), joined(imus)));
+    ins.remarks.push_back(
+        fmt::format("several topics could be the INS, nothing is compared; choose with --ins-topic "
+                    "and --imu-topic; topics of NavSatFix: {}; of Imu with an orientation: {}",
+                    joined(fixes), joined(imus)));
   }
   if (!fix.empty()) remark_left_out(fix, bag.fixes.at(fix), &ins.remarks);
   return ins;
