@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Namespace that the topics of a camera share. Topics of compressed images end with another word.
-std::string camera_of(std::string_view topic) {
+std::string camera_namespace(std::string_view topic) {
   if (topic.ends_with("/compressed")) topic.remove_suffix(std::string_view("/compressed").size());
   const std::size_t slash = topic.rfind('/');
   return std::string(topic.substr(0, slash == std::string_view::npos ? 0 : slash));
@@ -28,9 +28,9 @@ std::string camera_of(std::string_view topic) {
 
 /// Topic of the CameraInfo: next to the image topic, or below it if that topic is the camera's
 /// name.
-std::string topic_summary(const BagIndex& bag, const std::string& topic) {
+std::string camera_info_topic(const BagIndex& bag, const std::string& topic) {
   const std::string below = topic + "/camera_info";
-  return bag.infos.contains(below) ? below : camera_of(topic) + "/camera_info";
+  return bag.infos.contains(below) ? below : camera_namespace(topic) + "/camera_info";
 }
 
 bool is_rectified(std::string_view topic) {
@@ -80,7 +80,7 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
 int merit(const BagIndex& bag, const Topics& topics, bool given) {
   int sum = 0;
   for (const std::string& topic : topics) {
-    if (given || bag.infos.contains(topic_summary(bag, topic))) sum += 4;
+    if (given || bag.infos.contains(camera_info_topic(bag, topic))) sum += 4;
     if (!is_rectified(topic)) sum += 2;
     if (!topic.ends_with("/compressed")) sum += 1;
   }
@@ -224,7 +224,7 @@ void remark_left_out(const std::string& name, const LeftOut& out,
 
 RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::string& topic,
                       StereoSequence* sequence) {
-  const std::string name = topic_summary(bag, topic);
+  const std::string name = camera_info_topic(bag, topic);
   const auto found = bag.infos.find(name);
   if (found == bag.infos.end())
     refuse(path, 0,
@@ -290,20 +290,20 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
     if (bag.images.size() > 2 || chosen[0].find("left") == std::string::npos)
       sequence.assumptions.push_back(chosen[0] + " is left and " + chosen[1] + " is right");
   for (const std::string& name : chosen) remark_mosaics(bag, name, &sequence);
-  if (!given && topic_summary(bag, chosen[0]) == topic_summary(bag, chosen[1]))
+  if (!given && camera_info_topic(bag, chosen[0]) == camera_info_topic(bag, chosen[1]))
     refuse(path, 0,
            "has no CameraInfo of its own for each of {} and {}, only {}; give a calibration with "
            "--calibration",
-           chosen[0], chosen[1], topic_summary(bag, chosen[0]));
+           chosen[0], chosen[1], camera_info_topic(bag, chosen[0]));
   if (!given) {
     const std::array cameras{camera_info(path, bag, chosen[0], &sequence),
                              camera_info(path, bag, chosen[1], &sequence)};
     if (const std::string fault = set_ros_rig(cameras[0], cameras[1], &sequence.calibration);
         !fault.empty())
       refuse(path, 0, "{}/camera_info: P {}; give a calibration with --calibration",
-             camera_of(chosen[1]), fault);
+             camera_namespace(chosen[1]), fault);
     sequence.calibration_source =
-        "CameraInfo of " + camera_of(chosen[0]) + " and " + camera_of(chosen[1]);
+        "CameraInfo of " + camera_namespace(chosen[0]) + " and " + camera_namespace(chosen[1]);
   }
   std::array images{std::move(bag.images[chosen[0]].images),
                     std::move(bag.images[chosen[1]].images)};

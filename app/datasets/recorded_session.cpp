@@ -116,9 +116,9 @@ struct RecordedSession::Reader {
   void read_message(const detail::BagMessage& m, std::uint32_t file) {
     const std::string& type = m.channel->type;
     if (m.channel->topic == SessionDescription::kTopic) return read_description(m);
-    if (type == "sensor_msgs/Image") return take_image(m, file);
-    if (type == "vergence_msgs/Frame") return read_recorded_frame(m);
-    if (type == "vergence_msgs/InsReading") return take_reading(m);
+    if (type == "sensor_msgs/Image") return add_image(m, file);
+    if (type == "vergence_msgs/Frame") return add_frame(m);
+    if (type == "vergence_msgs/InsReading") return add_reading(m);
   }
 
   void read_description(const detail::BagMessage& m) {
@@ -135,7 +135,7 @@ struct RecordedSession::Reader {
     described = true;
   }
 
-  void take_image(const detail::BagMessage& m, std::uint32_t file) {
+  void add_image(const detail::BagMessage& m, std::uint32_t file) {
     const auto camera = cameras.find(m.channel->topic);
     if (camera == cameras.end() || m.place.chunk != detail::BagPlace::kNoChunk) return;
     const auto image = detail::read_ros_image(detail::first_bytes(m, detail::kRosImageHead),
@@ -148,7 +148,7 @@ struct RecordedSession::Reader {
     newest_stamp[camera->second] = image->stamp;
   }
 
-  void read_recorded_frame(const detail::BagMessage& m) {
+  void add_frame(const detail::BagMessage& m) {
     const auto record = read_frame(detail::first_bytes(m, kMaxSmall));
     if (!record) {
       ++broken;
@@ -168,7 +168,7 @@ struct RecordedSession::Reader {
     session->frames_.push_back(frame);
   }
 
-  void take_reading(const detail::BagMessage& m) {
+  void add_reading(const detail::BagMessage& m) {
     const auto reading = read_reading(detail::first_bytes(m, kMaxSmall));
     if (!reading) {
       ++broken;

@@ -45,9 +45,9 @@ class Truth {
 
   [[nodiscard]] std::optional<Transform> at(Stamp stamp) const {
     if (poses_.size() < 2) return track_.at(stamp);
-    if (stamp < poses_.front().stamp) return carried_on(poses_[1], poses_[0], stamp);
+    if (stamp < poses_.front().stamp) return extrapolate(poses_[1], poses_[0], stamp);
     if (stamp > poses_.back().stamp)
-      return carried_on(poses_[poses_.size() - 2], poses_.back(), stamp);
+      return extrapolate(poses_[poses_.size() - 2], poses_.back(), stamp);
     return track_.at(stamp);
   }
   [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
@@ -57,8 +57,8 @@ class Truth {
   static constexpr Duration kBeyond = Duration::milliseconds(1);
 
   /// Extrapolates from one pose beyond the end.
-  [[nodiscard]] static std::optional<Transform> carried_on(const StampedPose& from,
-                                                           const StampedPose& end, Stamp stamp) {
+  [[nodiscard]] static std::optional<Transform> extrapolate(const StampedPose& from,
+                                                            const StampedPose& end, Stamp stamp) {
     const double beyond = std::abs((stamp - end.stamp).to_seconds()),
                  step = std::abs((end.stamp - from.stamp).to_seconds());
     if (beyond > kBeyond.to_seconds() || step > kWidestHole.to_seconds()) return std::nullopt;
@@ -215,7 +215,7 @@ bool has_pair(const RecordedFrame& frame) {
 }
 
 /// First frame with both images.
-const RecordedFrame& init_features(const RecordedSession& session) {
+const RecordedFrame& first_complete_frame(const RecordedSession& session) {
   const auto& frames = session.frames();
   const auto first = std::find_if(frames.begin(), frames.end(), has_pair);
   if (first == frames.end())
@@ -254,7 +254,7 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
                             const std::function<void(std::size_t)>& progress) {
   ExportResult result;
   result.remarks = session.remarks();
-  const RecordedFrame& first = init_features(session);
+  const RecordedFrame& first = first_complete_frame(session);
   check_sizes(first, request.calibration);
   if (first.given.cameras > 2)
     result.remarks.push_back(fmt::format(

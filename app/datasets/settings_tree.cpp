@@ -106,7 +106,7 @@ bool is_ini(std::string_view text) {
 
 /// OpenCV's header and tabs are not valid YAML 1.2. They are replaced by blanks, so that line
 /// numbers stay the same.
-void put_right(std::string* text) {
+void replace_invalid_yaml(std::string* text) {
   if (text->starts_with("\xEF\xBB\xBF")) text->erase(0, 3);
   if (text->starts_with("%YAML"))
     std::fill(text->begin(),
@@ -118,7 +118,7 @@ void put_right(std::string* text) {
 }  // namespace
 
 std::vector<YamlFile> settings_trees(std::string text, const std::string& name) {
-  put_right(&text);
+  replace_invalid_yaml(&text);
   std::string_view rest = text;
   rest.remove_prefix(std::min(rest.find_first_not_of(" \r\n"), rest.size()));
   if (rest.starts_with('<'))

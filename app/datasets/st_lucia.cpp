@@ -33,7 +33,7 @@ std::optional<std::filesystem::path> find_log(const std::filesystem::path& folde
   return found[0];
 }
 
-std::optional<Stamp> stamp_of(std::string_view seconds, std::string_view microseconds) noexcept {
+std::optional<Stamp> parse_stamp(std::string_view seconds, std::string_view microseconds) noexcept {
   // Maximum number of seconds that 64 bits of nanoseconds hold.
   constexpr std::int64_t kLatest = 9'000'000'000;
   const auto s = parse_integer(seconds), us = parse_integer(microseconds);
@@ -79,8 +79,8 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
     refuse(
         log, line_number,
         "is not `seconds microseconds width height format` of both cameras and their two images");
-  const auto stamp = stamp_of(f[0], f[1]);
-  if (!stamp || !stamp_of(f[5], f[6]))
+  const auto stamp = parse_stamp(f[0], f[1]);
+  if (!stamp || !parse_stamp(f[5], f[6]))
     refuse(log, line_number, "does not begin with seconds and microseconds below a million");
   return {*stamp, {image_name(images, f[10]), image_name(images, f[11])}};
 }
@@ -156,7 +156,7 @@ bool parse_line(std::string_view text, Line* line) noexcept {
   constexpr std::size_t kFields = 12;
   std::array<std::string_view, kFields> f;
   if (split(text, ' ', f) != kFields) return false;
-  const auto stamp = stamp_of(f[0], f[1]);
+  const auto stamp = parse_stamp(f[0], f[1]);
   std::array<double, kFields> v{};
   for (std::size_t i = 2; i < kFields; ++i)
     if (!parse_number(f[i], &v[i])) return false;

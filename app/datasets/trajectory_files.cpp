@@ -35,8 +35,8 @@ bool present(const fs::path& p) {
   return fs::exists(p, ignored);
 }
 
-/// Meaning of a row's numbers.
-enum class Layout : std::uint8_t { pose, matrix3x4, matrix4x4 };
+/// Meaning of a row's numbers; the value is their count.
+enum class Layout : std::uint8_t { pose = 7, matrix3x4 = 12, matrix4x4 = 16 };
 
 /// Meaning of the columns.
 struct Columns {
@@ -50,10 +50,10 @@ struct Columns {
   std::size_t first = 0;
   // Order by the headings.
   std::optional<QuaternionOrder> order{};
+  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(layout); }
   [[nodiscard]] std::size_t needed() const {
-    std::size_t last = layout == Layout::pose        ? *std::max_element(pose.begin(), pose.end())
-                       : layout == Layout::matrix3x4 ? first + 11
-                                                     : first + 15;
+    std::size_t last =
+        layout == Layout::pose ? *std::max_element(pose.begin(), pose.end()) : first + count() - 1;
     if (time) last = std::max(last, time->last());
     return last + 1;
   }
@@ -152,8 +152,7 @@ bool is_matrix(const std::vector<std::string_view>& fields, std::size_t first, L
   v[15] = 1;
   // The tolerance only detects a matrix; inaccurate rows are refused one by one.
   constexpr double kRoughly = 0.1;
-  return finite_numbers(fields, first,
-                        std::span(v).first(layout == Layout::matrix3x4 ? 12U : 16U)) &&
+  return finite_numbers(fields, first, std::span(v).first(static_cast<std::size_t>(layout))) &&
          off_rotation(to_rotation(v)) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
          v[15] == 1;
 }
@@ -171,9 +170,8 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
                                       const TimeColumns& time) {
   Columns c;
   const std::size_t n = fields.size();
-  for (const auto& [layout, numbers] : {std::pair{Layout::matrix3x4, std::size_t{12}},
-                                        std::pair{Layout::matrix4x4, std::size_t{16}}}) {
-    const std::size_t first = n - std::min(n, numbers);
+  for (const Layout layout : {Layout::matrix3x4, Layout::matrix4x4}) {
+    const std::size_t first = n - std::min(n, static_cast<std::size_t>(layout));
     if (first > time.last() + 1 || !is_matrix(fields, first, layout)) continue;
     c.layout = layout;
     c.first = first;
@@ -386,11 +384,8 @@ class Reader {
 
   bool read_pose(const std::vector<std::string_view>& fields, std::size_t line, Transform* T) {
     std::array<double, 16> v{};
-    const std::size_t count = columns_.layout == Layout::pose        ? 7
-                              : columns_.layout == Layout::matrix3x4 ? 12
-                                                                     : 16;
     bool there = true;
-    for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t i = 0; i < columns_.count(); ++i)
       there = read_field(
                   fields[columns_.layout == Layout::pose ? columns_.pose[i] : columns_.first + i],
                   line, &v[i]) &&

@@ -74,7 +74,7 @@ constexpr std::array kPrograms{
 
 /// Splits a key into parts: digits are separate from letters, and a capital inside a word begins a
 /// new part.
-std::vector<std::string> tokens_of(std::string_view key) {
+std::vector<std::string> split_key(std::string_view key) {
   std::vector<std::string> tokens;
   enum { sign, digit, small, capital } before = sign;
   for (const char c : key) {
@@ -117,9 +117,7 @@ Side extract_side(std::vector<std::string>* tokens) {
 }
 
 std::string joined(const std::vector<std::string>& tokens) {
-  std::string word;
-  for (const std::string& token : tokens) word += token;
-  return word;
+  return fmt::format("{}", fmt::join(tokens, ""));
 }
 
 const Vocabulary* find_part(const std::string& word) {
@@ -196,7 +194,7 @@ class Walk {
       groups.push_back(key.substr(0, dot));
       key.erase(0, dot + 1);
     }
-    std::vector<std::string> tokens = tokens_of(key);
+    std::vector<std::string> tokens = split_key(key);
     if (tokens.empty()) return;
     Fact fact;
     fact.file = &file_;
@@ -217,7 +215,7 @@ class Walk {
       if (!find_fact(tokens, groups, &side, &fact)) return;
     }
     for (std::size_t i = groups.size(); !side.number && i-- > 0;) {
-      std::vector<std::string> group = tokens_of(groups[i]);
+      std::vector<std::string> group = split_key(groups[i]);
       side = extract_side(&group);
     }
     fact.camera = side.number;

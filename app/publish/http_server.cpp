@@ -38,7 +38,7 @@ constexpr std::array<std::pair<const char*, const char*>, 5> kHeaders{{
 }};
 
 /// Name in a Host header, without port and brackets.
-std::string_view name_of(std::string_view host) noexcept {
+std::string_view host_name(std::string_view host) noexcept {
   if (host.starts_with('[')) {
     const auto end = host.find(']');
     return end == std::string_view::npos ? host : host.substr(1, end - 1);
@@ -47,7 +47,7 @@ std::string_view name_of(std::string_view host) noexcept {
 }
 
 bool names_this_machine(std::string_view host, const HttpPolicy& policy) noexcept {
-  const std::string name(name_of(host));
+  const std::string name(host_name(host));
   return name == policy.host || HostPort{name}.loopback();
 }
 
@@ -102,7 +102,7 @@ FileDescriptor listen_at(const HostPort& address) {
   return socket;
 }
 
-std::string_view value_of(MHD_Connection* c, MHD_ValueKind kind, const char* name) noexcept {
+std::string_view find_value(MHD_Connection* c, MHD_ValueKind kind, const char* name) noexcept {
   const char* value = ::MHD_lookup_connection_value(c, kind, name);
   return value == nullptr ? std::string_view() : value;
 }
@@ -153,8 +153,8 @@ struct HttpServer::Callbacks {
     HttpRequest r;
     r.method = method;
     r.path = url;
-    const auto header = [c](const char* name) { return value_of(c, MHD_HEADER_KIND, name); };
-    const auto query = [c](const char* name) { return value_of(c, MHD_GET_ARGUMENT_KIND, name); };
+    const auto header = [c](const char* name) { return find_value(c, MHD_HEADER_KIND, name); };
+    const auto query = [c](const char* name) { return find_value(c, MHD_GET_ARGUMENT_KIND, name); };
     r.host = header("Host");
     r.origin = header("Origin");
     r.token = header("X-Vergence-Token");

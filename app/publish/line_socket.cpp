@@ -178,7 +178,7 @@ class UnixLineSocket final : public LineSocket {
       if ((events[2 + i].revents & POLLOUT) != 0)
         flush(monotonic_now(), &readers_[i]);
       else if (events[2 + i].revents != 0)
-        hear(events[2 + i].revents, answer, &readers_[i]);
+        read_requests(events[2 + i].revents, answer, &readers_[i]);
     }
     if (events[1].revents != 0) accept_readers();
   }
@@ -295,7 +295,7 @@ class UnixLineSocket final : public LineSocket {
   }
 
   /// Reads a reader's requests and answers complete lines.
-  void hear(short events, const Answer& answer, Reader* reader) noexcept {
+  void read_requests(short events, const Answer& answer, Reader* reader) noexcept {
     // In bytes.
     constexpr std::size_t kMaxRequest = 512;
     std::array<char, kMaxRequest> bytes;

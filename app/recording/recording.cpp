@@ -93,7 +93,7 @@ std::size_t room_left_at(const RecordRing& ring, bool hurried) noexcept {
   return hurried ? ring.capacity() / 4 : ring.capacity() / 8 * 7;
 }
 
-McapMessageHead head_of(std::span<const std::uint8_t> records) noexcept {
+McapMessageHead read_head(std::span<const std::uint8_t> records) noexcept {
   return McapMessageHead::read(records.first<McapMessageHead::kSize>());
 }
 
@@ -195,7 +195,7 @@ Recording::Batch Recording::gather() const noexcept {
     const std::span<const std::uint8_t> waiting = queues_[i]->ring.waiting();
     std::size_t at = 0;
     while (at < waiting.size()) {
-      const McapMessageHead head = head_of(waiting.subspan(at));
+      const McapMessageHead head = read_head(waiting.subspan(at));
       const std::size_t size = head.record_size();
       batch.filled = batch.messages == McapFile::kMaxMessages ||
                      (batch.bytes > 0 && batch.bytes + size > kMaxChunkBytes);
@@ -223,7 +223,7 @@ void Recording::release(const Batch& batch) noexcept {
 }
 
 void Recording::drop_oldest(RecordRing* ring) noexcept {
-  ring->release(head_of(ring->waiting()).record_size());
+  ring->release(read_head(ring->waiting()).record_size());
   counts_.lost.fetch_add(1, std::memory_order_relaxed);
 }
 

@@ -25,7 +25,7 @@ constexpr std::size_t kImages = 2;
 constexpr double kLongestStep = 1;
 
 /// Factor on the standard deviations of a degraded pose (docs/ros2.md).
-double widening_of(std::string_view reason) {
+double sigma_factor(std::string_view reason) {
   // The motion was extrapolated, not measured.
   for (const std::string_view r : {"time_gap", "map_reset", "no_image"})
     if (reason == r) return 10;
@@ -155,7 +155,7 @@ void Bridge::on_pose(const json& line) {
                                position};
   const PosedChild now{Stamp(line.at("stamp_ns").get<std::int64_t>()),
                        T_odom_world_ * T_world_left * T_left_child_};
-  const double factor = widening_of(line.at("reason").get_ref<const std::string&>());
+  const double factor = sigma_factor(line.at("reason").get_ref<const std::string&>());
   const double widening = factor * factor;
 
   // A rotation of the camera about the world's axes also moves the child, which is offset from it.

@@ -21,9 +21,7 @@ std::vector<std::string> usable(const Topics& topics) {
 }
 
 std::string joined(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list.empty() ? "none" : list;
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 template <typename Reading>
@@ -81,7 +79,7 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, I
   return true;
 }
 
-void print_without_fix(const std::string& name, RecordedIns* ins) {
+void remark_without_fix(const std::string& name, RecordedIns* ins) {
   const auto without =
       std::count_if(ins->readings.begin(), ins->readings.end(), [](const InsRecord& r) {
         return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
@@ -92,8 +90,8 @@ void print_without_fix(const std::string& name, RecordedIns* ins) {
                     ins->readings.size()));
 }
 
-RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
-                     const std::string& imu, const std::vector<RosAttitude>& attitudes) {
+RecordedIns combine(const std::string& name, const std::vector<RosFix>& fixes,
+                    const std::string& imu, const std::vector<RosAttitude>& attitudes) {
   RecordedIns ins;
   ins.readings.reserve(fixes.size());
   std::size_t next = 0, without = 0;
@@ -102,7 +100,7 @@ RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
     if (!attitude_at(attitudes, &next, &r)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
-  print_without_fix(name, &ins);
+  remark_without_fix(name, &ins);
   if (without > 0)
     ins.remarks.push_back(
         fmt::format("{}: {} fixes have no orientation of {} within {} ms around them: nothing is "
@@ -134,7 +132,7 @@ RecordedIns bag_ins(const std::filesystem::path& path, const BagIndex& bag,
   RecordedIns ins;
   if (fix.empty() && fixes.empty()) return ins;
   if (!fix.empty() && !imu.empty()) {
-    ins = of_fixes(fix, bag.fixes.at(fix).readings, imu, bag.attitudes.at(imu).readings);
+    ins = combine(fix, bag.fixes.at(fix).readings, imu, bag.attitudes.at(imu).readings);
     remark_left_out(imu, bag.attitudes.at(imu), &ins.remarks);
   } else if (!fix.empty() && imus.empty()) {
     ins.remarks.push_back("the NavSatFix of " + fix +
