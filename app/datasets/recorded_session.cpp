@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
 #include "app/datasets/text_file.hpp"
@@ -97,10 +96,6 @@ std::optional<InsRecord> read_reading(std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
-struct RecordedSession::Files {
-  std::vector<detail::BagFile> list;
-};
-
 /// Result of a scan.
 struct RecordedSession::Reader {
   RecordedSession* session;
@@ -180,23 +175,19 @@ struct RecordedSession::Reader {
   }
 };
 
-RecordedSession::RecordedSession() : files_(std::make_unique<Files>()) {}
-RecordedSession::RecordedSession(RecordedSession&&) noexcept = default;
-RecordedSession::~RecordedSession() = default;
-
 RecordedSession RecordedSession::open(const fs::path& folder) {
   RecordedSession session;
-  session.files_->list = detail::open_bag_files(detail::BagFormat::mcap, folder);
+  session.files_ = detail::open_bag_files(detail::BagFormat::mcap, folder);
   Reader reader{&session, folder};
-  for (std::size_t i = 0; i < session.files_->list.size(); ++i) {
-    const detail::BagFile& file = session.files_->list[i];
+  for (std::size_t i = 0; i < session.files_.size(); ++i) {
+    const detail::BagFile& file = session.files_[i];
     const auto scan =
         detail::scan_bag(detail::BagFormat::mcap, *file.bytes, [&](const detail::BagMessage& m) {
           reader.read_message(m, static_cast<std::uint32_t>(i));
         });
     if (!scan) {
       session.remarks_.push_back(file.name + " does not begin as a recording and was left out");
-      session.complete_ = session.complete_ && i + 1 == session.files_->list.size();
+      session.complete_ = session.complete_ && i + 1 == session.files_.size();
       continue;
     }
     scan->remark(file.name, &session.remarks_);
@@ -237,7 +228,7 @@ bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::
   if (image.offset == 0) return false;
   const auto width = static_cast<std::size_t>(image.width);
   const auto size = width * static_cast<std::size_t>(image.height);
-  const detail::ByteSource& file = *files_->list[image.file].bytes;
+  const detail::ByteSource& file = *files_[image.file].bytes;
   // The pixels are read in one piece for the checksum. Then the rows are moved apart, the last one
   // first.
   if (!file.read(image.offset, {out, size})) return false;
