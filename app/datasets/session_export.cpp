@@ -32,13 +32,13 @@ std::string rows(const Transform& T) {
   return out;
 }
 
-/// The truth at the stamps of frames.
+/// Ground truth at the stamps of frames.
 ///
-/// A frame's stamp is measured by the devices' clocks, the mock's truth has the exact one: the
-/// first or last frame may lie some 0.1 ms outside the truth that was made for it. Up to 1 ms
-/// beyond an end, far less than the time between two frames, the motion of the interval there is
-/// carried on. That is off by a/2 · 1 ms · 201 ms = 1 mm in a vehicle that brakes with a = 10 m/s²;
-/// the end's own pose would be off by 40 mm at 40 m/s.
+/// A frame's stamp is measured by the devices' clocks, while the simulated ground truth has exact
+/// stamps. So the first or last frame may be some 0.1 ms outside of it. Up to 1 ms beyond an end,
+/// far less than the interval of frames, the motion there is extrapolated. The error is a/2 · 1 ms
+/// · 201 ms = 1 mm if a vehicle brakes with a = 10 m/s²; the last pose itself would be off by 40 mm
+/// at 40 m/s.
 class Truth {
  public:
   explicit Truth(const Trajectory& poses) : poses_(poses), track_(poses, kWidestHole) {}

@@ -96,15 +96,14 @@ struct Posed {
   FrameReport report{};
 };
 
-/// `publish.http`: the live page (docs/live_interface.md).
+/// Live page of `publish.http` (docs/live_interface.md).
 ///
-/// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
-///          picture, copies two images; no lock, no system call. Everything else: a thread
-///          of its own, made by the constructor, that yields to the estimator's where a core is
-///          short.
-/// Memory   Rings fixed; the images' memory with the first viewer. Ring full: frames are left out,
-///          totals stay true.
-/// Errors   The constructor throws InputError (HttpServer), std::system_error.
+/// Threads  on_…() run on the estimator's thread: they push into rings and, if a viewer waits for
+///          an image, copy two images, without a lock or system call. Everything else runs on an
+///          own thread with a lower priority, which the constructor starts.
+/// Memory   Rings are fixed; images are allocated for the first viewer. If a ring is full, frames
+///          are dropped, but totals stay correct.
+/// Errors   The constructor throws InputError (HttpServer) and std::system_error.
 class LivePage final : public SessionObserver {
  public:
   /// `requests` must outlive it. `line_age_ms` returns the 99th percentile of the pose lines' age;
