@@ -89,8 +89,6 @@ void RigMonitor::watch(const RigCalibration& rig, bool solved_and_verified) noex
   solved_and_verified_ = solved_and_verified;
   expect_scatter(solved_and_verified ? options_.verified_bias_px : options_.unverified_bias_px);
   for (int k = 1; k < cameras_; ++k) {
-    Watched& w = camera(k);
-    w.pairing.reset();
     const Transform& T = transform(rig_, k);
     set_monitor_reference(k, T, covariance_of(solved_and_verified, T.t.norm()));
   }
@@ -112,6 +110,7 @@ void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig
                              bool solved_and_verified) noexcept {
   map_reset_pending_ = false;
   watch(rig, solved_and_verified);
+  for (int k = 1; k < cameras_; ++k) camera(k).pairing.reset();
   map_renewed(map);
 }
 

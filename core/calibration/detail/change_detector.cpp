@@ -90,7 +90,8 @@ void ChangeDetector::follow_spread(const StereoResiduals& e) noexcept {
 }
 
 bool ChangeDetector::stands_out(const StereoResiduals& e) const noexcept {
-  if (history_.frames() == 0) return false;
+  if (history_.frames() == 0)
+    return single(e.evidence, kFirstLife * e.spread_now) > options_.threshold;
   Vec5 mean;
   Mat5 covariance;
   estimate_reference(Evidence{}, &mean, &covariance);
