@@ -294,13 +294,6 @@ class Solve {
 
 }  // namespace
 
-std::size_t BundleAdjuster::memory_needed(const BundleCapacities& capacities) noexcept {
-  BundleWorkspace w;
-  Count count{(sizeof(BundleWorkspace) + kCacheLine - 1) / kCacheLine * kCacheLine};
-  lay_out(w, capacities, count);
-  return count.bytes;
-}
-
 BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
   // Limits of the index types.
   constexpr std::size_t kMaxPoses = 65535, kMaxObservations = 1U << 28U;

@@ -252,7 +252,7 @@ struct BundleWorkspace;
 ///                  point's minimum depth, so that no point passes through a camera.
 ///
 ///     const BundleCapacities capacities{.poses = poses.size(), .points = points.size()};
-///     Arena arena(BundleAdjuster::memory_needed(capacities));
+///     Arena arena;
 ///     BundleAdjuster adjuster(capacities, arena);
 ///     BundleProblem problem;
 ///     problem.cameras = cameras;
@@ -264,7 +264,7 @@ struct BundleWorkspace;
 ///
 /// Ownership  The problem's arrays are the caller's; no reference is kept after solve().
 /// Threads    solve() by one thread at a time; adjusters are independent of each other.
-/// Memory     memory_needed() bytes of the arena at construction, nothing in solve().
+/// Memory     From the arena at construction, nothing in solve().
 /// Time       One pass over the observations per step, at most max_steps. Deterministic on one
 ///            machine; SIMD targets differ by rounding.
 /// Errors     solve() never throws and never returns NaN; the status states what was changed. The
@@ -277,7 +277,6 @@ class BundleAdjuster {
   BundleAdjuster(const BundleCapacities& capacities, Arena& arena);
   [[nodiscard]] BundleResult solve(const BundleProblem& problem,
                                    const BundleOptions& options) noexcept;
-  [[nodiscard]] static std::size_t memory_needed(const BundleCapacities& capacities) noexcept;
 
  private:
   detail::BundleWorkspace* workspace_;

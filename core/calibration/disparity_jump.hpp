@@ -43,7 +43,6 @@ struct DisparityJump {
 /// Threads  One caller. Time: linear, except for sorting the tracks.
 class DisparityJumpDetector {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   DisparityJumpDetector(std::size_t capacity, Arena& arena);
 
   /// Sets the transform and pinholes in use, and clears the previous frame.

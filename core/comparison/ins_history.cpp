@@ -47,10 +47,6 @@ InsHistory::InsHistory(const ComparisonOptions& options, ComparisonCounters& cou
       counters_(counters),
       readings_(arena.make<Reading>(options.ins_capacity, "comparison: INS samples")) {}
 
-std::size_t InsHistory::bytes_needed(const ComparisonOptions& options) noexcept {
-  return options.ins_capacity * sizeof(Reading) + kCacheLine;
-}
-
 bool InsHistory::accept_stamp(Stamp stamp) noexcept {
   if (end_ > begin_ && stamp <= reading(end_ - 1).stamp) {
     ++counters_.ins_refused;

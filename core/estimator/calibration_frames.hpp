@@ -16,8 +16,6 @@ class CalibrationFrames {
  public:
   CalibrationFrames(const calibration::CalibrationOptions& options, std::size_t tracks,
                     Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const calibration::CalibrationOptions& options,
-                                                 std::size_t tracks) noexcept;
 
   /// Logs the tracks of a posed frame if every camera gave a good image and the tracks have moved
   /// by at least a pixel on average since the last logged frame.

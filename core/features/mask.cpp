@@ -13,11 +13,6 @@ std::size_t words_of(int width) noexcept {
 
 }  // namespace
 
-std::size_t Mask::memory_needed(int width, int height) noexcept {
-  return words_of(width) * static_cast<std::size_t>(std::max(0, height)) * sizeof(std::uint64_t) +
-         kCacheLine;
-}
-
 Mask::Mask(const ImageView& image, int margin, Arena& arena) {
   if (image.empty()) return;
   width_ = image.width;

@@ -21,7 +21,6 @@ class Mask {
   /// Hides the pixels of `image` that are 0 and those within `margin` px of one along x and y. An
   /// empty image hides nothing.
   Mask(const ImageView& image, int margin, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(int width, int height) noexcept;
 
   /// Pixels outside the image are not hidden; callers check the edge.
   [[nodiscard]] bool hides(int x, int y) const noexcept {

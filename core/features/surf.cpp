@@ -54,12 +54,6 @@ struct Surf::Octave {
   int step, first = 0, columns = 0, rows = 0;
 };
 
-std::size_t Surf::memory_needed(int max_width, int max_height) noexcept {
-  return detail::IntegralImage::memory_needed(max_width, max_height) +
-         static_cast<std::size_t>(std::max(0, max_width)) * kLayers * kRows * sizeof(float) +
-         2 * kCacheLine;
-}
-
 Surf::Surf(int max_width, int max_height, Arena& arena)
     : max_width_(std::max(0, max_width)),
       max_height_(std::max(0, max_height)),

@@ -68,7 +68,6 @@ class Surf {
   Surf() noexcept = default;
   /// Throws std::length_error if the arena is full.
   Surf(int max_width, int max_height, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
   /// Sets the image. If the result is not `ok`, there is no image.
   [[nodiscard]] SurfStatus set_image(const ImageView& image) noexcept;

@@ -25,10 +25,6 @@ Vec3 epipolar_line(const EpipolarBand* band, const SurfPoint& p) noexcept {
 
 }  // namespace
 
-std::size_t SurfMatcher::memory_needed(std::size_t capacity) noexcept {
-  return 2 * (capacity * sizeof(Best) + kCacheLine);
-}
-
 SurfMatcher::SurfMatcher(std::size_t capacity, Arena& arena)
     : left_(arena.make<Best>(capacity, "matches of left blobs")),
       right_(arena.make<Best>(capacity, "matches of right blobs")) {}

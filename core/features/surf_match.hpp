@@ -57,7 +57,6 @@ class SurfMatcher {
   /// `capacity`: maximum number of points in either image. Throws std::length_error if the arena is
   /// full.
   SurfMatcher(std::size_t capacity, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
 
   /// Matches are in the order of the left points. `band` may be null.
   [[nodiscard]] SurfMatchStatus match(const SurfView& left, const SurfView& right,

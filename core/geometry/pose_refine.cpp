@@ -35,12 +35,6 @@ constexpr double kMaxCondition = 1e12;
 
 }  // namespace
 
-std::size_t PoseRefiner::memory_needed(std::size_t capacity) noexcept {
-  return detail::PoseProblem::memory_needed(capacity) +
-         static_cast<std::size_t>(kMaxCameras) * capacity * sizeof(double) + capacity +
-         2 * kCacheLine;
-}
-
 PoseRefiner::PoseRefiner(std::size_t capacity, Arena& arena)
     : problem_(capacity, arena, kWho),
       sorted_(arena.make<double>(static_cast<std::size_t>(kMaxCameras) * capacity, kWho)),

@@ -72,7 +72,6 @@ struct RefinedPose {
 ///            instruction set.
 class PoseRefiner {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   /// `capacity`: maximum number of points. Throws std::length_error if the arena is full.
   PoseRefiner(std::size_t capacity, Arena& arena);
 

@@ -51,12 +51,6 @@ constexpr double kMaxCondition = 1e12;
 
 }  // namespace
 
-std::size_t StereoMlesac::memory_needed(std::size_t capacity) noexcept {
-  const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
-  return n * (6 * sizeof(float) + 4 * sizeof(Vec2) + sizeof(double) + sizeof(std::uint32_t) + 2) +
-         14 * kCacheLine;
-}
-
 StereoMlesac::StereoMlesac(std::size_t capacity, Arena& arena) {
   const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
   for (std::span<float>* column : {&x1_, &y1_, &x2_, &y2_, &weight_, &cap_})

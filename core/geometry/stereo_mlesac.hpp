@@ -56,7 +56,6 @@ struct StereoEstimate {
 /// RigMlesac.
 class StereoMlesac {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   /// `capacity`: maximum number of matches. Throws std::length_error if the arena is full.
   StereoMlesac(std::size_t capacity, Arena& arena);
 

@@ -2,14 +2,6 @@
 
 namespace vergence::odometry {
 
-std::size_t BlobMatcher::memory_needed(int max_width, int max_height) noexcept {
-  constexpr std::size_t kOfAnImage =
-      kMaxBlobs * (sizeof(features::SurfPoint) + sizeof(features::SurfDescriptor)) + 2 * kCacheLine;
-  return features::Surf::memory_needed(max_width, max_height) +
-         features::SurfMatcher::memory_needed(kMaxBlobs) + 2 * kOfAnImage +
-         kMaxBlobs * (sizeof(features::SurfMatch) + sizeof(RoughMatch)) + 2 * kCacheLine;
-}
-
 BlobMatcher::BlobMatcher(int max_width, int max_height, Arena& arena)
     : surf_(max_width, max_height, arena),
       matcher_(kMaxBlobs, arena),

@@ -59,24 +59,6 @@ int largest_height(const RigCalibration& rig) noexcept {
 
 }  // namespace
 
-std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCalibration& rig,
-                                    std::span<const ImageView> masks) noexcept {
-  std::size_t bytes = 0;
-  for (const ImageView& mask : masks)
-    if (!mask.empty()) bytes += features::Mask::memory_needed(mask.width, mask.height);
-  for (int k = 0; k < rig.cameras; ++k) {
-    const Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
-    bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) +
-             kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
-  }
-  if (options.init_features != 0)
-    bytes += BlobMatcher::memory_needed(largest_width(rig), largest_height(rig));
-  const auto n = static_cast<std::size_t>(options.features);
-  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint) + sizeof(FreeMatch)) +
-         kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor) + sizeof(float)) +
-         7 * kCacheLine;
-}
-
 FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
                    PairRunner& runner, std::span<const ImageView> masks)
     : options_(options),

@@ -75,9 +75,6 @@ class FrontEnd {
   /// 0. Missing or empty masks hide nothing.
   FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
            PairRunner& runner, std::span<const ImageView> masks = {});
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
-                                                 const RigCalibration& rig,
-                                                 std::span<const ImageView> masks = {}) noexcept;
 
   /// Builds the pyramids of a frame's images.
   [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;

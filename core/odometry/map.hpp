@@ -109,9 +109,6 @@ class Map {
  public:
   Map(std::size_t window, Arena& arena)
       : points_(arena.make<MapPoint>(kMaxPoints, "map points")), window_(window) {}
-  [[nodiscard]] static std::size_t memory_needed() noexcept {
-    return kMaxPoints * sizeof(MapPoint) + 2 * kCacheLine;
-  }
 
   void clear() noexcept;
   /// Returns a cleared free slot, or null if there is none.

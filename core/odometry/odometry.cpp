@@ -28,14 +28,6 @@ constexpr double kUnlinkedBand = 4.0;
 
 }  // namespace
 
-std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCalibration& rig,
-                                    std::span<const ImageView> masks) noexcept {
-  const auto n = static_cast<std::size_t>(options.features);
-  return FrontEnd::memory_needed(options, rig, masks) + Map::memory_needed() +
-         WindowAdjuster::memory_needed(options, rig) + PoseEstimator::memory_needed() +
-         RigInitialiser::memory_needed(n);
-}
-
 Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known,
                    Arena& arena, PairRunner& runner, std::span<const ImageView> masks)
     : options_(options),

@@ -113,9 +113,6 @@ class Odometry {
   /// and the first suitable pair initialises the cameras, unlinked. `masks`: see FrontEnd.
   Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena,
            PairRunner& runner, std::span<const ImageView> masks = {});
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
-                                                 const RigCalibration& rig,
-                                                 std::span<const ImageView> masks = {}) noexcept;
 
   /// Estimates the pose of one frame. If it would take longer than `budget`, work is left out in
   /// WorkBudget's order; zero means no limit. A replayed frame with a recorded workload repeats it.

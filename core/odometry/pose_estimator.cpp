@@ -34,12 +34,6 @@ bool PoseFit::confirmed_stereo() const noexcept {
   return std::popcount(cameras) >= 2 && stereo >= kStereoShare * stereo_found;
 }
 
-std::size_t PoseEstimator::memory_needed() noexcept {
-  return RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) +
-         PoseRefiner::memory_needed(kMaxPoints) + kMaxPoints * (sizeof(std::uint16_t) + 2) +
-         3 * kCacheLine;
-}
-
 PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibration& rig,
                              Arena& arena)
     : options_(options),

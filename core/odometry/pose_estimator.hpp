@@ -37,7 +37,6 @@ struct PoseFit {
 class PoseEstimator {
  public:
   PoseEstimator(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed() noexcept;
 
   /// Fits the pose of linked cameras from `start`; with `sample` by MLESAC first, else by
   /// refinement alone.

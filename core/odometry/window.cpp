@@ -39,13 +39,6 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options,
   return c;
 }
 
-std::size_t WindowAdjuster::memory_needed(const OdometryOptions& options,
-                                          const RigCalibration& rig) noexcept {
-  const BundleCapacities c = capacities(options, rig);
-  return BundleAdjuster::memory_needed(c) + c.points * (sizeof(Vec3) + sizeof(std::uint16_t)) +
-         c.observations * (sizeof(BundleObservation) + sizeof(float)) + 8 * kCacheLine;
-}
-
 WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig,
                                Arena& arena)
     : options_(options), rig_(rig), adjuster_(capacities(options, rig), arena) {

@@ -29,8 +29,6 @@ struct WindowOutcome {
 class WindowAdjuster {
  public:
   WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
-                                                 const RigCalibration& rig) noexcept;
 
   /// Adjusts the newest keyframes within the limits of `effort`. Writes poses and points back if
   /// the result is usable, and drops observations beyond the robust limit. T_camera_left() has the

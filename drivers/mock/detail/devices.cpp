@@ -41,8 +41,7 @@ void MockCamera::allocate(const Intrinsics& lens) {
                                          rig_->options.pattern);
   if (rig_->options.pattern == Pattern::gbrg && !rig_->options.raw)
     mosaic_.resize(FramePool::stride(lens.width) * static_cast<std::size_t>(lens.height));
-  arena_ = std::make_unique<Arena>(
-      FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
+  arena_ = std::make_unique<Arena>();
   pool_ = std::make_unique<FramePool>(lens.width, lens.height, MockRig::kSlots, *arena_);
 }
 

@@ -66,8 +66,7 @@ EstimatorRunOptions with_calibration(const RigCalibration& rig) {
 }
 
 struct EstimatorRun::Parts {
-  explicit Parts(const EstimatorRunOptions& s)
-      : arena(Estimator::memory_needed(s.options, s.initial)) {
+  explicit Parts(const EstimatorRunOptions& s) {
     if (s.threads > 1) {
       two.emplace();
       beside.emplace();

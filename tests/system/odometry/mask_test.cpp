@@ -113,7 +113,7 @@ Passed pass(bool dirty, std::span<const ImageView> masks) {
   const DirtyDrive& d = dirty_drive();
   const StereoDrive& truth = d.drive();
   OdometryOptions options;
-  Arena arena(odometry::Odometry::memory_needed(options, truth.rig, masks));
+  Arena arena;
   SequentialRunner runner;
   odometry::Odometry odometry(options, truth.rig, true, arena, runner, masks);
   Passed passed;

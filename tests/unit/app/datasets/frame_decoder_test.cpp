@@ -53,8 +53,7 @@ class Decoder : public testing::Test {
 
   test::TemporaryFolder folder_;
   StereoSequence sequence_;
-  Arena arena_{FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) +
-               kCacheLine};
+  Arena arena_;
   FramePool pool_{test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena_};
 };
 
@@ -155,9 +154,7 @@ TEST_F(Decoder, truncatesLongName) {
 TEST_F(Decoder, stopsWhileConsumerHoldsPairs) {
   open(40);
   for (const int taken : {0, 1, 10}) {
-    Arena arena(
-        FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) +
-        kCacheLine);
+    Arena arena;
     FramePool pool(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena);
     FrameDecoder decoder(sequence_, 0, 40, pool);
     DecodedPair pair;

@@ -105,7 +105,7 @@ TEST_F(StLuciaImages, readsUnpaddedMicroseconds) {
 
 TEST_F(StLuciaImages, convertsMosaicToGrey) {
   const StereoSequence s = open();
-  Arena arena(FramePool::memory_needed(kWidth, kHeight, FrameDecoder::kSlots) + kCacheLine);
+  Arena arena;
   FramePool pool(kWidth, kHeight, FrameDecoder::kSlots, arena);
   FrameDecoder decoder(s, 0, 2, pool);
   for (std::uint64_t i = 0; i < 2; ++i) {

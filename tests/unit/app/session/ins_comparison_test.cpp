@@ -43,7 +43,7 @@ struct ComparedSession {
   SessionOutput output{observers};
   const std::unique_ptr<EventLog> log = std::make_unique<EventLog>();
   const ComparisonOptions options{};
-  Arena arena{Comparison::bytes_needed(options)};
+  Arena arena;
   InsComparison comparison{options, InsSource::device, arena, *log};
 };
 

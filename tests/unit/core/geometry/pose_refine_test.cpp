@@ -32,9 +32,7 @@ class PoseRefinerTest : public testing::Test {
     }
   }
 
-  Arena arena_{PoseRefiner::memory_needed(kCapacity) +
-               RigObservationTable::memory_needed(kCapacity) +
-               detail::PoseProblem::memory_needed(kCapacity)};
+  Arena arena_;
   PoseRefiner refiner_{kCapacity, arena_};
   RigObservationTable table_{kCapacity, arena_};
   detail::PoseProblem problem_{kCapacity, arena_, "test"};
@@ -185,7 +183,7 @@ TEST_F(PoseRefinerTest, invalidInputHasNoPose) {
   options = {};
   options.gross_chi2 = 0;
   EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, options).usable);
-  Arena small_arena(PoseRefiner::memory_needed(20));
+  Arena small_arena;
   PoseRefiner small(20, small_arena);
   EXPECT_FALSE(small.refine(table_.view(), Transform{}, {}, {}).usable);
 

@@ -9,7 +9,7 @@ namespace vergence::odometry {
 namespace {
 
 struct Filled {
-  Arena arena{Map::memory_needed()};
+  Arena arena;
   Map map;
   explicit Filled(std::size_t window) : map(window, arena) {}
 

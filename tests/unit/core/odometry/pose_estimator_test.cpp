@@ -27,8 +27,7 @@ struct Scene {
   Transform T_left_world{exp_so3({0.3, -0.2, 0.1}), {1, -2, 3}};
   std::array<Transform, kMaxCameras> T_camera_left{};  // true; the rig's may be another
 
-  explicit Scene(int cameras = 2)
-      : arena(Map::memory_needed() + PoseEstimator::memory_needed()), map(10, arena) {
+  explicit Scene(int cameras = 2) : map(10, arena) {
     rig.cameras = cameras;
     for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
       Intrinsics& c = rig.intrinsics[k];

@@ -40,7 +40,7 @@ OdometryOptions many_steps() {
 struct Bend {
   RigCalibration calibration = rig();
   OdometryOptions options = many_steps();
-  Arena arena{Map::memory_needed() + WindowAdjuster::memory_needed(options, calibration)};
+  Arena arena;
   Map map{6, arena};
   WindowAdjuster adjuster{options, calibration, arena};
   std::vector<Transform> poses;
