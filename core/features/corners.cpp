@@ -17,6 +17,7 @@ constexpr float kFlat = 0.25F;
 
 struct Grid {
   int cell, columns, rows;
+  [[nodiscard]] int cells() const noexcept { return columns * rows; }
   [[nodiscard]] int index(float x, float y) const noexcept {
     const int c = std::clamp(static_cast<int>(x) / cell, 0, columns - 1);
     const int r = std::clamp(static_cast<int>(y) / cell, 0, rows - 1);
@@ -88,10 +89,11 @@ void find_corners(const ImageView& image, const CornerOptions& options,
                   std::span<const Corner> taken, PairRunner& runner,
                   BoundedVector<Corner>* out) noexcept {
   out->clear();
-  const int cell = std::clamp(options.cell, 8, kMaxCell);
-  const Grid grid{cell, (image.width + cell - 1) / cell, (image.height + cell - 1) / cell};
-  const int cells = grid.columns * grid.rows;
-  if (image.empty() || cells > kMaxGridCells) return;
+  if (image.empty()) return;
+  Grid grid{};
+  for (int cell = std::max(options.cell, 8); grid.cell == 0 || grid.cells() > kMaxGridCells; ++cell)
+    grid = {cell, (image.width + cell - 1) / cell, (image.height + cell - 1) / cell};
+  if (grid.cell > kMaxCell) return;
   std::array<bool, kMaxGridCells> occupied{};
   for (const Corner& c : taken) occupied[static_cast<std::size_t>(grid.index(c.x, c.y))] = true;
 
@@ -104,7 +106,7 @@ void find_corners(const ImageView& image, const CornerOptions& options,
   };
   runner.run(TaskRef(upper), TaskRef(lower));
 
-  const auto end = std::remove_if(found.begin(), found.begin() + cells,
+  const auto end = std::remove_if(found.begin(), found.begin() + grid.cells(),
                                   [](const Corner& c) { return !(c.score > 0.F); });
   std::sort(found.begin(), end, stronger);
   for (auto it = found.begin(); it != end && !out->full(); ++it)

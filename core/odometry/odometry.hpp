@@ -150,6 +150,8 @@ class Odometry {
   [[nodiscard]] PoseFit fit(const Transform& start, bool sample) noexcept;
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
                               FrameOutcome* out) noexcept;
+  /// True if camera k should see a point of its own frame.
+  [[nodiscard]] bool in_view(int k, const Vec3& p_camera) const noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
   /// Estimates the pose from all map points, without a prediction. Dormant points are followed
   /// again and marked in *revived.
@@ -169,9 +171,6 @@ class Odometry {
                                  FrameOutcome* out) noexcept;
   void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
                    double dt, FrameOutcome* out) noexcept;
-  /// Rebuilds the map from the newest frame at its pose. Returns false if that fails; the old map
-  /// is kept.
-  bool renew_scene(FrameOutcome* out) noexcept;
   void adopt(const RigCalibration& rig) noexcept;
   /// Changes to a calibration and keeps the map: undistorts the window's pixels with the new
   /// intrinsics, triangulates points again, and keeps the newest pose. Returns false if this
@@ -179,8 +178,6 @@ class Odometry {
   [[nodiscard]] bool reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept;
   /// Changes back to the previous calibration if a map can be built with it.
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
-  /// Discards the map; without a calibration the rig must be initialised again.
-  void lose_scene() noexcept;
   void assess_frame(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
 
   const OdometryOptions& options_;

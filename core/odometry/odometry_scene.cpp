@@ -10,15 +10,7 @@
 /// Maps: initialisation, change of calibration, loss.
 namespace vergence::odometry {
 
-using detail::kNearEnough;
-using detail::kRigidShare;
-using detail::StageClock;
-using detail::weakness;
-
 namespace {
-
-// Minimum number of stereo matches to initialise the rig's transform.
-constexpr int kStartMatches = 30;
 
 // Maximum sigma of the direction of t for a start, in rad.
 constexpr double kWorstDirection = 0.1;
@@ -30,13 +22,11 @@ constexpr double kWorstRotation = 0.01;
 bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   StageClock clock(out);
   const std::span<const FreeMatch> matches = front_end_.match_free(1);
-  const std::size_t n = matches.size();
+  const auto n = static_cast<int>(matches.size());
   const StereoEstimate e = initialiser_.estimate(matches, rig_);
   clock.mark(Stage::match);
-  out->reason =
-      n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
-  if (!e.found || e.inliers < kStartMatches || e.inliers < kRigidShare * static_cast<double>(n))
-    return false;
+  out->reason = n < options_.min_inliers ? Reason::needs_texture : Reason::uncalibrated;
+  if (!e.found || e.inliers < options_.min_inliers || e.inliers < kRigidShare * n) return false;
   // If all points are far away, the direction of t is not determined and depths would be arbitrary.
   if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
     out->reason = Reason::needs_near_structure;
@@ -48,11 +38,12 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
 
 bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  StereoCount stereo = front_end_.match_new(nullptr);
+  front_end_.detect_new(nullptr);
+  StereoCount stereo = front_end_.match_new();
   // If half of the corners are matched and near, swapped cameras cannot match more by chance.
-  const bool asked = 2 * stereo.near < stereo.corners;
+  const bool asked = stereo.near < kMajority * stereo.corners;
   const bool exchanged = asked && front_end_.exchanged();
-  if (asked) stereo = front_end_.match_new(nullptr);
+  if (asked) stereo = front_end_.match_new();
   clock.mark(Stage::match);
   if (stereo.corners < options_.min_inliers)
     out->reason = Reason::few_features;
@@ -67,14 +58,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
     front_end_.add_points(T_left_world, PointStage::active, &map_);
     new_points_.reset();
     gaps_.clear_renewal();
-    const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
-    map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
-    keyframe_points_ = 0;
-    for (MapPoint& p : map_.points()) {
-      if (!p.followed()) continue;
-      p.seen[slot] = p.now;
-      ++keyframe_points_;
-    }
+    keyframe_points_ = map_.observe(map_.make_keyframe({T_left_world, rig_.T_camera_left, stamp}));
     out->posed = true;
     out->keyframe = true;
     out->reason = Reason::none;
@@ -127,11 +111,6 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
   frames_lost_ = 0;
 }
 
-void Odometry::lose_scene() noexcept {
-  map_.clear();
-  if (link_ == Link::unlinked) reset_extrinsics();
-}
-
 void Odometry::reset_extrinsics() noexcept {
   rig_known_ = false;
   for (Transform& T : rig_.T_camera_left) T = {};
@@ -155,25 +134,19 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
       out->reason = Reason::no_stereo_matches;
     }
   } else if (gaps_.renewal_due() && out->renewal_due) {
-    out->renewed = renew_scene(out);
+    FrameOutcome built;
+    built.stage_ms = out->stage_ms;
+    out->renewed = start_scene(motion_.T_left_world(), motion_.stamp(), &built);
+    out->keyframe = out->keyframe || out->renewed;
+    out->stage_ms = built.stage_ms;
     // The old map continues if a new one cannot be built.
     gaps_.clear_renewal();
   }
 }
 
-bool Odometry::renew_scene(FrameOutcome* out) noexcept {
-  FrameOutcome built;
-  const bool renewed = start_scene(motion_.T_left_world(), motion_.stamp(), &built);
-  if (renewed) out->keyframe = true;
-  for (std::size_t i = 0; i < out->stage_ms.size(); ++i) out->stage_ms[i] += built.stage_ms[i];
-  return renewed;
-}
-
 bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept {
   const RigCalibration before = rig_;
-  std::array<UndistortedCamera, kMaxCameras> old_lenses;
-  for (int k = 0; k < rig_.cameras; ++k)
-    old_lenses[static_cast<std::size_t>(k)] = front_end_.lens(k);
+  const std::array<UndistortedCamera, kMaxCameras> old_lenses = front_end_.lenses();
   const bool was_linked = link_ == Link::linked;
   if (was_linked) last_rig_ = before;
   const auto held =
@@ -270,12 +243,10 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
 
   const EpipolarEvidence evidence = front_end_.weigh_points(map_);
   // Add the newest frame as a keyframe, so that the points are also adjusted to its observations.
-  const std::size_t newest_slot = map_.make_keyframe(motion_.T_left_world(), motion_.stamp());
-  map_.keyframe(newest_slot).T_camera_left = rig_.T_camera_left;
-  for (MapPoint& p : map_.points())
-    if (p.followed()) p.seen[newest_slot] = p.now;
-  if (window_.adjust(map_).usable)
-    std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
+  const std::size_t newest_slot =
+      map_.make_keyframe({motion_.T_left_world(), rig_.T_camera_left, motion_.stamp()});
+  (void)map_.observe(newest_slot);
+  if (window_.adjust(map_, true).usable) rig_.T_camera_left = window_.T_camera_left();
   const PoseFit newest = poses_.fit_linked(map_, map_.keyframe(newest_slot).T_left_world, false);
   *points_kept =
       held == 0 ? 1

@@ -8,7 +8,6 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr std::size_t kMaxWindowPoints = 1024;
 // Average number of observations per point over all cameras; more are left out.
 constexpr std::size_t kObservationsAPoint = 10;
 // Limit of the squared whitened residual with 2 degrees of freedom; Gaussian errors exceed it with
@@ -33,8 +32,9 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options,
   BundleCapacities c;
   c.cameras = static_cast<std::size_t>(rig.cameras);
   c.poses = static_cast<std::size_t>(options.window_keyframes * rig.cameras);
-  c.points = kMaxWindowPoints;
-  c.observations = kMaxWindowPoints * kObservationsAPoint;
+  // At most half of the map's points are old enough to be seen by two keyframes.
+  c.points = kMaxPoints / 2;
+  c.observations = c.points * kObservationsAPoint;
   c.shared = options.extrinsic_rotation_sigma_rad > 0;
   return c;
 }
@@ -162,16 +162,11 @@ int WindowAdjuster::drop_outliers(Map& map) noexcept {
   return dropped;
 }
 
-WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
-                                    const FrameWorkload& effort) noexcept {
+WindowOutcome WindowAdjuster::solve(bool linked, const FrameWorkload& effort) noexcept {
   WindowOutcome outcome;
-  outcome.points = static_cast<int>(points_.size());
   outcome.observations = static_cast<int>(observations_.size());
   if (poses_.size() < 2 || points_.empty()) return outcome;
   T_camera_left_ = rig_.T_camera_left;
-  if (configuration == BundleConfiguration::stereo_odometry && rotations_free_)
-    configuration = BundleConfiguration::stereo_calibration;
-
   const auto n = static_cast<std::size_t>(rig_.cameras);
   BundleProblem problem;
   problem.cameras = std::span(cameras_).first(n);
@@ -182,37 +177,26 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
   problem.observations = observations_.span();
   problem.squared_residuals = residuals_.first(observations_.size());
   BundleOptions how;
-  how.configuration = configuration;
+  how.configuration = !linked           ? BundleConfiguration::parallel_monocular
+                      : rotations_free_ ? BundleConfiguration::stereo_calibration
+                                        : BundleConfiguration::stereo_odometry;
   how.loss = BundleLoss::huber;
   how.loss_threshold = options_.huber;
   how.max_steps = std::min<int>(options_.window_steps, effort.window_steps);
   how.cost_tolerance = 1e-4;
-  if (configuration == BundleConfiguration::stereo_calibration)
+  if (how.configuration == BundleConfiguration::stereo_calibration)
     how.shared_prior = {&prior_rig_, kInflation};
   const BundleResult result = adjuster_.solve(problem, how);
-  outcome.termination = result.termination;
   outcome.usable = result.usable();
   outcome.steps = result.steps;
-  outcome.rms_px = result.rms_px;
   return outcome;
 }
 
-WindowOutcome WindowAdjuster::adjust(Map& map, const FrameWorkload& effort) noexcept {
-  gather(map, true, effort);
-  WindowOutcome outcome = solve(BundleConfiguration::stereo_odometry, effort);
+WindowOutcome WindowAdjuster::adjust(Map& map, bool linked, const FrameWorkload& effort) noexcept {
+  gather(map, linked, effort);
+  WindowOutcome outcome = solve(linked, effort);
   if (!outcome.usable) return outcome;
-  for (std::size_t i = 0; i < poses_.size(); ++i)
-    map.keyframe(map.order()[oldest_ + i]).T_left_world = {normalised(poses_[i].R), poses_[i].t};
-  for (std::size_t i = 0; i < points_.size(); ++i) map.points()[owner_[i]].p_world = points_[i];
-  outcome.dropped = drop_outliers(map);
-  return outcome;
-}
-
-WindowOutcome WindowAdjuster::adjust_unlinked(Map& map, const FrameWorkload& effort) noexcept {
-  gather(map, false, effort);
-  WindowOutcome outcome = solve(BundleConfiguration::parallel_monocular, effort);
-  if (!outcome.usable) return outcome;
-  const auto images = static_cast<std::size_t>(rig_.cameras);
+  const std::size_t images = linked ? 1 : static_cast<std::size_t>(rig_.cameras);
   for (std::size_t i = 0; oldest_ + i < map.order().size(); ++i) {
     Keyframe& keyframe = map.keyframe(map.order()[oldest_ + i]);
     const Transform& left = poses_[i * images];

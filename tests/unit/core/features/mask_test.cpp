@@ -42,17 +42,14 @@ TEST(Mask, zeroPixelsAndTheirMarginAreHidden) {
   for (const int margin : {0, 1, 7}) {
     Arena arena;
     const Mask mask(image.view(), margin, arena);
-    std::int64_t hidden = 0;
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x) {
         bool near = false;
         for (int v = std::max(0, y - margin); v <= std::min(kHeight - 1, y + margin); ++v)
           for (int u = std::max(0, x - margin); u <= std::min(kWidth - 1, x + margin); ++u)
             near = near || image.view().at(u, v) == 0;
-        hidden += near ? 1 : 0;
         ASSERT_EQ(mask.hides(x, y), near) << x << ", " << y << ", margin " << margin;
       }
-    EXPECT_EQ(mask.count(), hidden);
   }
 }
 
