@@ -15,13 +15,16 @@ using Index = Eigen::Index;
 // Added to a unit variance, to keep covariances written with few digits positive definite.
 constexpr double kRidge = 1e-9;
 
-/// One row of the layout as a combination of at most six published parameters.
-struct Combination {
-  int first = 0, count = 0;
-  double factor[6]{};
-};
+double covariance_of(const RigCovariance& C, const Combination& a, const Combination& b) noexcept {
+  double sum = 0;
+  for (int i = 0; i < a.count; ++i)
+    for (int j = 0; j < b.count; ++j)
+      sum += a.factor[i] * b.factor[j] * C(a.first + i, b.first + j);
+  return sum;
+}
 
-/// Row of (τ, φ) of camera k at the mean from the published (φ, τ): row r of Bᵀ [R₀ᵀ τ; R₀ᵀ φ].
+}  // namespace
+
 Combination extrinsic_combination(const Mat6& basis, const Mat3& R, int k, int row) noexcept {
   Combination c;
   c.first = extrinsic_row(k);
@@ -33,16 +36,6 @@ Combination extrinsic_combination(const Mat6& basis, const Mat3& R, int k, int r
   }
   return c;
 }
-
-double covariance_of(const RigCovariance& C, const Combination& a, const Combination& b) noexcept {
-  double sum = 0;
-  for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j < b.count; ++j)
-      sum += a.factor[i] * b.factor[j] * C(a.first + i, b.first + j);
-  return sum;
-}
-
-}  // namespace
 
 SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& layout,
                          std::size_t cameras) noexcept
