@@ -9,8 +9,6 @@
 namespace vergence::odometry {
 namespace {
 
-// Margin of the image in pixels: half a window and one more.
-constexpr double kImageMargin = 9.0;
 // Minimum standard deviation of the coarsest level in grey levels; a lens cap's noise stays below
 // 2.
 constexpr float kMinStructure = 3.0F;

@@ -18,6 +18,10 @@
 
 namespace vergence::odometry {
 
+/// Margin of the image in px, in which points are not followed: half a row of a window in memory,
+/// and one more.
+inline constexpr double kImageMargin = features::kWindowStride / 2 + 1;
+
 /// Checks of the images of one frame.
 struct ImageCheck {
   /// Bit k is set if camera k delivered an image.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <optional>
 
 #include "core/types/time.hpp"
 
@@ -19,9 +20,8 @@ class GapDetector {
  public:
   /// Call for every frame. Returns the seconds since the previous one; 0 for the first.
   [[nodiscard]] double since_frame(Stamp frame) noexcept {
-    const double since = any_ ? (frame - last_).to_seconds() : 0;
-    if (any_) intervals_[count_++ % kIntervals] = since;
-    any_ = true;
+    const double since = last_ ? (frame - *last_).to_seconds() : 0;
+    if (last_) intervals_[count_++ % kIntervals] = since;
     last_ = frame;
     return since;
   }
@@ -55,9 +55,8 @@ class GapDetector {
     return *middle;
   }
 
-  // True once there was a frame, at `last_`.
-  bool any_ = false;
-  Stamp last_{};
+  // Stamp of the last frame.
+  std::optional<Stamp> last_;
   // In seconds.
   std::array<double, kIntervals> intervals_{};
   std::size_t count_ = 0;

@@ -12,23 +12,14 @@ namespace vergence::odometry {
 
 namespace {
 
-// Minimum share of found points that agree.
-constexpr double kSampleShare = 0.3;
 // Minimum share if no attempt does better; a wrong calibration leaves a quarter of the far points.
 constexpr double kMinSampleShare = 0.2;
-// Maximum rms residual in px, however many points agree.
-constexpr double kSampleResidual = 3.0;
-// Minimum number of points that agree on a pose; of rough matches 8 do by chance.
-constexpr int kRelocaliseInliers = 15;
-// Margin of the image in px, in which a patch does not fit.
-constexpr double kBorder = 12.0;
 // Number of rig frames, so four images, before a point constrains poses.
 constexpr std::uint16_t kFoundEnough = 2;
 
 /// True if the pose of the sample is accurate enough to follow all points from it.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
-  return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given &&
-         fit.rms_px < kSampleResidual;
+  return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given;
 }
 
 }  // namespace
@@ -59,7 +50,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     fit = this->fit(*a.start, true);
     clock.mark(Stage::pose);
     if (sample_agrees(fit, kMinSampleShare) && fit.inliers > best.inliers) best = fit;
-    if (sample_agrees(fit, kSampleShare)) break;
+    if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
   bool unreliable = frames_lost_ > 0 || out->gap_s > 0;
@@ -86,7 +77,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
 
 void Odometry::recover_cameras(const PoseFit& fit) noexcept {
   for (int k = 1; k < rig_.cameras; ++k) {
-    if (has_camera(fit.cameras, k) || front_end_.relocalise(map_, k) < kRelocaliseInliers) continue;
+    if (has_camera(fit.cameras, k) || front_end_.relocalise(map_, k) < kCameraAlone) continue;
     Transform& T_camera_left = rig_.T_camera_left[static_cast<std::size_t>(k)];
     Transform T_camera_world;
     if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, &T_camera_world)) continue;
@@ -98,7 +89,7 @@ bool Odometry::in_view(int k, const Vec3& p_camera) const noexcept {
   Vec2 pixel;
   const Camera& camera = front_end_.lens(k).raw();
   return camera.project(p_camera, &pixel, nullptr) == ProjectStatus::ok &&
-         camera.inside(pixel, kBorder) && !front_end_.hides(k, pixel);
+         camera.inside(pixel, kImageMargin) && !front_end_.hides(k, pixel);
 }
 
 int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
@@ -114,10 +105,10 @@ PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived
   const int candidates = front_end_.relocalise(map_, 0);
   clock.mark(Stage::match);
   PoseFit fit;
-  if (candidates < kRelocaliseInliers) return fit;
+  if (candidates < kCameraAlone) return fit;
   fit = this->fit(motion_.T_left_world(), true);
   clock.mark(Stage::pose);
-  fit.found = fit.inliers >= kRelocaliseInliers;
+  fit.found = fit.inliers >= kCameraAlone;
   if (!fit.found) return fit;
   out->relocalised = true;
   // Points that are not found are dropped as usual.

@@ -12,8 +12,6 @@
 namespace vergence::odometry {
 namespace {
 
-// Minimum number of inliers of a camera's own pose.
-constexpr int kCameraAlone = 12;
 // Maximum ratio of matches to inliers; wrong matches agree by chance.
 constexpr int kByChance = 4;
 

@@ -11,6 +11,9 @@ inline constexpr double kMajority = 0.5;
 /// Minimum number of inliers that do not agree by chance. Three points determine a pose; five more
 /// of thirty, found within 32 px, agree with it to half a pixel once in 10¹⁰ hypotheses.
 inline constexpr int kMinAgreeing = 8;
+/// Minimum number of inliers of a pose that only one camera's observations, or rough matches,
+/// support; a few more than agree by chance.
+inline constexpr int kCameraAlone = 12;
 
 /// Pose of the rig from this frame's observations of the map, with its support.
 struct PoseFit {

@@ -15,10 +15,6 @@ constexpr std::size_t kObservationsAPoint = 10;
 constexpr float kOutlier = 16.F;
 // Minimum number of observations that determine a pose.
 constexpr int kObservationsOfPose = 3;
-// Minimum depth of a point in every camera that sees it, in metres.
-constexpr double kMinDepthOfPoint = 0.05;
-// Depth in metres at which the calibration's depth error is evaluated.
-constexpr double kReferenceDepth = 20.0;
 // Sigma in rad and m of rig parameters that a window does not estimate.
 constexpr double kHeldSigma = 1e-6;
 // Inflation of a variance: an unmodelled lens field of 0.03 px does not average out over 2000
@@ -73,8 +69,9 @@ void WindowAdjuster::set_rotation_prior() noexcept {
       return;
     }
     // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
-    const double known = 0.01 * calibration::depth_error_percent(rig_, k, kReferenceDepth) *
-                         t.norm() / kReferenceDepth;
+    const double known = 0.01 *
+                         calibration::depth_error_percent(rig_, k, calibration::kRatingDepth) *
+                         t.norm() / calibration::kRatingDepth;
     const double sigma = known > 0 ? std::min(known, options_.extrinsic_rotation_sigma_rad)
                                    : options_.extrinsic_rotation_sigma_rad;
     const Mat3 turn = sigma * sigma * axis.normalized() * axis.normalized().transpose() +
@@ -123,7 +120,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
         const std::size_t pose =
             linked ? frame - oldest_ : (frame - oldest_) * static_cast<std::size_t>(images) + c;
         const Vec3 here = poses_[pose] * p.p_world;
-        if ((linked ? rig_.T_camera_left[c] * here : here).z() < kMinDepthOfPoint) continue;
+        if ((linked ? rig_.T_camera_left[c] * here : here).z() < kMinDepth) continue;
         BundleObservation o;
         o.point = static_cast<std::uint32_t>(points_.size());
         o.pose = static_cast<std::uint16_t>(pose);
