@@ -27,7 +27,7 @@ struct Grid {
 
 /// Best unmasked local maximum of the block's scores without its outer ring; score 0 if there is
 /// none. (x0, y0): the block's first pixel in the image.
-Corner best_of(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
+Corner best_corner(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
   Corner best;
   for (int y = 1; y < h - 1; ++y) {
     const float* s = score + y * detail::kMaxBlock;
@@ -74,7 +74,7 @@ void scan_rows(const ImageView& image, const CornerOptions& options, const Grid&
       const int y1 = std::min((r + 1) * grid.cell, image.height - low) + 1;
       if (x1 - x0 < 4 || y1 - y0 < 4) continue;
       detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data());
-      Corner best = best_of(score.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
+      Corner best = best_corner(score.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
       if (!(best.score > kFlat)) continue;
       best.x += static_cast<float>(x0);
       best.y += static_cast<float>(y0);

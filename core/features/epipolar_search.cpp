@@ -17,7 +17,7 @@ using detail::kBlock;
 constexpr int kPlaces = kMaxSearchSteps * 5;
 constexpr int kMaxBand = 2;
 
-Block middle_of(const Patch& patch, int level) noexcept {
+Block middle_block(const Patch& patch, int level) noexcept {
   Block b;
   const auto& from = patch.pixels[static_cast<std::size_t>(level)];
   constexpr int kFirst = kPatchSide / 2 - kBlock / 2;
@@ -69,7 +69,7 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   const Vec2 along = (last - first).normalized();
   const bool horizontal = std::abs(along.x()) >= std::abs(along.y());
   const int band = std::clamp(options.band, 0, kMaxBand);
-  const Block block = middle_of(patch, level);
+  const Block block = middle_block(patch, level);
   // The block's first pixel is kBlock/2 before the searched pixel; the anchor's offset in its pixel
   // moves with it.
   const Vec2 anchor = patch.offset[static_cast<std::size_t>(level)].cast<double>();

@@ -134,7 +134,7 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
                                     const features::AlignOptions& how) const noexcept {
   Followed f;
   const auto i = static_cast<std::size_t>(k);
-  if (!placed(k)) return f;
+  if (!has_extrinsics(k)) return f;
   const Transform T_k_world = rig_.T_camera_left[i] * T_left_world;
   const Camera& camera = lenses_[i].raw();
   Vec2 predicted;

@@ -119,7 +119,7 @@ class FrontEnd {
 
   /// Returns true if the corners of the last match_new() fit the rig better with its cameras
   /// swapped. Discards the matches.
-  [[nodiscard]] bool exchanged() noexcept;
+  [[nodiscard]] bool swapped() noexcept;
 
   [[nodiscard]] const std::array<UndistortedCamera, kMaxCameras>& lenses() const noexcept {
     return lenses_;
@@ -172,7 +172,7 @@ class FrontEnd {
   /// which weights the effect of the patch's unknown slope.
   [[nodiscard]] bool finish(int k, const Vec2& raw, double by_noise, double parallax,
                             Followed* f) const noexcept;
-  void match_stereo(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
+  void match_stereo(const features::Corner& corner, bool swapped, NewPoint* out) const noexcept;
   [[nodiscard]] features::CornerOptions corner_options(int k) const noexcept;
   /// Finds corners of camera k four times as dense as points, so that most corners of the other
   /// image have a partner.
@@ -180,13 +180,13 @@ class FrontEnd {
   void match_corners_freely(int k) noexcept;
   /// Aligns a rough match and keeps it if that succeeds and there is room.
   void keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept;
-  void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
+  void match_all(std::span<const features::Corner> corners, bool swapped) noexcept;
   /// Weighs `distances_`.
   [[nodiscard]] EpipolarEvidence weigh_distances() noexcept;
   /// Weighs the epipolar distances of the matches whose disparity exceeds `min_disparity`.
   [[nodiscard]] EpipolarEvidence weigh(double min_disparity) noexcept;
   /// True if camera k's transform is known at least roughly; before, it is the identity.
-  [[nodiscard]] bool placed(int k) const noexcept {
+  [[nodiscard]] bool has_extrinsics(int k) const noexcept {
     return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0;
   }
   /// Mask of camera k, or null.

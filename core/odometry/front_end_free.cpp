@@ -60,7 +60,7 @@ int FrontEnd::relocalise(Map& map, int k) noexcept {
   std::array<std::uint16_t, kMaxPoints> owner;
   std::size_t n = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!points[i].holds_poses()) continue;
+    if (!points[i].constrains_poses()) continue;
     described_[n] = features::describe(points[i].patch);
     owner[n++] = static_cast<std::uint16_t>(i);
   }

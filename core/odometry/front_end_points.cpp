@@ -23,21 +23,21 @@ features::CornerOptions FrontEnd::corner_options(int k) const noexcept {
   return how;
 }
 
-void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
+void FrontEnd::match_stereo(const features::Corner& corner, bool swapped,
                             NewPoint* out) const noexcept {
   out->usable = false;
   const Vec2 at(corner.x, corner.y);
   if (!features::cut_patch(pyramids_[0], at, &out->patch)) return;
   if (!finish(0, at, 0.0, 0.0, &out->left)) return;
   for (int k = 1; k < cameras_; ++k) {
-    if (!has_camera(structured_, k) || !placed(k)) continue;
+    if (!has_camera(structured_, k) || !has_extrinsics(k)) continue;
     const auto i = static_cast<std::size_t>(k);
     // With the cameras swapped, the first image is that of camera k.
-    const UndistortedCamera& here = lenses_[exchanged ? i : 0];
+    const UndistortedCamera& here = lenses_[swapped ? i : 0];
     if (!here.ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) continue;
     const Transform& T_k_left = rig_.T_camera_left[i];
-    const features::EpipolarCurve curve{&lenses_[exchanged ? 0 : i].raw(),
-                                        exchanged ? T_k_left.inverse() : T_k_left, out->ray};
+    const features::EpipolarCurve curve{&lenses_[swapped ? 0 : i].raw(),
+                                        swapped ? T_k_left.inverse() : T_k_left, out->ray};
     const double baseline = rig_.T_camera_left[i].t.norm();
     // Search over the width of the image; two cameras do not both see nearer points.
     const Intrinsics& lens = rig_.intrinsics[i];
@@ -75,10 +75,10 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
   }
 }
 
-void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchanged) noexcept {
+void FrontEnd::match_all(std::span<const features::Corner> corners, bool swapped) noexcept {
   const std::size_t half = corners.size() / 2;
   const auto some = [&](std::size_t begin, std::size_t end) noexcept {
-    for (std::size_t i = begin; i < end; ++i) match_stereo(corners[i], exchanged, &fresh_[i]);
+    for (std::size_t i = begin; i < end; ++i) match_stereo(corners[i], swapped, &fresh_[i]);
   };
   auto first = [&]() noexcept { some(0, half); };
   auto second = [&]() noexcept { some(half, corners.size()); };
@@ -144,7 +144,7 @@ EpipolarEvidence FrontEnd::weigh_points(const Map& map) noexcept {
   return weigh_distances();
 }
 
-bool FrontEnd::exchanged() noexcept {
+bool FrontEnd::swapped() noexcept {
   const double as_given = weigh(kNearDisparity).log_likelihood_ratio;
   match_all(corners_.span(), true);
   const EpipolarEvidence other = weigh(kNearDisparity);

@@ -94,7 +94,7 @@ struct MapPoint {
   std::array<PointObservation, kMaxWindow> seen{};
 
   /// True if the position is accurate enough to constrain poses.
-  [[nodiscard]] bool holds_poses() const noexcept {
+  [[nodiscard]] bool constrains_poses() const noexcept {
     return stage == PointStage::active || stage == PointStage::dormant;
   }
   [[nodiscard]] bool followed() const noexcept {

@@ -147,7 +147,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
       adopt(*std::exchange(next_rig_, std::nullopt));
       out.relinked = true;
     }
-    begin_scene(frame, images, predicted, dt, &out);
+    begin_map(frame, images, predicted, dt, &out);
     return out;
   }
 

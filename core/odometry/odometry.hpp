@@ -167,15 +167,15 @@ class Odometry {
   double new_points(int min_corners, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
-  [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp,
-                                 FrameOutcome* out) noexcept;
-  void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
-                   double dt, FrameOutcome* out) noexcept;
+  [[nodiscard]] bool start_map(const Transform& T_left_world, Stamp stamp,
+                               FrameOutcome* out) noexcept;
+  void begin_map(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
+                 double dt, FrameOutcome* out) noexcept;
   void adopt(const RigCalibration& rig) noexcept;
   /// Changes to a calibration and keeps the map: undistorts the window's pixels with the new
   /// intrinsics, triangulates points again, and keeps the newest pose. Returns false if this
   /// frame's matches do not fit the calibration.
-  [[nodiscard]] bool reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept;
+  [[nodiscard]] bool reexpress_map(const RigCalibration& rig, double* points_kept) noexcept;
   /// Changes back to the previous calibration if a map can be built with it.
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
   void assess_frame(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;

@@ -125,7 +125,7 @@ PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived
 void Odometry::count_across(const PoseFit& fit) noexcept {
   int expected = 0, seen = 0;
   for (MapPoint& p : map_.points()) {
-    if (!p.holds_poses() || !p.now.by(0)) continue;
+    if (!p.constrains_poses() || !p.now.by(0)) continue;
     const bool now = std::popcount(p.now.cameras) > 1;
     bool visible = now;
     for (int k = 1; k < rig_.cameras && !visible; ++k)
@@ -141,7 +141,7 @@ void Odometry::count_across(const PoseFit& fit) noexcept {
 void Odometry::settle_points(const PoseFit& fit) noexcept {
   for (MapPoint& p : map_.points()) p.in_images = p.now.cameras;
   for (std::size_t i = 0; i < map_.points().size(); ++i)
-    if (map_.points()[i].holds_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
+    if (map_.points()[i].constrains_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
   count_across(fit);
   int tried = 0, kept = 0;
   for (MapPoint& p : map_.points()) {

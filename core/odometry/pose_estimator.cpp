@@ -58,7 +58,7 @@ bool PoseEstimator::others_move(const Map& map, const Transform& T_left_world) n
   collect(map, rig_, 0, [](const MapPoint& p) noexcept {
     return p.now.cameras == 0 ? p.in_images : std::uint8_t{0};
   });
-  return holds_camera(solve(T_left_world, true));
+  return supports_camera(solve(T_left_world, true));
 }
 
 void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
@@ -67,7 +67,7 @@ void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
   one.intrinsics[0] = rig_.intrinsics[static_cast<std::size_t>(k)];
   collect(map, one, k, [k](const MapPoint& p) noexcept {
     std::uint8_t cameras = 0;
-    if (p.holds_poses() && p.now.by(k)) add_camera(&cameras, k);
+    if (p.constrains_poses() && p.now.by(k)) add_camera(&cameras, k);
     return cameras;
   });
 }
@@ -108,7 +108,7 @@ void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
   const std::span<const MapPoint> points = map.points();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const MapPoint& p = points[i];
-    if (!p.holds_poses() || p.now.cameras == 0) continue;
+    if (!p.constrains_poses() || p.now.cameras == 0) continue;
     ++fit->given;
     if (std::popcount(p.now.cameras) > 1) ++fit->stereo_found;
     const std::uint8_t good = agrees_[i];
@@ -134,7 +134,7 @@ void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
 PoseFit PoseEstimator::fit_all(const Map& map, const Transform& start, bool sample,
                                bool left_only) noexcept {
   collect(map, rig_, 0, [](const MapPoint& p) noexcept {
-    return p.holds_poses() ? p.now.cameras : std::uint8_t{0};
+    return p.constrains_poses() ? p.now.cameras : std::uint8_t{0};
   });
   PoseFit fit;
   fit.T_left_world = start;
@@ -170,7 +170,7 @@ PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
   return all;
 }
 
-bool PoseEstimator::holds_camera(const Solved& s) const noexcept {
+bool PoseEstimator::supports_camera(const Solved& s) const noexcept {
   return s.inliers >= kCameraAlone && kByChance * s.inliers >= static_cast<int>(owner_.size());
 }
 
@@ -178,7 +178,7 @@ bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start,
                                Transform* T_camera_world) noexcept {
   collect_camera(map, k);
   const Solved s = solve(start, true);
-  if (!holds_camera(s)) return false;
+  if (!supports_camera(s)) return false;
   *T_camera_world = s.T;
   return true;
 }
@@ -194,7 +194,7 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
     const auto c = static_cast<std::size_t>(k);
     collect_camera(map, k);
     const Solved s = solve(T_camera_left[c] * (k == 0 ? start : fit.T_left_world), sample);
-    if (!holds_camera(s)) {
+    if (!supports_camera(s)) {
       // The rig's pose needs the left camera's.
       if (k == 0) break;
       continue;

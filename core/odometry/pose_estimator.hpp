@@ -99,7 +99,7 @@ class PoseEstimator {
   [[nodiscard]] PoseFit fit_all(const Map& map, const Transform& start, bool sample,
                                 bool left_only) noexcept;
   /// Returns true if a camera's own pose, solved from all rows of the table, can be relied on.
-  [[nodiscard]] bool holds_camera(const Solved& s) const noexcept;
+  [[nodiscard]] bool supports_camera(const Solved& s) const noexcept;
   [[nodiscard]] PoseRefineOptions how_to_refine(bool rough) const noexcept;
   void count(const Map& map, PoseFit* fit) const noexcept;
 

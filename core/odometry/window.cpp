@@ -106,7 +106,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
   const std::span<MapPoint> all = map.points();
   for (std::size_t i = 0; i < all.size(); ++i) {
     const MapPoint& p = all[i];
-    if (!p.holds_poses()) continue;
+    if (!p.constrains_poses()) continue;
     const std::size_t first = observations_.size();
     int keyframes = 0;
     bool fits = !points_.full();

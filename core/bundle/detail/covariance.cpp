@@ -62,14 +62,14 @@ void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t s
 
 /// Prior in addition to the tracks: its information, and its contribution to the gradient's
 /// variance as a separate cluster.
-struct KnownBeside {
+struct PriorInformation {
   Shared information, variance;
 };
 
-KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem,
-                         const BundleOptions& options, const BundleState& state,
-                         const System& system) noexcept {
-  KnownBeside known{Shared::Zero(s.size, s.size), Shared::Zero(s.size, s.size)};
+PriorInformation prior_information(const SharedLayout& s, const BundleProblem& problem,
+                                   const BundleOptions& options, const BundleState& state,
+                                   const System& system) noexcept {
+  PriorInformation known{Shared::Zero(s.size, s.size), Shared::Zero(s.size, s.size)};
   for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
     if (s.extrinsic[k] >= 0 && options.length[k].kind == BundleLength::measured) {
       const Transform& T = state.T_camera_left[k];
@@ -160,7 +160,7 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem,
 
   poses_to_shared(A, ld, first, size);
   const Shared meat = track_variance(w, problem, options, state, system);
-  const KnownBeside known = known_beside(layout, problem, options, state, system);
+  const PriorInformation known = prior_information(layout, problem, options, state, system);
   Shared own_meat(p.estimated_count, p.estimated_count);
   double clustered = 0, believed = 0;
   for (int r = 0; r < p.estimated_count; ++r)

@@ -15,7 +15,8 @@ using Index = Eigen::Index;
 // Added to a unit variance, to keep covariances written with few digits positive definite.
 constexpr double kRidge = 1e-9;
 
-double covariance_of(const RigCovariance& C, const Combination& a, const Combination& b) noexcept {
+double combined_covariance(const RigCovariance& C, const Combination& a,
+                           const Combination& b) noexcept {
   double sum = 0;
   for (int i = 0; i < a.count; ++i)
     for (int j = 0; j < b.count; ++j)
@@ -54,7 +55,7 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
     for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) {
       rows[n] = extrinsic_combination(basis, T.R, number, i);
       // If the transform is unknown, so is the rest.
-      if (!(covariance_of(prior.rig->covariance, rows[n], rows[n]) > 0)) return;
+      if (!(combined_covariance(prior.rig->covariance, rows[n], rows[n]) > 0)) return;
       place[n++] = layout.extrinsic[k] + i;
     }
   }
@@ -73,11 +74,11 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
   SharedMatrix C(n, n);
   SharedVector scale(n);
   for (int i = 0; i < n; ++i)
-    scale[i] = 1.0 / std::sqrt(covariance_of(prior.rig->covariance, rows[i], rows[i]));
+    scale[i] = 1.0 / std::sqrt(combined_covariance(prior.rig->covariance, rows[i], rows[i]));
   for (int i = 0; i < n; ++i)
     for (int j = 0; j <= i; ++j)
       C(i, j) = C(j, i) =
-          scale[i] * scale[j] * covariance_of(prior.rig->covariance, rows[i], rows[j]);
+          scale[i] * scale[j] * combined_covariance(prior.rig->covariance, rows[i], rows[j]);
   C.diagonal().array() += kRidge;
   const Eigen::LLT<SharedMatrix> factor(C);
   if (factor.info() != Eigen::Success) return;

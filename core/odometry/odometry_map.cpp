@@ -36,18 +36,18 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   return true;
 }
 
-bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
+bool Odometry::start_map(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
   front_end_.detect_new(nullptr);
   StereoCount stereo = front_end_.match_new();
   // If half of the corners are matched and near, swapped cameras cannot match more by chance.
   const bool asked = stereo.near < kMajority * stereo.corners;
-  const bool exchanged = asked && front_end_.exchanged();
+  const bool swapped = asked && front_end_.swapped();
   if (asked) stereo = front_end_.match_new();
   clock.mark(Stage::match);
   if (stereo.corners < options_.min_inliers)
     out->reason = Reason::few_features;
-  else if (exchanged)
+  else if (swapped)
     out->reason = Reason::cameras_swapped;
   else if (!stereo.evidence.fits() || stereo.matched < options_.min_inliers)
     out->reason = Reason::no_stereo_matches;
@@ -70,15 +70,15 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   return false;
 }
 
-void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
-                           const Transform& predicted, double dt, FrameOutcome* out) noexcept {
+void Odometry::begin_map(const RigFrame& frame, const ImageCheck& images,
+                         const Transform& predicted, double dt, FrameOutcome* out) noexcept {
   // Without points to follow, this frame starts a map at the predicted end of the last one.
   const Reason of_images = weakness(images, rig_.cameras);
   const bool unknown = link_ == Link::unlinked && !rig_known_;
   bool started = unknown && resume(predicted, frame.stamp, out);
   const bool initialise = unknown && !started;
   if (!started)
-    started = (!initialise || initialise_rig(out)) && start_scene(predicted, frame.stamp, out);
+    started = (!initialise || initialise_rig(out)) && start_map(predicted, frame.stamp, out);
   if (!started && link_ == Link::linked && out->reason == Reason::no_stereo_matches)
     started = resume(predicted, frame.stamp, out);
   if (!started) {
@@ -129,14 +129,14 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   if (next_rig_ && out->relink_due) {
     const RigCalibration next = *std::exchange(next_rig_, std::nullopt);
     out->relinked = true;
-    if (!reexpress_scene(next, &out->points_kept)) {
+    if (!reexpress_map(next, &out->points_kept)) {
       out->status = PoseStatus::degraded;
       out->reason = Reason::no_stereo_matches;
     }
   } else if (gaps_.renewal_due() && out->renewal_due) {
     FrameOutcome built;
     built.stage_ms = out->stage_ms;
-    out->renewed = start_scene(motion_.T_left_world(), motion_.stamp(), &built);
+    out->renewed = start_map(motion_.T_left_world(), motion_.stamp(), &built);
     out->keyframe = out->keyframe || out->renewed;
     out->stage_ms = built.stage_ms;
     // The old map continues if a new one cannot be built.
@@ -144,14 +144,14 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   }
 }
 
-bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept {
+bool Odometry::reexpress_map(const RigCalibration& rig, double* points_kept) noexcept {
   const RigCalibration before = rig_;
   const std::array<UndistortedCamera, kMaxCameras> old_lenses = front_end_.lenses();
   const bool was_linked = link_ == Link::linked;
   if (was_linked) last_rig_ = before;
   const auto held =
       std::count_if(map_.points().begin(), map_.points().end(),
-                    [](const MapPoint& p) { return p.holds_poses() && p.now.cameras != 0; });
+                    [](const MapPoint& p) { return p.constrains_poses() && p.now.cameras != 0; });
   adopt(rig);
 
   // Converts a direction in the old model of camera k to a raw pixel, and to an ideal pixel of the
@@ -209,7 +209,7 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
   std::size_t n = 0;
   Transform T_left_world, T_right_left;
   for (const MapPoint& p : map_.points()) {
-    if (!p.holds_poses()) continue;
+    if (!p.constrains_poses()) continue;
     where(p, &T_left_world, &T_right_left);
     const Vec3 X = T_left_world * p.p_world;
     Vec3 again;
@@ -261,7 +261,7 @@ bool Odometry::resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* 
   const RigCalibration now = rig_;
   adopt(*last_rig_);
   FrameOutcome resumed = *out;
-  if (start_scene(T_left_world, stamp, &resumed)) {
+  if (start_map(T_left_world, stamp, &resumed)) {
     *out = resumed;
     out->relinked = out->resumed = true;
     out->points_kept = 1;
