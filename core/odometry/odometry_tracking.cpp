@@ -14,12 +14,15 @@ namespace {
 
 // Minimum share if no attempt does better; a wrong calibration leaves a quarter of the far points.
 constexpr double kMinSampleShare = 0.2;
+// Maximum rms residual in px, however many points agree; on a motorway wrong poses have such ones.
+constexpr double kSampleResidual = 3.0;
 // Number of rig frames, so four images, before a point constrains poses.
 constexpr std::uint16_t kFoundEnough = 2;
 
 /// True if the pose of the sample is accurate enough to follow all points from it.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
-  return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given;
+  return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given &&
+         fit.rms_px < kSampleResidual;
 }
 
 }  // namespace
