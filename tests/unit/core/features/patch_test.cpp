@@ -177,8 +177,8 @@ TEST(Patch, otherTextureOrNegativeIsNotMatched) {
     const Built b(image.view());
     Patch patch{};
     ASSERT_TRUE(cut_patch(b.pyramid, {90, 80}, &patch));
-    const AlignResult r =
-        align_in(draw(kWidth, kHeight, Texture(seed + 1000, 4, 9)), patch, {90, 80});
+    const AlignResult r = align_in(draw(kWidth, kHeight, Texture(seed + 1000, 4, 9)), patch,
+                                   {90, 80}, Mat2::Identity(), {.min_zncc = 0.8F});
     EXPECT_NE(r.status, AlignStatus::ok) << seed;
   }
   // The negative has the right edges in the right places.
