@@ -184,7 +184,7 @@ TEST(Patch, otherTextureOrNegativeIsNotMatched) {
   // The negative has the right edges in the right places.
   const Scene s(1);
   EXPECT_NE(align_in(draw(kWidth, kHeight, [&](const Vec2& p) { return 255 - s.texture(p); }),
-                     s.patch, s.at)
+                     s.patch, s.at, Mat2::Identity(), {.min_zncc = 0.8F})
                 .status,
             AlignStatus::ok);
 }

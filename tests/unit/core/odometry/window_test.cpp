@@ -113,8 +113,6 @@ TEST(WindowAdjuster, exactObservationsRestoreThePoses) {
   const int before = b.observations();
   const WindowOutcome out = b.adjuster.adjust(b.map, true);
   EXPECT_LT(b.worst_pose_error(), 1e-6);
-  EXPECT_LT(out.rms_px, 1e-4);  // what rounding to floats leaves
-  EXPECT_GT(out.points, 100);
   EXPECT_EQ(out.dropped, 0);
   EXPECT_EQ(b.observations(), before);
   EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, first.t)
