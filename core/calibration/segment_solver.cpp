@@ -17,7 +17,7 @@ SegmentSolver::SegmentSolver(Kind kind, const RigCalibration& given, const RigCa
                          static_cast<std::size_t>(options.max_frames))),
       solver_(options_, monitor, given.cameras, features, arena) {}
 
-std::optional<RigSolution> SegmentSolver::take(const TrackLog& tracks) noexcept {
+std::optional<RigSolution> SegmentSolver::add(const TrackLog& tracks) noexcept {
   std::optional<RigSolution> solved;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const LoggedFrame& f = tracks.frame(i);

@@ -31,8 +31,8 @@ CalibrationFrames::CalibrationFrames(const calibration::CalibrationOptions& opti
                                      std::size_t tracks, Arena& arena)
     : options_(options), log_(static_cast<std::size_t>(options.max_frames), tracks, arena) {}
 
-void CalibrationFrames::take(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
-                             const RigFrame& frame) noexcept {
+void CalibrationFrames::add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+                            const RigFrame& frame) noexcept {
   if (outcome.scale != 1.0) log_.scale_about(outcome.T_left_world.centre(), outcome.scale);
   ++frames_still_;
   if (!outcome.images_good || pixels_moved(odometry.map()) < kMovedPixels) return;

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "core/features/patch.hpp"
 #include "core/odometry/front_end.hpp"

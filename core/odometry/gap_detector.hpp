@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <optional>
 
 #include "core/types/time.hpp"
 
@@ -20,8 +19,9 @@ class GapDetector {
  public:
   /// Call for every frame. Returns the seconds since the previous one; 0 for the first.
   [[nodiscard]] double since_frame(Stamp frame) noexcept {
-    const double since = last_ ? (frame - *last_).to_seconds() : 0;
-    if (last_) intervals_[count_++ % kIntervals] = since;
+    const double since = frames_ > 0 ? (frame - last_).to_seconds() : 0;
+    if (frames_ > 0) intervals_[(frames_ - 1) % kIntervals] = since;
+    ++frames_;
     last_ = frame;
     return since;
   }
@@ -47,7 +47,7 @@ class GapDetector {
 
   /// Median interval in seconds; gaps have no effect unless they are the majority.
   [[nodiscard]] double usual_interval() const noexcept {
-    const std::size_t n = std::min(count_, kIntervals);
+    const std::size_t n = std::min(std::max<std::size_t>(frames_, 1) - 1, kIntervals);
     if (n == 0) return 0;
     std::array<double, kIntervals> sorted = intervals_;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>((n - 1) / 2);
@@ -56,10 +56,10 @@ class GapDetector {
   }
 
   // Stamp of the last frame.
-  std::optional<Stamp> last_;
+  Stamp last_{};
   // In seconds.
   std::array<double, kIntervals> intervals_{};
-  std::size_t count_ = 0;
+  std::size_t frames_ = 0;
   // True if the newest frame came after a gap.
   bool before_ = false;
   bool due_ = false;
