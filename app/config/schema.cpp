@@ -435,9 +435,9 @@ Group sync() {
           "of one IEEE "
           "1394 cycle timer; `ptp`, stamps of one PTP "
           "clock; `side_by_side`, both images come in one (`cameras.N.image_half`). Not verified: "
-          "`counter`, exposure n of every camera belongs together; "
-          "`software`, what was exposed within "
-          "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
+          "`frame_counter`, images with equal exposure counts; "
+          "`approximate_time`, images stamped within "
+          "`tolerance_ms` by the host's clock, for cameras without a trigger.")
       .number("timeout_ms", &S::timeout_ms, 1, 10000, "ms",
               "Maximum wait for a late image of a pulse.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
