@@ -20,7 +20,7 @@ class CalibrationFrames {
   /// Logs the tracks of a posed frame if every camera gave a good image and the tracks have moved
   /// by at least a pixel on average since the last logged frame.
   void add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
-            const RigFrame& frame) noexcept;
+           const RigFrame& frame) noexcept;
   /// Returns true if no frame was logged for so long that the rig must be standing still.
   [[nodiscard]] bool standing() const noexcept;
   void restart_standing() noexcept { frames_still_ = 0; }
