@@ -61,6 +61,11 @@ class RosWriter {
   std::string bytes_;
 };
 
+/// A number of `size` bytes, little endian.
+[[nodiscard]] std::string number(std::uint64_t value, int size);
+/// Records packed as one frame of LZ4.
+[[nodiscard]] std::string lz4_frame(const std::string& records);
+
 /// A recording in memory.
 class BagWriter {
  public:

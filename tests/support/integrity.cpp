@@ -4,7 +4,6 @@
 #include <optional>
 #include <utility>
 
-#include "core/math/so3.hpp"
 
 namespace vergence::test {
 namespace {

@@ -3,11 +3,9 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
-#include "core/math/random.hpp"
 #include "firmware_iface/trigger/board/board.h"
 #include "tests/support/simulators/device_model.hpp"
 

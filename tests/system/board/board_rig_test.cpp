@@ -3,15 +3,12 @@
 #include <dlfcn.h>
 #include <errno.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <fstream>
 #include <map>
 #include <string_view>
-#include <thread>
 
 #include "drivers/serial/serial.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"

@@ -2,7 +2,6 @@
 // simulated cameras.
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <thread>
 
 #include <fmt/format.h>

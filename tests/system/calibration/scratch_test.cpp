@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/calibration/gates.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/system/odometry/estimator_run.hpp"
 
 namespace vergence::test {

@@ -18,6 +18,8 @@ struct FaultCase {
   /// ("/devices/clock_resets") that are not 0, or lines on the terminal. None: poses that are not
   /// those of the untouched drive.
   std::vector<std::string> said{};
+  /// Kinds of events that must not occur.
+  std::vector<std::string> unsaid{};
   std::string more{};    // further arguments
   std::string system{};  // what goes wrong below the program, in real time (faulty_system.c)
   double duration_s = 20;

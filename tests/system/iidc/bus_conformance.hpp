@@ -2,7 +2,6 @@
 #include <chrono>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/camera_options.hpp"

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -7,8 +8,6 @@
 #include <iterator>
 #include <string>
 #include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/trajectory_files.hpp"
@@ -187,6 +186,19 @@ TEST(Recorded, realTimeRunReplaysBitForBit) {
   ASSERT_LE(o.code, 1) << o.err;
   ASSERT_LE(replay(folder / "live", folder / "again").code, 1);
   expect_same_poses(folder / "live", folder / "again");
+}
+
+// In real time: with --fast the poses are ahead of the file that is written.
+TEST(Recorded, everySplitFileHoldsCameraTransforms) {
+  const TemporaryFolder folder;
+  const Outcome o = drive(folder / "s", "--duration 3 --set record.split_mb=1");
+  ASSERT_LE(o.code, 1) << o.err;
+  for (const char* name : {"drive_0.mcap", "drive_1.mcap"}) {
+    const auto file = test::read_mcap(folder / "s" / name);
+    EXPECT_TRUE(std::any_of(file.messages.begin(), file.messages.end(), [](const auto& m) {
+      return m.topic == "/tf_static";
+    })) << name;
+  }
 }
 
 /// A rectified drive with a truth that is a straight drive at constant speed and ends `short_ns`

@@ -4,10 +4,7 @@
 #include <sched.h>
 
 #include <algorithm>
-#include <atomic>
 #include <fstream>
-#include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,12 +25,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-class Ros2Restarts : public testing::Test {
- protected:
-  TemporaryFolder folder_;
-  std::string socket_ = (folder_.path() / "pose.sock").string();
-  std::uint32_t domain_ = own_domain();
-};
+using Ros2Restarts = Ros2Rig;
 
 TEST_F(Ros2Restarts, nextSessionIsFoundGapIsStale) {
   const std::string log = (folder_.path() / "log").string();

@@ -15,12 +15,7 @@ namespace {
 
 using app::FileDescriptor;
 
-class Ros2Topics : public testing::Test {
- protected:
-  TemporaryFolder folder_;
-  std::string socket_ = (folder_.path() / "pose.sock").string();
-  std::uint32_t domain_ = own_domain();
-};
+using Ros2Topics = Ros2Rig;
 
 void expect_identity(const geometry_msgs_msg_dds__Quaternion_& q) {
   EXPECT_EQ(q.w, 1);

@@ -1,18 +1,13 @@
 // The V4L2 driver on the kernel's own test cameras, as a USB camera would be: webcam inputs, nobody
 // at the far side.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstring>
 #include <filesystem>
-#include <map>
 #include <set>
-#include <thread>
 
 #include "drivers/v4l2/v4l2.hpp"
 #include "tests/rigs/vivid.hpp"

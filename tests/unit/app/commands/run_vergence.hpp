@@ -2,8 +2,6 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include "tests/support/temporary_folder.hpp"
@@ -21,21 +19,12 @@ struct Outcome {
 [[nodiscard]] inline Outcome run_vergence(const std::string& arguments,
                                           const std::string& before = "") {
   const TemporaryFolder folder;
-  const auto text = [](const std::filesystem::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    std::ostringstream all;
-    all << in.rdbuf();
-    return all.str();
-  };
   const auto out = folder / "out", err = folder / "err";
   const std::string command = before + " '" + VERGENCE_PROGRAM + "' " + arguments + " >'" +
                               out.string() + "' 2>'" + err.string() + "' </dev/null";
   const int status = std::system(command.c_str());
-  Outcome outcome;
-  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  outcome.out = text(out);
-  outcome.err = text(err);
-  return outcome;
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(out),
+          read_file(err)};
 }
 
 }  // namespace vergence::test

@@ -9,8 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/errors.hpp"
-#include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {

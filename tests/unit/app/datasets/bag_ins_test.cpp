@@ -8,7 +8,6 @@
 
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/bag_in_memory.hpp"

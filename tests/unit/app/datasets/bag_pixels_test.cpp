@@ -8,7 +8,6 @@
 
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/types/bayer.hpp"
 #include "tests/support/bag_in_memory.hpp"
 #include "tests/support/refusal.hpp"

@@ -7,7 +7,6 @@
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/ros_messages.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -13,9 +13,7 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stamp_text.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/math/so3.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 

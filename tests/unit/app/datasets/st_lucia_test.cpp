@@ -14,7 +14,6 @@
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/recorded_ins.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
 #include "core/types/bayer.hpp"
 #include "tests/support/refusal.hpp"

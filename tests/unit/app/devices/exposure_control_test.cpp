@@ -8,26 +8,19 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/idle_camera.hpp"
+
 namespace vergence::app {
 namespace {
 
 constexpr int kWidth = 96, kHeight = 64;
 
 /// Answers as told, after a while.
-class SlowCamera final : public CameraDevice {
+class SlowCamera final : public test::IdleCamera {
  public:
-  const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration&, CameraConfiguration*) noexcept override {
-    return DeviceStatus::ok;
-  }
-  DeviceTiming timing() const noexcept override { return {}; }
-  DeviceStatus start(Notifier*) noexcept override { return DeviceStatus::ok; }
-  DeviceStatus wait(Duration, Frame*) noexcept override { return DeviceStatus::timeout; }
   ImageView view(FrameSlot) const noexcept override {
     return {pixels_.data(), kWidth, kHeight, kWidth};
   }
-  void release(FrameSlot) noexcept override {}
-  void stop() noexcept override {}
   DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -35,7 +28,6 @@ class SlowCamera final : public CameraDevice {
     if (answer.load() == DeviceStatus::ok) *actual = requested;
     return answer.load();
   }
-  CameraStatistics statistics() const noexcept override { return {}; }
   void expose_for(ExposureControl* control) {
     Frame frame;
     frame.exposure = has.exposure;
@@ -49,7 +41,6 @@ class SlowCamera final : public CameraDevice {
   std::atomic<DeviceStatus> answer{DeviceStatus::ok};
 
  private:
-  DeviceInfo info_;
   std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight, 10);  // dark
 };
 

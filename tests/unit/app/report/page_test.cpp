@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "app/report/report.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/session_writer.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
@@ -146,22 +145,6 @@ TEST(CalibrationWriter, reportsWhetherNextDriveHasIt) {
         std::string(outcome.event.message.data()).find("calibration.yaml") != std::string::npos,
         session_fails);
   }
-}
-
-TEST(CalibrationWriter, postingDoesNotAllocate) {
-  if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  const test::TemporaryFolder folder;
-  CalibrationWriter writer({.session = folder.path(), .when_full = WhenFull::wait});
-  const CalibrationRecord record = found(false);
-  const auto before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    for (int i = 0; i < 100; ++i) writer.on_calibration(record);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
-  EXPECT_TRUE(close(&writer).empty());
-  EXPECT_EQ(writer.totals().rejected, 100U);
 }
 
 }  // namespace

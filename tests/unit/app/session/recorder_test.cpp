@@ -13,7 +13,6 @@
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/session/records.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
@@ -146,27 +145,6 @@ TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
     if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   EXPECT_TRUE(found);
-}
-
-TEST(Recorder, postingAllocatesNothing) {
-  if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {.ins = true});
-  EstimatorEvent event;
-  event.why = "a state changed";
-  const auto before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    for (std::uint64_t i = 0; i < 1000; ++i) {
-      recorder.on_report(pose(i, PoseStatus::ok, 0));
-      recorder.on_event(EventRecord::of(event));
-      recorder.on_reading(InsRecord{});
-    }
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
-  EXPECT_EQ(recorder.close()->dropped_readings, 0U);
-  EXPECT_EQ(lines_of(folder / "ins.csv").size(), 1001U);
 }
 
 }  // namespace
