@@ -42,7 +42,8 @@ DriveOutcome calibrated_first(const RecordedSequence& d, const StereoSequence& s
 
 struct Reach {
   const char* name;
-  double segments_percent, ate_m, scale;  // at most; off from 1 at most
+  /// Maximum errors; `scale` is the maximum difference from 1.
+  double segments_percent, ate_m, scale;
 };
 
 class RecordedLenses : public testing::TestWithParam<Reach> {};
@@ -110,7 +111,8 @@ TEST(RecordedCalibration, rotationFromTheStartIsEstimatedAndNoKnock) {
     const Mat3 R = exp_so3(kDegree * degrees) * straight.rig->T_camera_left[1].R;
     const Vec3 off = log_so3(found.rig->T_camera_left[1].R * R.transpose()) / kDegree;
     std::printf("turned by %.2f deg: %.4f deg off\n", degrees.norm(), off.norm());
-    EXPECT_LT(off.norm(), 0.05) << off.transpose();  // lenses are free, too
+    // The intrinsics are estimated, too.
+    EXPECT_LT(off.norm(), 0.05) << off.transpose();
   }
 }
 

@@ -12,7 +12,8 @@
 namespace vergence::test {
 namespace {
 
-constexpr double kAt = 9;  // s: the calibration is confirmed by then
+/// Time in s at which the calibration is verified.
+constexpr double kAt = 9;
 
 /// A fault without its times.
 struct Kind {
@@ -83,7 +84,8 @@ void add(const Kind& kind, double at_s, FaultCase* c) {
   c->from_s = first ? at_s : std::min(c->from_s, at_s);
   c->until_s = std::max(c->until_s, at_s + kind.seconds);
   c->recovers_within_s = std::max(c->recovers_within_s, kind.recovers);
-  c->duration_s = c->until_s + c->recovers_within_s + 2;  // twenty frames and some
+  // Two seconds are more than twenty frames.
+  c->duration_s = c->until_s + c->recovers_within_s + 2;
 }
 
 }  // namespace
@@ -161,7 +163,8 @@ FaultCase random_faults(std::uint64_t seed) {
     kind.seconds = static_cast<double>(static_cast<int>(kind.seconds * 1000)) / 1000;
     add(kind, static_cast<double>(1000 + random.below(13'000)) / 1000, &c);
   }
-  c.duration_s = std::max(c.duration_s, 12.0);  // the calibration is confirmed at 6 s
+  // The calibration is verified at 6 s.
+  c.duration_s = std::max(c.duration_s, 12.0);
   return c;
 }
 

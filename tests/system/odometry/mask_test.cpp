@@ -11,9 +11,11 @@ namespace vergence::test {
 namespace {
 
 constexpr std::size_t kFrames = 120;
-constexpr int kBonnet = 110;  // rows
+/// Height in rows.
+constexpr int kBonnet = 110;
 const std::array<Eigen::Vector2i, 2> kDirt{Eigen::Vector2i(210, 170), Eigen::Vector2i(430, 205)};
-constexpr int kDirtRadius = 38;  // px
+/// Radius in px.
+constexpr int kDirtRadius = 38;
 
 /// Part of camera k's image that is not the street: the bonnet, dirt on the glass.
 bool is_painted(std::size_t k, int x, int y, int height) {
@@ -80,10 +82,12 @@ const DirtyDrive& dirty_drive() {
 }
 
 struct Passed {
-  std::array<int, 2> observations{}, painted{};  // by camera; of these, of what is painted
+  /// Observations by camera, and those of them on painted pixels.
+  std::array<int, 2> observations{}, painted{};
   int posed = 0;
   Transform T_left_world{};
-  double error = 0;  // m, of the way from the first frame to the last
+  /// Error in m of the motion from the first frame to the last.
+  double error = 0;
 };
 
 Passed pass(bool dirty, std::span<const ImageView> masks) {

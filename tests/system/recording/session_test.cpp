@@ -97,7 +97,8 @@ TEST_F(RecordedDrive, recordingHasEveryMessageOnceAndIsFinished) {
   EXPECT_EQ(count["/vergence/frame"], frames);
   EXPECT_EQ(count["/left/image_raw"], frames);
   EXPECT_EQ(count["/left/camera_info"], frames);
-  EXPECT_LT(count["/right/image_raw"], frames);  // it was gone
+  // The right camera was disconnected for a second.
+  EXPECT_LT(count["/right/image_raw"], frames);
   EXPECT_EQ(count["/ins/fix"], count["/vergence/ins_reading"]);
   EXPECT_EQ(count["/vergence/session"], 1);
   EXPECT_GE(count["/tf_static"], 1);
@@ -203,7 +204,8 @@ TEST(Recorded, everySplitFileHoldsCameraTransforms) {
 
 /// A rectified drive with a truth that is a straight drive at constant speed and ends `short_ns`
 /// before the last frame.
-constexpr double kSpeed = 40;  // m/s
+/// Speed in m/s.
+constexpr double kSpeed = 40;
 void drive_with_truth(const std::filesystem::path& session, std::int64_t short_ns) {
   const Outcome o =
       drive(session, "--fast --duration 2 --set rig.nominal.k1=0 --set rig.nominal.k2=0");
@@ -220,7 +222,8 @@ void drive_with_truth(const std::filesystem::path& session, std::int64_t short_n
 // The stamps of frames are measured, those of the truth exact: 8 µs are 0.3 mm.
 TEST(RecordedTruth, truthEndingMicrosecondsEarlyIsExtrapolated) {
   const TemporaryFolder folder;
-  constexpr std::int64_t kShort = 8'000;  // ns
+  // Missing time in ns.
+  constexpr std::int64_t kShort = 8'000;
   drive_with_truth(folder / "s", kShort);
   for (const std::string format : {"kitti", "euroc"}) {
     const Outcome o = export_to(folder / format, folder / "s", "--format " + format);

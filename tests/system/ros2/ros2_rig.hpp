@@ -261,8 +261,10 @@ class StreamSession {
   static constexpr int kWidth = 640, kHeight = 480;
   static constexpr std::size_t kShifts = 997;
 
-  static constexpr std::int64_t kFirst = 1'577'836'800'000'000'001;  // ns
-  static constexpr std::int64_t kInterval = 50'000'000;              // ns
+  /// First stamp in ns.
+  static constexpr std::int64_t kFirst = 1'577'836'800'000'000'001;
+  /// Frame interval in ns.
+  static constexpr std::int64_t kInterval = 50'000'000;
   app::SessionRequests requests;
 
  private:

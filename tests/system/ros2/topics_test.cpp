@@ -150,7 +150,8 @@ TEST_F(Ros2Topics, imagesEqualTheSessionsAndShareStamps) {
   RosReader<RosCameraInfo> left_info(participant, "/vergence/left/camera_info"),
       right_info(participant, "/vergence/right/camera_info");
   RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
-  std::map<std::int64_t, int> received;  // by frame: images, camera_info and odometry
+  // Number of images, camera_info and odometry messages by frame.
+  std::map<std::int64_t, int> received;
   int images = 0;
   const auto take = [&](RosReader<RosImage>* reader, std::size_t camera) {
     for (const RosImage* m; (m = reader->take()) != nullptr; ++images) {
@@ -228,7 +229,8 @@ TEST_F(Ros2Topics, nodeIsAnnouncedInHumblesLayout) {
 
 struct RefusalCase {
   std::vector<std::string> words;
-  std::string named;  // by the message
+  /// Part of the message.
+  std::string named;
 };
 void PrintTo(const RefusalCase& c, std::ostream* out) { *out << c.named; }
 

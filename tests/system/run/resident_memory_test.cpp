@@ -28,9 +28,12 @@ constexpr std::int64_t kKiB = 1024;
 /// other up to its capacity: it is told apart, with what lies beside it in one mapping. Of the
 /// large mappings the other is the mock's way, which is laid out at the start.
 struct Resident {
-  std::int64_t arena = 0;         // large mappings without a file
-  std::int64_t arena_mapped = 0;  // and what these could hold
-  std::int64_t others = 0;        // all the rest of the process
+  /// Resident part of large mappings without a file.
+  std::int64_t arena = 0;
+  /// Capacity of those mappings.
+  std::int64_t arena_mapped = 0;
+  /// Resident part of the rest of the process.
+  std::int64_t others = 0;
 };
 constexpr std::int64_t kLargeMapping = 64 * 1024 * kKiB;
 
@@ -42,7 +45,8 @@ std::optional<Resident> resident_of(pid_t process) {
   Resident resident;
   for (std::string line; std::getline(smaps, line);) {
     const auto dash = line.find('-'), colon = line.find(':');
-    if (dash < colon && dash < line.find(' ')) {  // 7f…-7f… rw-p 00000000 00:00 0   name
+    // The line begins a mapping: 7f…-7f… rw-p 00000000 00:00 0 name.
+    if (dash < colon && dash < line.find(' ')) {
       const std::uint64_t begin = std::strtoull(line.c_str(), nullptr, 16),
                           end = std::strtoull(line.c_str() + dash + 1, nullptr, 16);
       size = static_cast<std::int64_t>(end - begin);
@@ -70,8 +74,10 @@ int handles_of(pid_t process) {
 /// A drive that goes on for `seconds` of its own time with one frame a second.
 struct SlowDrive {
   int seconds = 0;
-  double speed = 0.0;  // m/s, so that the way lasts as long
-  int settled = 0;     // frames after which growth counts
+  /// Speed in m/s, low enough for the path to last.
+  double speed = 0.0;
+  /// Number of frames after which growth counts.
+  int settled = 0;
 };
 
 pid_t start(const SlowDrive& drive, const std::filesystem::path& session) {
@@ -99,14 +105,18 @@ struct Growth {
   Resident at_the_end{};
   int handles_settled = 0, handles_at_the_end = 0;
   int frames = 0;
-  int status = 0;         // of waitpid, of a drive that ended by itself
-  bool too_slow = false;  // `wall` was over while frames still came
+  /// Status of waitpid() of a run that ended before it was killed.
+  int status = 0;
+  /// True if `wall` expired while frames still came.
+  bool too_slow = false;
 };
 
 Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
-  constexpr int kReport = 5;  // frames before the end: what is written then takes memory of its own
+  // Frames before the end, from which on the report needs memory.
+  constexpr int kReport = 5;
   constexpr std::chrono::milliseconds kLook{500};
-  constexpr std::chrono::seconds kHung{20};  // a solve on a busy machine takes a few
+  // A solve takes a few seconds on a busy machine.
+  constexpr std::chrono::seconds kHung{20};
   const TemporaryFolder folder;
   const pid_t process = start(drive, folder / "s");
   const auto until = std::chrono::steady_clock::now() + wall;
@@ -157,7 +167,8 @@ void expect_flat(const Growth& growth, int least) {
 }
 
 TEST(ResidentMemory, twentyMinutesTakeNoMoreThanOne) {
-  constexpr int kTwenty = 20 * 60, kTen = 10 * 60, kMinute = 60;  // s, and frames
+  // Times in s, and numbers of frames.
+  constexpr int kTwenty = 20 * 60, kTen = 10 * 60, kMinute = 60;
   expect_flat(growth_of({kTwenty, 0.8, kMinute}, std::chrono::seconds(100)), kTen);
 }
 

@@ -71,8 +71,8 @@ TEST(Run, everySuppliedSimulatedConfigurationRuns) {
   for (const auto& entry :
        std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
     if (entry.path().extension() != ".yaml") continue;
-    if (text_of(entry.path()).find("driver: mock") == std::string::npos)
-      continue;  // real cameras: tests/system has them on their stacks
+    // Other tests of tests/system run real cameras on their stacks.
+    if (text_of(entry.path()).find("driver: mock") == std::string::npos) continue;
     ++files;
     const TemporaryFolder folder;
     const Outcome o = run_vergence("run '" + entry.path().string() +
@@ -102,7 +102,8 @@ TEST(Run, realTimeFramesArePosedOrCounted) {
                 devices["camera0_underruns"].get<int>(),
             81);
   const std::string poses = text_of(session / "poses.csv");
-  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n') - 1,  // but for the head
+  // The header is not counted.
+  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n') - 1,
             read - summary["drops"]["lines"].get<int>());
   EXPECT_EQ(summary["runtime_allocations"], 0);
   std::ifstream lines(session / "events.jsonl");
@@ -138,7 +139,8 @@ TEST(Run, idealInsReferenceIsTruthWithinAMillimetre) {
   double worst_m = 0, worst_rad = 0;
   const Transform& T0 = truth[100].T_world_body;
   const Transform& R0 = reference[100].T_world_body;
-  for (std::size_t i = 100; i < reference.size(); ++i) {  // the clocks are known after five seconds
+  // The clocks are synchronised after five seconds.
+  for (std::size_t i = 100; i < reference.size(); ++i) {
     ASSERT_LT(std::abs((reference[i].stamp - truth[i].stamp).to_seconds()), 1e-4);
     const Transform step = T0.inverse() * truth[i].T_world_body,
                     ours = R0.inverse() * reference[i].T_world_body;

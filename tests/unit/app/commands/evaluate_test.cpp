@@ -68,8 +68,8 @@ TEST(EvaluateCommand, matchesReferenceToSixDigits) {
       const auto got = nlohmann::json::parse(o.out);
       expect_same(expected, got, name);
       EXPECT_EQ(got["dropped"], answer["dropped"]);
-      EXPECT_EQ(got["roll_about_path_unobservable"],
-                pair == "c");  // the straight one, and only that
+      // Only the path of pair c is straight.
+      EXPECT_EQ(got["roll_about_path_unobservable"], pair == "c");
     }
   }
 }
@@ -121,8 +121,8 @@ std::string session_with_ins(const test::TemporaryFolder& folder, const std::str
   const LocalTangentPlane plane({-27.5, 153, 60});
   Transform T_ins_left = mount_of({0.9, 0.4, 0}, {0, 0, 2 * M_PI / 180});
   std::string ours, readings = std::string(kInsHeader) + "\n", line;
-  const Transform T_world_enu =
-      (place_at(0) * T_ins_left).inverse();  // the odometry begins where it is
+  // The world of the odometry starts at the first left camera pose.
+  const Transform T_world_enu = (place_at(0) * T_ins_left).inverse();
   for (int i = 0; i < 4800; ++i) {
     const double t = 0.025 * i;
     const Transform T = place_at(t);

@@ -10,7 +10,8 @@ namespace vergence::test {
 
 /// Result of one run of the built program.
 struct Outcome {
-  int code = -1;  // exit code; 128 + number when a signal ended it
+  /// Exit code, or 128 + the number of the signal that ended the program.
+  int code = -1;
   std::string out, err;
 };
 

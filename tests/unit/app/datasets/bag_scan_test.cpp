@@ -92,7 +92,8 @@ TEST_P(BagScanOf, truncatedBagGivesCompleteChunksOnly) {
 TEST_P(BagScanOf, survivesAnyChangedByte) {
   const std::string whole = small_file(GetParam());
   for (std::size_t i = 8; i < whole.size(); ++i) {
-    if (whole[i] == ' ') continue;  // what pads the first record of a ROS 1 bag
+    // Blanks pad the first record of a ROS 1 bag.
+    if (whole[i] == ' ') continue;
     for (const char value : {'\x00', '\x7f', '\xff'}) {
       std::string spoilt = whole;
       spoilt[i] = value;

@@ -164,7 +164,8 @@ TEST_F(Decoder, stopsWhileConsumerHoldsPairs) {
       ASSERT_TRUE(decoder.next(&pair));
       decoder.release(pair);
     }
-    if (taken == 0) continue;  // the destructor alone
+    // This case tests the destructor alone.
+    if (taken == 0) continue;
     decoder.stop();
     EXPECT_FALSE(decoder.next(&pair));
   }

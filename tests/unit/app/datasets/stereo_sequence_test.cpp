@@ -246,7 +246,8 @@ void make_deep(const test::TemporaryFolder& folder, int pairs, int most) {
 // A disk that was full, a shutter that was shut: they say nothing of the others.
 TEST_F(Sequence, detectsEffectiveBitsFromSamples) {
   struct Case {
-    int most, last;  // samples of the first pairs and of the last one
+    /// Highest samples of the first pairs and of the last one.
+    int most, last;
     int bits;
   };
   for (const Case& c : {Case{4095, 4095, 12}, Case{1000, 1000, 10}, Case{16383, 16383, 14},

@@ -14,7 +14,8 @@ using test::contains;
 using test::FakeMachine;
 using enum FindingState;
 
-constexpr std::uint32_t kHost = 0xC0A80A01U, kMask24 = 0xFFFFFF00U;  // 192.168.10.1/24
+/// The host is 192.168.10.1/24.
+constexpr std::uint32_t kHost = 0xC0A80A01U, kMask24 = 0xFFFFFF00U;
 const std::string kLimits =
     "Max realtime priority     0                    0\n"
     "Max locked memory         8388608              8388608   bytes\n";

@@ -41,7 +41,8 @@ class SlowCamera final : public test::IdleCamera {
   std::atomic<DeviceStatus> answer{DeviceStatus::ok};
 
  private:
-  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight, 10);  // dark
+  /// The image is dark.
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight, 10);
 };
 
 TEST(ExposureControl, slowCameraDoesNotDelayFrames) {
@@ -71,7 +72,8 @@ TEST(ExposureControl, unableCameraEndsItForgetfulOneIsAskedAgain) {
 
   exposure::ExposureOptions options;
   options.target = 20;
-  options.dead_band = 1;  // 10 grey levels are within a stop of 20
+  // Ten grey levels are within a stop of 20.
+  options.dead_band = 1;
   // Another exposure than it was given, or another gain alone.
   for (const ExposureSetting& has : {ExposureSetting{Duration::microseconds(100), 0},
                                      ExposureSetting{Duration::microseconds(1000), 6}}) {
@@ -86,7 +88,8 @@ TEST(ExposureControl, unableCameraEndsItForgetfulOneIsAskedAgain) {
 
 TEST(ExposureControl, changeWhileDisconnectedIsRepeatedOnReturn) {
   const ExposureSetting start{Duration::microseconds(1000), 0};
-  SlowCamera camera;  // dark: a longer exposure is asked for
+  // The image is dark, so a longer exposure is requested.
+  SlowCamera camera;
   camera.has = start;
   camera.answer = DeviceStatus::disconnected;
   exposure::ExposureOptions options;
@@ -94,7 +97,8 @@ TEST(ExposureControl, changeWhileDisconnectedIsRepeatedOnReturn) {
   const auto look = [&] { camera.expose_for(&control); };
   while (camera.asked == 0) look();
   camera.answer = DeviceStatus::ok;
-  camera.show(options.target);  // nothing more is to be changed
+  // No further change is needed.
+  camera.show(options.target);
   for (int i = 0; i < 8 * options.settle_frames && camera.asked == 1; ++i) look();
   EXPECT_EQ(camera.asked, 2);
   EXPECT_EQ(control.counters().again, 1U);

@@ -71,7 +71,8 @@ TEST(PoseLine, hasEveryKeyOfTheSchema) {
                 q.coeffs()[static_cast<Eigen::Index>(i)], 1e-9);
   ASSERT_EQ(j["covariance"].size(), 21U);
   EXPECT_DOUBLE_EQ(j["covariance"][0], 0.25);
-  EXPECT_DOUBLE_EQ(j["covariance"][20], 1e-6);  // four digits are written
+  // Four digits are written.
+  EXPECT_DOUBLE_EQ(j["covariance"][20], 1e-6);
   ASSERT_EQ(j["motion_covariance"].size(), 21U);
   EXPECT_DOUBLE_EQ(j["motion_covariance"][6], 0.0004);
   EXPECT_DOUBLE_EQ(j["length_sigma"], 0.0125);
@@ -280,7 +281,8 @@ TEST(LinePublisher, imagesFollowARequestForThem) {
   start.image_bytes = 6;
   const Publishing p(start, R"({"request": "images", "rate_hz": 5})");
   const Kept* socket = p.socket;
-  const std::string pixels = "abcdefgh";  // rows of 4 bytes
+  // Rows have 4 bytes.
+  const std::string pixels = "abcdefgh";
   RigFrame frame;
   frame.cameras = 2;
   frame.images[0] = {reinterpret_cast<const std::uint8_t*>(pixels.data()), 3, 2, 4};

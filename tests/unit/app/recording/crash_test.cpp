@@ -27,7 +27,8 @@ namespace {
 struct PostTimes {
   static constexpr std::uint32_t kMax = 1U << 16U;
   std::atomic<std::uint32_t> posted{0};
-  std::array<std::int64_t, kMax> at_ns{};  // steady clock
+  /// Times of the steady clock.
+  std::array<std::int64_t, kMax> at_ns{};
 };
 
 std::int64_t steady_ns() {
@@ -35,9 +36,12 @@ std::int64_t steady_ns() {
 }
 
 struct Killed {
-  std::uint32_t posted = 0;      // messages
-  std::int64_t killed_ns = 0;    // just before the signal
-  std::vector<std::int64_t> at;  // of each message
+  /// Number of messages posted.
+  std::uint32_t posted = 0;
+  /// Time just before the signal.
+  std::int64_t killed_ns = 0;
+  /// Time of each message.
+  std::vector<std::int64_t> at;
 };
 
 /// A process of its own records a text of 100 bytes every millisecond and an image every 33, and is

@@ -165,7 +165,8 @@ struct Bridged {
   Bridge bridge;
 };
 
-constexpr std::int64_t kStep = 50'000'000;  // ns
+/// Frame interval in ns.
+constexpr std::int64_t kStep = 50'000'000;
 
 /// A vehicle that drives an arc at a constant speed, whose camera sits off its origin: the speed
 /// and the pose of the vehicle come out, not those of the camera.
@@ -226,15 +227,18 @@ TEST(Bridge, poseCovarianceIsOfTheBaseFrame) {
 }
 
 TEST(Bridge, twistCovarianceAddsScaleUncertainty) {
-  BridgeOptions options;  // the camera at the vehicle's origin
+  // The camera is at the vehicle's origin.
+  BridgeOptions options;
   options.T_base_left = mount_of(Vec3::Zero(), Vec3::Zero());
   Bridged b(options);
   Pose pose;
-  pose.motion = Vec3(1, 2, 3).replicate<2, 1>().asDiagonal();  // right, down, forward
+  // The axes are right, down and forward.
+  pose.motion = Vec3(1, 2, 3).replicate<2, 1>().asDiagonal();
   pose.length_sigma = 0.1;
   (void)b.add(pose);
   pose.stamp_ns = kStep;
-  pose.T_world_left.t.z() = 0.5;  // 10 m/s forward
+  // The speed is 10 m/s forward.
+  pose.T_world_left.t.z() = 0.5;
   const Odometry o = b.add(pose);
   const double per_s2 = 1 / (0.05 * 0.05);
   const Matrix6 wanted = (Eigen::Vector<double, 6>() << 3 * per_s2 + 1, per_s2, 2 * per_s2,
@@ -270,7 +274,8 @@ TEST(Bridge, degradedIsWidenedLostIsNotPublished) {
 
 /// The bridge's list names reasons as the stream has them: a renamed one would be widened less.
 TEST(Bridge, listedReasonsExist) {
-  std::map<double, int> reasons;  // by the variance that they make of 1
+  // Number of reasons by the variance that they make of 1.
+  std::map<double, int> reasons;
   for (int i = 1; i <= static_cast<int>(Reason::pairing_ambiguous); ++i) {
     Bridged b;
     Pose pose;
@@ -308,7 +313,8 @@ TEST(Bridge, childCameraIsOpticalFrame) {
   Bridged b(options);
   b.bridge.add(calibration_line("front left", "right"));
   Pose pose;
-  pose.T_world_left.t = {1, 2, 3};  // right, down, forward
+  // The axes are right, down and forward.
+  pose.T_world_left.t = {1, 2, 3};
   const Odometry o = b.add(pose);
   EXPECT_EQ(o.child, "front_left_optical_frame");
   EXPECT_LT((o.pose.t - Vec3(3, -1, -2)).norm(), 1e-12) << "forward, left, up of odom";
@@ -319,7 +325,8 @@ TEST(Bridge, latchesCalibrationUnderRosNames) {
   BridgeOptions options = on_vehicle();
   Bridged b(options);
   b.bridge.add(calibration_line("1-st", "1 st"));
-  b.bridge.add(calibration_line("1-st", "1 st"));  // the greeting again
+  // The greeting repeats the calibration.
+  b.bridge.add(calibration_line("1-st", "1 st"));
   for (const char* topic :
        {"/tf_static", "/vergence/_1_st/camera_info", "/vergence/_1_st_1/camera_info"}) {
     EXPECT_EQ(b.kept.messages[topic].size(), 1U) << topic;
@@ -338,7 +345,8 @@ TEST(Bridge, imageComesWithCameraInfoOfItsStamp) {
   options.images = true;
   Bridged b(options);
   EXPECT_EQ(b.bridge.begin_image(kImage), 6U);
-  b.bridge.end_image("abcdef");  // before a calibration
+  // No calibration was received yet.
+  b.bridge.end_image("abcdef");
   b.bridge.add(calibration_line("left", "right"));
   auto& images = b.kept.messages["/vergence/right/image_raw"];
   const auto& info = b.kept.messages["/vergence/right/camera_info"];
@@ -363,7 +371,8 @@ TEST(Bridge, publishesEnuPoseOnceAligned) {
   options.T_base_left = mount_of(Vec3::Zero(), Vec3::Zero());
   Bridged b(options);
   Pose pose;
-  pose.T_world_left.t = {0, 0, 100};  // enu: y is the world's z
+  // The y axis of ENU is the world's z axis.
+  pose.T_world_left.t = {0, 0, 100};
   pose.covariance.setZero();
   b.bridge.add(line_of(pose));
   EXPECT_TRUE(b.kept.messages["/vergence/fix"].empty());
@@ -421,7 +430,8 @@ TEST(Bridge, malformedLinesAreOnlyCounted) {
     try {
       b.bridge.add({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     } catch (const InputError&) {
-      ++refused;  // another version
+      // The mutated line has another version.
+      ++refused;
     }
   }
   EXPECT_GT(b.bridge.malformed(), 2000U);

@@ -82,7 +82,8 @@ EventRecord verified() {
 TEST(CalibrationWriter, savesFoundOrVerifiedForNextDrive) {
   struct Row {
     bool confirms, finds;
-    int frames;  // of the calibration in the state file; 0: there is none
+    /// Frames of the calibration in the state file; 0 if there is none.
+    int frames;
   };
   for (const auto& [confirms, finds, frames] :
        {Row{false, false, 0}, {true, false, 7}, {false, true, 60}, {true, true, 60}}) {
@@ -126,7 +127,8 @@ TEST(CalibrationWriter, reportsWhetherNextDriveHasIt) {
         {false, true, true, true},
         {true, true, true, true},
         {true, true, false, false},
-        {true, false, false, true}}) {  // the session's is all there is to keep
+        // The session's file is the only one to write.
+        {true, false, false, true}}) {
     const test::TemporaryFolder folder;
     const auto block = [&](const char* file) {
       std::filesystem::create_directories(folder / (std::string(file) + ".new"));

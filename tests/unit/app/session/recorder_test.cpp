@@ -60,7 +60,8 @@ TEST(Recorder, stampsAreExactAndLostFramesHaveNoPose) {
   ASSERT_EQ(csv.size(), 4U);
   EXPECT_EQ(csv[0], kPosesHeader);
   for (const std::string& line : csv)
-    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 32) << line;  // 33 columns
+    // There are 33 columns.
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 32) << line;
   EXPECT_EQ(csv[2], "1,1403636584813555584,stereo_odometry,lost,few_inliers" +
                         std::string(26, ',') + "100,,7.500");
   EXPECT_EQ(csv[3].substr(0, 64),
@@ -124,7 +125,8 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
     return false;
   };
   Recorder recorder(folder.path(), options);
-  constexpr std::uint64_t kFrames = 5000;  // several times what may wait
+  // This is several times the capacity of the queue.
+  constexpr std::uint64_t kFrames = 5000;
   for (std::uint64_t i = 0; i < kFrames; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
   posted.set_value();
   const auto totals = recorder.close();
@@ -140,7 +142,8 @@ TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
   Recorder recorder(folder.path(), {});
   recorder.on_report(pose(0, PoseStatus::ok, 0));
   bool found = false;
-  for (int i = 0; i < 200 && !found; ++i) {  // two seconds at most, one is promised
+  // The loop waits two seconds at most; one is promised.
+  for (int i = 0; i < 200 && !found; ++i) {
     found = lines_of(folder / "trajectory.tum").size() == 1;
     if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
