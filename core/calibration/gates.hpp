@@ -15,6 +15,9 @@ struct HeldOut {
   double median_px = 0;
 };
 
+/// Minimum number of held-out frames of a test.
+inline constexpr int kMinHeldOut = 6;
+
 /// Measures the fit on frames newer than frame number `after`: at most the newest kHeldOutFrames,
 /// and at most kHeldOutMatches of each. With several additional cameras the worst one counts, in
 /// its own pixels. Pure.
@@ -27,8 +30,6 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 /// too few frames can be compared. The gains of several cameras are added, so that a knocked one
 /// outweighs one that is determined slightly less well. Pure.
 inline constexpr double kChance = 2.0;
-/// Value of `chance` for a test that is repeated with every solve.
-inline constexpr double kRareChance = 3.0;
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;
