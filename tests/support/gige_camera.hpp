@@ -15,19 +15,28 @@ namespace vergence::test {
 
 /// Properties of a simulated camera.
 struct GigeCameraOptions {
-  std::string address = "127.0.0.2";  // any of 127.0.0.0/8; one camera each
+  /// Any of 127.0.0.0/8; one camera each.
+  std::string address = "127.0.0.2";
   std::string serial = "SIM-1";
-  int sensor_width = 1280, sensor_height = 960;      // px
-  std::uint64_t tick_frequency = 125'000'000;        // Hz of its clock; 0: it has none
-  std::int64_t clock_offset_ns = 7'000'000'000'000;  // its clock at the host's 0
+  /// px.
+  int sensor_width = 1280, sensor_height = 960;
+  /// Rate of its clock, Hz; 0: it has none.
+  std::uint64_t tick_frequency = 125'000'000;
+  /// Its clock at the host's 0.
+  std::int64_t clock_offset_ns = 7'000'000'000'000;
   double clock_drift_ppm = 20;
-  std::uint64_t first_block = 65'500;  // 16-bit ids wrap 35 frames later; 0 is never used
-  bool extended_ids = false;           // 64-bit block ids
-  bool old_names =
-      false;  // ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0
-  bool discoverable = true;   // answers broadcasts
-  std::uint64_t seed = 1;     // of the packets that are lost
-  bool number_images = true;  // the first 8 bytes of an image are its number, little endian
+  /// 16-bit ids wrap 35 frames later; 0 is never used.
+  std::uint64_t first_block = 65'500;
+  /// 64-bit block ids.
+  bool extended_ids = false;
+  /// ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0.
+  bool old_names = false;
+  /// Answers broadcasts.
+  bool discoverable = true;
+  /// Seed of the packets that are lost.
+  std::uint64_t seed = 1;
+  /// The first 8 bytes of an image are its number, little endian.
+  bool number_images = true;
   /// Pixels of image `number`, width × height bytes that stay valid; empty: a pattern of the
   /// simulator's own.
   std::function<const std::uint8_t*(std::uint64_t number)> images{};

@@ -53,9 +53,11 @@ void GigeCamera::reset() {
   in_addr own{};
   (void)::inet_pton(AF_INET, options_.address.c_str(), &own);
   put(0x00, 0x00010002);
-  put(0x04, 0x80000001);  // big endian, UTF-8
+  // Big endian, UTF-8.
+  put(0x04, 0x80000001);
   put(0x08, 0x0000'0200);
-  put(0x0C, ntohl(own.s_addr));  // a hardware address of its own
+  // A hardware address of its own.
+  put(0x0C, ntohl(own.s_addr));
   put(0x10, 0x7);
   put(0x14, 0x5);
   put(0x24, ntohl(own.s_addr));
@@ -75,7 +77,8 @@ void GigeCamera::reset() {
   put(0x900, 0);
   put(0x904, 1);
   put(0x934, 4U | 2U | 1U);
-  put(kHeartbeat, 3000);  // ms
+  // ms.
+  put(kHeartbeat, 3000);
   put(kTicksHigh, static_cast<std::uint32_t>(options_.tick_frequency >> 32U));
   put(kTicksLow, static_cast<std::uint32_t>(options_.tick_frequency));
   put(kPacketSize, 1500);
@@ -90,7 +93,8 @@ void GigeCamera::reset() {
   put(exposure_time, std::bit_cast<std::uint32_t>(5000.0F));
   put(trigger_selector, 1);
   put(exposure_mode, 1);
-  put(exposure_auto, 2);  // as many cameras come: on
+  // On, as many cameras come.
+  put(exposure_auto, 2);
   put(gain_auto, 2);
   put(line_selector, 1);
   put(ptp_status, 3);
@@ -109,7 +113,8 @@ void GigeCamera::take_control(bool taken) {
   controller_ = {};
   foreign_ = taken;
   put(kControl, taken ? 2 : 0);
-  acquiring_ = false;  // as whenever its controller changes
+  // As whenever its controller changes.
+  acquiring_ = false;
 }
 
 void GigeCamera::answer() {
@@ -122,7 +127,8 @@ void GigeCamera::answer() {
     const bool silent_for_long =
         !foreign_ && word(kControl) != 0 &&
         monotonic_now() - heard_ > Duration::milliseconds(word(kHeartbeat));
-    if (silent_for_long) {  // its controller is gone
+    // Its controller is gone.
+    if (silent_for_long) {
       put(kControl, 0);
       controller_ = {};
       acquiring_ = false;
@@ -159,10 +165,12 @@ void GigeCamera::handle(int fd, const std::uint8_t* bytes, std::size_t length,
   Wire body;
   std::uint32_t status = kOk;
   switch (command) {
-    case 0x02:  // discovery
+    // Discovery.
+    case 0x02:
       for (std::uint32_t i = 0; i < 0xF8; ++i) body.u8(memory_[i]);
       break;
-    case 0x40:  // resend; never answered
+    // Resend; never answered.
+    case 0x40:
       if (size >= 12) {
         std::uint64_t block = from_wire(payload) & 0xFFFFU;
         if (extended && size >= 20)
@@ -172,18 +180,21 @@ void GigeCamera::handle(int fd, const std::uint8_t* bytes, std::size_t length,
                        from_wire(payload + 8) & (extended ? ~0U : 0xFFFFFFU));
       }
       return;
-    case 0x80:  // read registers
+    // Read registers.
+    case 0x80:
       for (std::uint32_t i = 0; i + 4 <= size; i += 4) {
         const std::uint32_t address = from_wire(payload + i);
         if (address + 4 > kMemory) status = kInvalidAddress;
         body.u32(word(address));
       }
       break;
-    case 0x82:  // write registers
+    // Write registers.
+    case 0x82:
       status = write_registers(payload, size, from);
       body.u16(0).u16(status == kOk ? size / 8 : 0);
       break;
-    case 0x84: {  // read memory
+    // Read memory.
+    case 0x84: {
       const std::uint32_t address = from_wire(payload), count = from_wire16(payload + 6);
       if (size < 8 || address > kMemory || count > 536 || address + count > kMemory) {
         status = kInvalidAddress;
@@ -193,7 +204,8 @@ void GigeCamera::handle(int fd, const std::uint8_t* bytes, std::size_t length,
       for (std::uint32_t i = 0; i < count; ++i) body.u8(memory_[address + i]);
       break;
     }
-    case 0x86: {  // write memory: registers in a row
+    // Write memory: registers in a row.
+    case 0x86: {
       const std::uint32_t address = from_wire(payload);
       for (std::uint32_t i = 4; i + 4 <= size && status == kOk; i += 4)
         status =

@@ -13,8 +13,8 @@ namespace {
 using namespace gige_register;
 using namespace gvcp;
 
-constexpr std::size_t kLatchedPulses = 256;  // exposed one after the other, stamped with their own
-                                             // time: a busy machine's delays are none
+/// Exposed one after the other, stamped with their own time: a busy machine's delays are none.
+constexpr std::size_t kLatchedPulses = 256;
 }  // namespace
 
 void GigeCamera::pulse(std::uint64_t number, HostStamp when) {
@@ -47,7 +47,8 @@ GvspFrame GigeCamera::make_frame(std::uint64_t number, HostStamp when) {
   if (given != nullptr) {
     f.pixels.assign(given, given + bytes);
   } else {
-    f.pixels.assign(bytes, static_cast<std::uint8_t>(31 * number));  // every byte tells its image
+    // Every byte tells its image.
+    f.pixels.assign(bytes, static_cast<std::uint8_t>(31 * number));
   }
   if (options_.number_images)
     for (std::size_t i = 0; i < 8; ++i) f.pixels[i] = static_cast<std::uint8_t>(number >> (8 * i));

@@ -17,7 +17,8 @@ namespace {
 constexpr std::uint32_t kLeader = 1, kTrailer = 2, kData = 3;
 /// Payload type of an image.
 constexpr std::uint32_t kImage = 1;
-constexpr std::uint32_t kUnavailable = 0x800C;  // GEV_STATUS_PACKET_UNAVAILABLE
+/// GEV_STATUS_PACKET_UNAVAILABLE.
+constexpr std::uint32_t kUnavailable = 0x800C;
 
 }  // namespace
 
@@ -34,7 +35,8 @@ GvspSender::GvspSender(const std::string& address, bool extended_ids, std::uint6
   if (socket_ < 0 || ::inet_pton(AF_INET, address.c_str(), &own.sin_addr) != 1 ||
       ::bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0)
     throw std::runtime_error("simulated camera: no stream socket on " + address);
-  const int room = 4 << 20;  // its own queue is not what is tested
+  // Its own queue is not what is tested.
+  const int room = 4 << 20;
   (void)::setsockopt(socket_, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
 }
 
@@ -133,7 +135,8 @@ void GvspSender::send(GvspFrame frame, Fate fate) {
     packet(record, id, false);
     due = due + packet_delay_;
     const Duration ahead = due - monotonic_now();
-    lock.unlock();  // requests to send again are answered between packets, as a camera does
+    // Requests to send again are answered between packets, as a camera does.
+    lock.unlock();
     if (ahead > Duration::microseconds(60)) sleep_until(due);
     lock.lock();
   }

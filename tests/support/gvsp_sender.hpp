@@ -57,7 +57,8 @@ struct GvspFrame {
   std::uint64_t number = 0, block = 0, ticks = 0;
   std::uint32_t pixel_format = 0;
   int width = 0, height = 0, offset_x = 0, offset_y = 0;
-  std::vector<std::uint8_t> pixels;  // and the chunk data behind them
+  /// Pixels, and the chunk data behind them.
+  std::vector<std::uint8_t> pixels;
 };
 
 /// The stream channel of the simulated camera: packets, their loss, what is sent again, and the
@@ -84,17 +85,21 @@ class GvspSender {
   [[nodiscard]] std::vector<std::uint64_t> whole() const;
 
  private:
-  static constexpr std::size_t kHistory = 8;  // frames that can be asked for again
+  /// Frames that can be asked for again.
+  static constexpr std::size_t kHistory = 8;
   struct Record {
     GvspFrame frame;
-    std::uint32_t data_bytes = 0,
-                  packets = 0;  // of a packet; of the frame, leader and trailer among them
+    /// Bytes of a packet; packets of the frame, leader and trailer among them.
+    std::uint32_t data_bytes = 0, packets = 0;
     std::size_t account = 0;
   };
   struct Account {
-    std::uint64_t number = 0;  // of the image
-    std::vector<bool> went;    // by packet
-    bool never = false;        // torn on purpose: packet `hole` is not sent again either
+    /// Number of the image.
+    std::uint64_t number = 0;
+    /// By packet.
+    std::vector<bool> went;
+    /// Torn on purpose: packet `hole` is not sent again either.
+    bool never = false;
     std::uint32_t hole = 0;
   };
   void packet(const Record& record, std::uint32_t id, bool again);
@@ -104,7 +109,8 @@ class GvspSender {
 
   int socket_ = -1;
   bool extended_;
-  mutable std::mutex mutex_;  // held for one packet at a time while a frame goes out
+  /// Held for one packet at a time while a frame goes out.
+  mutable std::mutex mutex_;
   double loss_ = 0;
   Random random_;
   sockaddr_in target_{};

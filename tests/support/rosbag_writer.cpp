@@ -8,7 +8,8 @@
 namespace vergence::test {
 namespace {
 
-constexpr std::size_t kBagHeader = 4096;  // bytes of the first record, padded
+/// Bytes of the first record, padded.
+constexpr std::size_t kBagHeader = 4096;
 
 std::string fields_of(const RosbagWriter::Fields& fields) {
   std::string out;

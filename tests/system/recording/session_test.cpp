@@ -169,7 +169,7 @@ TEST_F(RecordedDrive, recordingIsExportedToFolderAndEuroc) {
   EXPECT_FALSE(std::filesystem::exists(out("kitti")));
 }
 
-TEST(Recorded, recordingWithoutCalibrationIsCalibratedFromItsImages) {
+TEST(Recorded, recordingWithoutCalibrationIsCalibratedFromImages) {
   const TemporaryFolder folder;
   const auto session = folder / "drive";
   EXPECT_LE(drive(session, "--fast --duration 12 --from-scratch").code, 1);
