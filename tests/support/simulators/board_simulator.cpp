@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/math/random.hpp"
+
 namespace vergence::test {
 namespace {
 
