@@ -146,8 +146,8 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   };
   const auto second =
       drive_once(pass, found, [&](const Estimator& e, const PoseSample& /*sample*/) {
-        keep(joined.take(e.tracks()));
-        keep_solution(alone.take(e.tracks()));
+        keep(joined.add(e.tracks()));
+        keep_solution(alone.add(e.tracks()));
       });
   if (!second) {
     result.why = kInterrupted;

@@ -69,7 +69,7 @@ void DisparityJumpDetector::rebase(const Transform& T_camera_left, const Pinhole
   T_camera_left_ = T_camera_left;
   left_ = left;
   camera_ = camera;
-  count_ = take(stereo, before_);
+  count_ = sort_into(stereo, before_);
   T_now_before_ = {};
   skipped_ = 0;
 }
@@ -79,7 +79,7 @@ void DisparityJumpDetector::skip(const Transform& T_now_previous) noexcept {
   if (++skipped_ > kMaxSkipped) count_ = 0;
 }
 
-std::size_t DisparityJumpDetector::take(std::span<const StereoObservation> stereo,
+std::size_t DisparityJumpDetector::sort_into(std::span<const StereoObservation> stereo,
                                         std::span<StereoObservation> into) noexcept {
   const std::size_t n = std::min(stereo.size(), into.size());
   std::copy_n(stereo.begin(), n, into.begin());
@@ -180,7 +180,7 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
 DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
                                           std::span<const StereoObservation> stereo,
                                           const Transform& T_now_previous) noexcept {
-  const std::size_t n = take(stereo, now_);
+  const std::size_t n = sort_into(stereo, now_);
   const Transform T_now_before = T_now_previous * T_now_before_;
   T_now_before_ = {};
   skipped_ = 0;

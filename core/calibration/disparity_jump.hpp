@@ -86,7 +86,7 @@ class DisparityJumpDetector {
                          const Transform& T_now_previous, Row* out) const noexcept;
   [[nodiscard]] DisparityJump fit(std::span<Row> rows) noexcept;
   /// Copies observations sorted by track; returns their number.
-  std::size_t take(std::span<const StereoObservation> stereo,
+  std::size_t sort_into(std::span<const StereoObservation> stereo,
                    std::span<StereoObservation> into) noexcept;
   void evaluate(std::uint64_t frame, DisparityJump* jump) noexcept;
 

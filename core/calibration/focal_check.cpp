@@ -47,7 +47,7 @@ void FocalCheck::measure(RigSolver& solver, RigSolveRequest request,
   solve_ms_ = found.solve_ms;
 }
 
-void FocalCheck::take(bool full) noexcept {
+void FocalCheck::accept(bool full) noexcept {
   if (!measures_ || solved_.measured_px <= 0) return;
   newest_ = solved_;
   measured_frames_ = frames_;

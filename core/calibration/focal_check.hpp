@@ -34,7 +34,7 @@ class FocalCheck {
   /// The posterior of earlier frames is not used, because it assumes the focal length.
   void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& solved) noexcept;
   /// Accepts the measurement of a finished solve. `full`: it had the maximum number of frames.
-  void take(bool full) noexcept;
+  void accept(bool full) noexcept;
 
   [[nodiscard]] const FocalMeasurement& newest() const noexcept { return newest_; }
   /// Duration of the newest measurement, in ms.

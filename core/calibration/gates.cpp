@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "core/calibration/health.hpp"
@@ -22,7 +23,7 @@ constexpr double kTimesUsed = 3.0, kWorstUsed = 0.5;
 // is the rig's, and for one that is not. With the first, every published calibration of the seven
 // recorded sequences is verified (robustness_bench drives); the second is the size of a mounting
 // error.
-constexpr double kMakersTurn = 1e-3, kOtherTurn = 15e-3;
+constexpr double kSuppliedYaw = 1e-3, kOtherYaw = 15e-3;
 // Prior probability that a supplied calibration is not the rig's, and rate of wrong decisions about
 // it; both are chosen.
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
@@ -55,54 +56,50 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
   return median(std::span(distance).first(n));
 }
 
-/// Calls `each` for at most kHeldOutFrames newest frames after frame number `after`.
+/// Calls `each` for at most the newest kHeldOutFrames frames whose number is above `after` and at
+/// most `last`.
 template <class Each>
-void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept {
+void for_newest(const TrackLog& log, std::uint64_t after, std::uint64_t last, Each each) noexcept {
   std::size_t n = 0;
-  for (std::size_t i = log.size(); i-- > 0 && n < kHeldOutFrames && log.frame(i).number > after;
-       ++n)
+  for (std::size_t i = log.size(); i-- > 0 && n < kHeldOutFrames && log.frame(i).number > after;) {
+    if (log.frame(i).number > last) continue;
     each(log.frame(i));
+    ++n;
+  }
 }
 
-HeldOut fit_of(std::span<double> medians) noexcept {
+template <class Each>
+void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept {
+  for_newest(log, after, std::numeric_limits<std::uint64_t>::max(), each);
+}
+
+/// Fit of camera k on the newest frames after frame number `after` and up to `last`.
+HeldOut fit_on(const TrackLog& log, std::uint64_t after, std::uint64_t last,
+               const RigCalibration& rig, int k) noexcept {
+  std::array<double, kHeldOutFrames> medians;
+  std::size_t n = 0;
+  for_newest(log, after, last, [&](const LoggedFrame& f) noexcept {
+    if (const double m = median_distance(f, rig, k); m >= 0) medians[n++] = m;
+  });
   HeldOut h;
-  h.frames = static_cast<int>(medians.size());
-  if (medians.empty()) return h;
-  h.median_px = median(medians);
+  h.frames = static_cast<int>(n);
+  if (n > 0) h.median_px = median(std::span(medians).first(n));
   return h;
 }
 
 /// Fit of camera k on the newest frames after frame number `after`.
-HeldOut fit_of_held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig,
+HeldOut fit_on_held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig,
                         int k) noexcept {
-  std::array<double, kHeldOutFrames> medians;
-  std::size_t n = 0;
-  for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
-    if (const double m = median_distance(f, rig, k); m >= 0) medians[n++] = m;
-  });
-  return fit_of(std::span(medians).first(n));
-}
-
-/// Fit of camera k on the newest frames that a solution was solved from, up to frame number
-/// `newest`.
-HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibration& rig,
-                    int k) noexcept {
-  std::array<double, kHeldOutFrames> medians;
-  std::size_t n = 0;
-  for (std::size_t i = log.size(); i-- > 0 && n < medians.size();) {
-    if (log.frame(i).number > newest) continue;
-    if (const double m = median_distance(log.frame(i), rig, k); m >= 0) medians[n++] = m;
-  }
-  return fit_of(std::span(medians).first(n));
+  return fit_on(log, after, std::numeric_limits<std::uint64_t>::max(), rig, k);
 }
 
 /// Returns true if held-out frames contradict camera k of `rig`, compared with the fit of `solved`
 /// on its own frames.
 bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
                   std::uint64_t newest, int k, double pixel_sigma) noexcept {
-  const HeldOut fit = fit_of_held_out(log, newest, rig, k);
+  const HeldOut fit = fit_on_held_out(log, newest, rig, k);
   if (fit.frames < kMinHeldOut) return false;
-  const HeldOut used = fit_of_used(log, newest, solved, k);
+  const HeldOut used = fit_on(log, 0, newest, solved, k);
   return fit.median_px > kTimesUsed * std::min(std::max(used.median_px, pixel_sigma), kWorstUsed);
 }
 
@@ -121,9 +118,9 @@ double angle_between(const Vec3& a, const Vec3& b) noexcept {
 }  // namespace
 
 HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
-  HeldOut worst = fit_of_held_out(log, after, rig, 1);
+  HeldOut worst = fit_on_held_out(log, after, rig, 1);
   for (int k = 2; k < rig.cameras; ++k) {
-    const HeldOut fit = fit_of_held_out(log, after, rig, k);
+    const HeldOut fit = fit_on_held_out(log, after, rig, k);
     if (fit.median_px > worst.median_px) worst = fit;
   }
   return worst;
@@ -176,7 +173,7 @@ double current_percent(const RigCalibration& current, int k, double depth,
   const double by_turn = 100 * depth / current.T_camera_left[static_cast<std::size_t>(k)].t.norm();
   // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
   return own > 0 ? std::hypot(own, 1e-3 * o.extrinsic_random_walk_mrad_per_sqrt_h * by_turn)
-                 : kMakersTurn * by_turn;
+                 : kSuppliedYaw * by_turn;
 }
 
 }  // namespace
@@ -198,7 +195,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     const double by_turn =
         100 * depth / measured.T_camera_left[static_cast<std::size_t>(k)].t.norm();
     const double m = current_percent(current, k, depth, o);
-    const double odds = log_odds_of(difference, s, m, kOtherTurn * by_turn);
+    const double odds = log_odds_of(difference, s, m, kOtherYaw * by_turn);
     const double certainty = (odds - before) / certain;
     // If the rig is that of the calibration in use, the best estimate of its depth error is the
     // weighted mean of both.

@@ -39,21 +39,21 @@ struct Monitor::Parts {
   bool valid = false;
   detail::Reference reference{};
   Mat5 covariance = Mat5::Zero();
-  detail::MonitorResiduals looks{};
+  detail::MonitorResiduals residuals{};
   detail::ChangeDetector windows{};
   MonitorResult latest{};
   int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
 
   void clear() noexcept {
-    looks.reset();
+    residuals.reset();
     windows.reset(options, covariance);
     latest = MonitorResult{};
     collapsed = standing_over = 0;
   }
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
-  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& residuals) noexcept;
+  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& stereo) noexcept;
 };
 
 std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept {
@@ -107,7 +107,7 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   // If most of the expected matches are missing, the few that are found are chance matches.
   const detail::StereoResiduals stereo =
       collapsed > 0 ? detail::StereoResiduals{}
-                    : looks.stereo(reference, frame, options.min_matches, frame.moving);
+                    : residuals.stereo(reference, frame, options.min_matches, frame.moving);
   if (!stereo.usable) return;
   if (!frame.moving) {
     watch_standing(frame, stereo);
@@ -119,11 +119,11 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
 }
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame,
-                                    const detail::StereoResiduals& residuals) noexcept {
+                                    const detail::StereoResiduals& stereo) noexcept {
   // Keep what moving frames have detected.
   if (latest.kind != Kind::quiet && standing_over < options.collapse_frames) return;
-  latest.statistic = windows.single(residuals.evidence, residuals.spread_now);
-  latest.evidence = {0.5 * latest.statistic, detail::shift_px(residuals.evidence), 0};
+  latest.statistic = windows.single(stereo.evidence, stereo.spread_now);
+  latest.evidence = {0.5 * latest.statistic, detail::shift_px(stereo.evidence), 0};
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;
   } else {

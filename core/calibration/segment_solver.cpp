@@ -23,7 +23,7 @@ std::size_t SegmentSolver::memory_needed(const CalibrationOptions& options,
   return RigSolver::memory_needed(options, monitor, cameras, features);
 }
 
-std::optional<RigSolution> SegmentSolver::take(const TrackLog& tracks) noexcept {
+std::optional<RigSolution> SegmentSolver::add(const TrackLog& tracks) noexcept {
   std::optional<RigSolution> solved;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const LoggedFrame& f = tracks.frame(i);

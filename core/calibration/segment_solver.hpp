@@ -11,7 +11,7 @@ namespace vergence::calibration {
 /// Ownership  `given`, whose intrinsics are the priors, and `start`, the initial values of the
 /// first
 ///            solve, are copied.
-/// Threads    One caller; solves run in take() and end(), some hundred milliseconds each.
+/// Threads    One caller; solves run in add() and end(), some hundred milliseconds each.
 /// Memory     From the arena.
 class SegmentSolver {
  public:
@@ -31,7 +31,7 @@ class SegmentSolver {
 
   /// Adds the frames of `tracks` that are newer than those added before. Returns the solution if
   /// that completed a stretch.
-  [[nodiscard]] std::optional<RigSolution> take(const TrackLog& tracks) noexcept;
+  [[nodiscard]] std::optional<RigSolution> add(const TrackLog& tracks) noexcept;
   /// Call after the last frame: solves the remaining frames if they are at least
   /// options.min_frames.
   [[nodiscard]] std::optional<RigSolution> end() noexcept;

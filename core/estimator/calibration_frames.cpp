@@ -36,7 +36,7 @@ std::size_t CalibrationFrames::memory_needed(const calibration::CalibrationOptio
   return calibration::TrackLog::memory_needed(static_cast<std::size_t>(options.max_frames), tracks);
 }
 
-void CalibrationFrames::take(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+void CalibrationFrames::add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
                              const RigFrame& frame) noexcept {
   if (outcome.scale != 1.0) log_.scale_about(outcome.T_left_world.centre(), outcome.scale);
   ++frames_still_;

@@ -21,7 +21,7 @@ class CalibrationFrames {
 
   /// Logs the tracks of a posed frame if every camera gave a good image and the tracks have moved
   /// by at least a pixel on average since the last logged frame.
-  void take(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+  void add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
             const RigFrame& frame) noexcept;
   /// Returns true if no frame was logged for so long that the rig must be standing still.
   [[nodiscard]] bool standing() const noexcept;

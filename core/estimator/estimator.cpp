@@ -112,7 +112,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       // Images that are out of sync cannot be used for calibration, even if no lag is visible for a
       // while.
       if (!p.degradations.stands(Degradation::out_of_sync) || p.state != State::stereo_odometry)
-        p.calibrator.frames().take(p.odometry, out, frame);
+        p.calibrator.frames().add(p.odometry, out, frame);
     }
   }
   p.odometry.rebuild(&out);
@@ -163,7 +163,7 @@ void Estimator::finish() noexcept {
       if (p.calibrator.estimating()) p.transition(Trigger::frames_enough, p.last);
     }
     if (const auto decision = p.calibrator.decide_now(p.last, p.last_number))
-      p.take(*decision, p.last);
+      p.apply(*decision, p.last);
   }
 }
 

@@ -158,7 +158,7 @@ void Estimator::Parts::restart_estimation(std::optional<CalibrationCause> cause,
 /// Starts solves and acts on their decisions.
 void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
   if (const auto decision = calibrator.decide(frame.stamp, frame.number))
-    take(*decision, frame.stamp);
+    apply(*decision, frame.stamp);
   const bool solves = state == State::parallel_monocular || state == State::recalibrating ||
                       state == State::stereo_odometry;
   if (solves && calibrator.can_solve()) {
@@ -221,7 +221,7 @@ void Estimator::Parts::notify_verified(Stamp stamp) noexcept {
          verified_percent, verified_by);
 }
 
-void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
+void Estimator::Parts::apply(const CalibrationDecision& decision, Stamp stamp) noexcept {
   (void)decisions.push(decision);
   if (decision.focal.contradicted && !std::exchange(focal_contradicted, true))
     record(EstimatorEvent::Kind::focal_length_contradicted, stamp,

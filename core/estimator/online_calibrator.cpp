@@ -188,7 +188,7 @@ std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::
   // Frames of two rigs or out of sync cannot measure a focal length.
   const Gate gate = review().gate(false);
   if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
-    solve_.focal_check().take(frames_.solved_frames() >= frames_.most());
+    solve_.focal_check().accept(frames_.solved_frames() >= frames_.most());
   return solve_.for_new_rig() ? evaluate_estimate(stamp, number)
                               : evaluate_refinement(stamp, number, last);
 }

@@ -21,7 +21,7 @@ class SolutionReview;
 /// solutions verify, contradict or refine the calibration in use. They are from a growing segment
 /// of frames; a full one is closed, and its result is the prior of the next.
 ///
-///     calibrator.frames().take(odometry, out, frame);  // every posed frame
+///     calibrator.frames().add(odometry, out, frame);  // every posed frame
 ///     if (calibrator.can_solve()) calibrator.start_solve();
 ///     if (const auto decision = calibrator.decide(frame.stamp, frame.number))
 ///       if (decision->accepted) calibrator.use(*decision);
@@ -34,7 +34,7 @@ class OnlineCalibrator {
   [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
                                                  const RigCalibration& rig) noexcept;
 
-  /// Frames that calibrations are solved from; call take() with each posed frame.
+  /// Frames that calibrations are solved from; call add() with each posed frame.
   [[nodiscard]] CalibrationFrames& frames() noexcept { return frames_; }
   /// Monitor of the rig; call update() with each posed frame.
   [[nodiscard]] RigMonitor& monitor() noexcept { return monitor_; }

@@ -18,7 +18,7 @@ using odometry::MapPoint;
 constexpr std::array kFound = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 // Minimum number of frames in which a point was found. A new point's match was searched for in the
 // band of the calibration in use and cannot test it.
-constexpr int kWitness = 2;
+constexpr int kMinFound = 2;
 // Number of frames after a new reference until the spread of matches is known. Until then a result
 // makes poses `degraded` and raises no knock; so does a median distance to the epipolar lines above
 // kFarFromLines px. On recorded sequences it stays below 0.3 px.
@@ -196,7 +196,7 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
       w.jumps.skip(step);
       continue;
     }
-    (void)collect_stereo(odometry.map(), k, kWitness);
+    (void)collect_stereo(odometry.map(), k, kMinFound);
     w.jumps.set_transform(w.T_camera_left_before);
     const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
     if (jump.confirmed && !w.pairing.questioned())
@@ -240,7 +240,7 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
   const Transform step = step_to(outcome.T_left_world);
   const bool moving = seconds > 0 && step.t.norm() > kMovingSpeed * seconds;
   for (int k = 1; k < cameras_; ++k) {
-    const int found = collect_stereo(odometry.map(), k, kWitness);
+    const int found = collect_stereo(odometry.map(), k, kMinFound);
     calibration::PairingEvidence& pairing = camera(k).pairing;
     const double before = pairing.distance_px();
     pairing.next(frame.number, stereo_.span(), transform(rig_, k), pinhole(rig_, 0),

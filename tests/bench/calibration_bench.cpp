@@ -202,7 +202,7 @@ void rendered_stretches(const app::Configuration& c) {
   std::vector<calibration::RigSolution> stretches;
   for (std::uint64_t i = 0; i < kFrames; ++i) {
     (void)estimator.process(rendered.frame(i));
-    const auto solved = alone.take(estimator.tracks());
+    const auto solved = alone.add(estimator.tracks());
     if (solved && solved->status == calibration::RigSolveStatus::ok) stretches.push_back(*solved);
   }
   print_stretches("mock", stretches);
@@ -225,7 +225,7 @@ std::array<std::vector<RigSolution>, kStretches.size()> solve_stretches(
   const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size(), {}, {}};
   (void)app::drive_once(pass, given, [&](const Estimator& e, const PoseSample& /*sample*/) {
     for (std::size_t i = 0; i < kStretches.size(); ++i) {
-      const auto s = stretches[i].take(e.tracks());
+      const auto s = stretches[i].add(e.tracks());
       if (s && s->status == calibration::RigSolveStatus::ok) solved[i].push_back(*s);
     }
   });

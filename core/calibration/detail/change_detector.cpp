@@ -100,17 +100,17 @@ bool ChangeDetector::stands_out(const StereoResiduals& e) const noexcept {
 void ChangeDetector::push(const StereoResiduals& e) noexcept {
   const bool out = stands_out(e);
   if (pending_ && out) {
-    take(*pending_);
+    add(*pending_);
     pending_.reset();
   } else if (out && over_ == 0) {
     pending_ = e;
     return;
   }
   pending_.reset();
-  take(e);
+  add(e);
 }
 
-void ChangeDetector::take(const StereoResiduals& e) noexcept {
+void ChangeDetector::add(const StereoResiduals& e) noexcept {
   follow_spread(e);
   if (!history_.push({e.frame, e.evidence})) return;
   measure_scatter();
@@ -186,7 +186,7 @@ MonitorResult ChangeDetector::decide() noexcept {
 void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   // Sums Σ e, Σ age e and Σ age² e from the newest entry back, from which a ramp's sums follow.
   Evidence zeroth, first, second;
-  const auto take = [&](const Entry& entry, double age, int frames) {
+  const auto visit = [&](const Entry& entry, double age, int frames) {
     zeroth.add(entry.evidence);
     first.add(entry.evidence, age);
     second.add(entry.evidence, age * age);
@@ -208,10 +208,10 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   const std::size_t whole = std::min((EvidenceHistory::kRecent - open) / block, history_.closed());
   const std::size_t singles = open + whole * block;
   for (std::size_t age = 0; age < singles; ++age)
-    take(history_.recent(age), static_cast<double>(age), static_cast<int>(age) + 1);
+    visit(history_.recent(age), static_cast<double>(age), static_cast<int>(age) + 1);
   for (std::size_t b = whole; b < history_.blocks(); ++b) {
     const std::size_t oldest = open + (b + 1) * block - 1;
-    take(history_.block(b), static_cast<double>(oldest) - 0.5 * (block - 1),
+    visit(history_.block(b), static_cast<double>(oldest) - 0.5 * (block - 1),
          static_cast<int>(oldest) + 1);
   }
 }

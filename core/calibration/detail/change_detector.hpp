@@ -43,7 +43,7 @@ class ChangeDetector {
   };
 
   void follow_spread(const StereoResiduals& e) noexcept;
-  void take(const StereoResiduals& e) noexcept;
+  void add(const StereoResiduals& e) noexcept;
   [[nodiscard]] bool stands_out(const StereoResiduals& e) const noexcept;
   void measure_scatter() noexcept;
   void renew_floor() noexcept;

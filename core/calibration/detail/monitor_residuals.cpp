@@ -45,9 +45,9 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     row.track = s.track;
     if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) ++rows_;
   }
-  StereoResiduals look;
-  look.frame = frame.frame;
-  if (rows_ < static_cast<std::size_t>(min_matches)) return look;
+  StereoResiduals result;
+  result.frame = frame.frame;
+  if (rows_ < static_cast<std::size_t>(min_matches)) return result;
 
   Vec5 fit = Vec5::Zero();
   for (int round = 0; round < kReweightings; ++round) {
@@ -56,8 +56,8 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
       sizes_[i] = std::abs(rest(stereo_[i])) * std::sqrt(stereo_[i].inverse_sigma2);
     const double scale =
         std::max(median(std::span(sizes_).first(rows_)) / kMedianOfNormal, kMinScale);
-    look.evidence = Evidence{};
-    Evidence& e = look.evidence;
+    result.evidence = Evidence{};
+    Evidence& e = result.evidence;
     for (std::size_t i = 0; i < rows_; ++i) {
       StereoRow& row = stereo_[i];
       const double d = rest(row);
@@ -69,14 +69,15 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     }
     fit = with_prior(e.A).solve(e.g);
   }
-  look.usable = std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
-                              [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
-  spread_of(look.evidence, fit, follow && look.usable, &look);
-  return look;
+  result.usable =
+      std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
+                    [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
+  spread_of(result.evidence, fit, follow && result.usable, &result);
+  return result;
 }
 
 void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, bool follow,
-                                 StereoResiduals* look) noexcept {
+                                 StereoResiduals* result) noexcept {
   // With x a track's contribution to the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹
   // x|². The variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), with s the
   // sum of the track's earlier contributions.
@@ -93,8 +94,8 @@ void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, bool
     before += 2 * white.dot(whiten * m.sum);
     m.sum += x;
   }
-  look->spread_now = kTukeySpread * now / kTheta;
-  look->spread_life = kTukeySpread * (now + before) / kTheta;
+  result->spread_now = kTukeySpread * now / kTheta;
+  result->spread_life = kTukeySpread * (now + before) / kTheta;
 }
 
 }  // namespace vergence::calibration::detail

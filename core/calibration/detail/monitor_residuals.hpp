@@ -59,7 +59,7 @@ class MonitorResiduals {
     Vec5 sum = Vec5::Zero();
   };
   void spread_of(const Evidence& evidence, const Vec5& fit, bool follow,
-                 StereoResiduals* look) noexcept;
+                 StereoResiduals* result) noexcept;
 
   std::size_t rows_ = 0;
   std::array<StereoRow, kMaxObservations> stereo_{};

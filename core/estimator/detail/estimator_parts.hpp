@@ -68,7 +68,7 @@ struct Estimator::Parts {
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void watch_estimate(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
-  void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void apply(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void adopt(const CalibrationDecision& decision) noexcept;
   void start_estimation(CalibrationCause cause, std::uint64_t onset,
                         const RigFrame& frame) noexcept;

@@ -50,7 +50,7 @@ struct Driven {
   void go(int frames) {
     for (int i = 0; i < frames; i += 10) {
       log_drive(drive, 10, {}, log);
-      if (const auto s = stretches.take(log)) solved.push_back(*s);
+      if (const auto s = stretches.add(log)) solved.push_back(*s);
     }
   }
 };
@@ -144,11 +144,11 @@ TEST(SegmentSolver, repeatedFramesAreTakenOnce) {
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   Driven d(o, SegmentSolver::Kind::alone, given, given);
   log_drive(d.drive, 20, {}, d.log);
-  for (int i = 0; i < 5; ++i) EXPECT_FALSE(d.stretches.take(d.log).has_value());
+  for (int i = 0; i < 5; ++i) EXPECT_FALSE(d.stretches.add(d.log).has_value());
   EXPECT_EQ(d.stretches.frames(), 20U);
   log_drive(d.drive, 10, {}, d.log);
-  EXPECT_TRUE(d.stretches.take(d.log).has_value());
-  EXPECT_FALSE(d.stretches.take(d.log).has_value());
+  EXPECT_TRUE(d.stretches.add(d.log).has_value());
+  EXPECT_FALSE(d.stretches.add(d.log).has_value());
   EXPECT_EQ(d.stretches.frames(), 30U);
 }
 
@@ -158,7 +158,7 @@ TEST(SegmentSolver, lastSegmentIsSolvedFromTheMinimumOn) {
   for (const int frames : {24, 25}) {  // CalibrationOptions::min_frames is 25
     Driven d(o, SegmentSolver::Kind::joined, given, given);
     log_drive(d.drive, frames, {}, d.log);
-    EXPECT_FALSE(d.stretches.take(d.log).has_value());
+    EXPECT_FALSE(d.stretches.add(d.log).has_value());
     const auto s = d.stretches.end();
     ASSERT_EQ(s.has_value(), frames == 25) << frames;
     if (s.has_value()) {
@@ -181,7 +181,7 @@ TEST(SegmentSolver, oldPriorHasLessWeight) {
     log_drive(d.drive, 30, {}, d.log);
     for (std::size_t i = 0; later && i < d.log.size(); ++i)
       d.log.frame(i).stamp = Stamp(d.log.frame(i).stamp.ns() + 24LL * 3600 * 1'000'000'000);
-    const auto s = d.stretches.take(d.log);
+    const auto s = d.stretches.add(d.log);
     ASSERT_TRUE(s.has_value() && s->status == RigSolveStatus::ok);
     sigma[later ? 1 : 0] = std::sqrt(s->rig.covariance(extrinsic_row(1) + 1, extrinsic_row(1) + 1));
   }
@@ -204,12 +204,12 @@ TEST(SegmentSolver, failedSegmentLeavesTheNextUnchanged) {
       if (tried) d.log.begin(f);
     }
     if (tried) {
-      const auto s = d.stretches.take(d.log);
+      const auto s = d.stretches.add(d.log);
       ASSERT_TRUE(s.has_value());
       EXPECT_NE(s->status, RigSolveStatus::ok) << "nothing was seen";
     }
     log_drive(d.drive, 30, {}, d.log);
-    const auto s = d.stretches.take(d.log);
+    const auto s = d.stretches.add(d.log);
     ASSERT_TRUE(s.has_value() && s->status == RigSolveStatus::ok);
     third[tried ? 1 : 0] = *s;
   }
