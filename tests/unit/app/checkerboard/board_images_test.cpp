@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-
 #include "app/checkerboard/board_detector.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
