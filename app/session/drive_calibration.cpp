@@ -111,10 +111,11 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
     ++result.frames;
   });
   if (!first) {
-    result.why = pass.stopped && pass.stopped()
-                     ? kInterrupted
-                     : "from scratch no calibration was found: what the drive lacks, a replay with "
-                       "--from-scratch says";
+    result.why =
+        pass.stopped && pass.stopped()
+            ? kInterrupted
+            : "none was found from scratch; replay with --from-scratch and read the reasons in "
+              "calibrations.csv";
     return result;
   }
   StartingCalibration found = given;

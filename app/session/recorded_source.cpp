@@ -276,7 +276,7 @@ void RecordedSource::print_metrics(const SessionTotals& /*totals*/, const Summar
                        : "";
     progress->print(
         fmt::format("error against the reference over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m "
-                    "with scale {:.4f}{}",
+                    "(Sim(3), scale {:.4f}){}",
                     e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
     if (!facts_.ins)
       progress->print(fmt::format("next: vergence evaluate {} {}",
