@@ -47,7 +47,8 @@ void MockCamera::allocate(const Intrinsics& lens) {
 
 DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
-  constexpr double kMaxGain = 40;  // dB
+  // Limit in dB.
+  constexpr double kMaxGain = 40;
   if (!stream.streaming()) return DeviceStatus::stopped;
   if (requested.exposure <= Duration{} ||
       requested.exposure.to_seconds() * configuration_.rate_hz > 1)
@@ -207,7 +208,8 @@ DeviceStatus MockTrigger::start(Notifier* ready) noexcept {
   if (status != DeviceStatus::ok || (was && !disconnected_)) return status;
   starts_.fetch_add(1, std::memory_order_relaxed);
   disconnected_ = false;
-  if (was) return status;  // it is back; its pulses go on by themselves
+  // The trigger board is back, and its pulses have continued.
+  if (was) return status;
   try {
     listener_->begin(configuration_);
   } catch (const std::exception&) {
@@ -232,7 +234,8 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   {
     const std::lock_guard lock(asking_);
     if (!any_)
-      pause_boot_ = d.value.pulse.boot;  // of a pause that was asked for before the first report
+      // The pause was requested before the first report.
+      pause_boot_ = d.value.pulse.boot;
     any_ = true;
     newest_ = d.value.slot;
     boot_ = d.value.pulse.boot;
