@@ -47,7 +47,8 @@ void add_doctor(CLI::App& root, ExitCode* exit_code) {
              "Configuration to check; without it, check what is connected", "FILE");
   add_option(*command, "--set", a->set, "Set a configuration key; repeatable", "KEY=VALUE")
       ->allow_extra_args(false);
-  add_option(*command, "--session-dir", a->out, "Check free space in this directory", "DIR");
+  add_option(*command, "--session-dir", a->out, "Check free space in this directory [current]",
+             "DIR");
   command->add_flag("--json", a->json, "Print JSON (docs/deployment.md)");
   command->footer(
       "Example: vergence doctor app/config/gige.yaml --session-dir /data\n"

@@ -40,9 +40,8 @@ struct Reference {
 Reference load_reference(const EvaluationRequest& a) {
   if (a.reference.empty() && !a.estimate_ins_extrinsics)
     throw InputError(
-        "REFERENCE is missing; name a trajectory, or with --estimate-ins-extrinsics a session "
-        "folder that "
-        "has an ins.csv");
+        "REFERENCE is missing; pass a trajectory file, or with --estimate-ins-extrinsics a session "
+        "directory with ins.csv");
   // A session folder stands for its poses, but where a mount is asked for: that is the INS's.
   const std::filesystem::path path = a.reference.empty() ? a.estimate : a.reference;
   std::error_code ignored;
@@ -51,7 +50,7 @@ Reference load_reference(const EvaluationRequest& a) {
   if (!ins.empty()) return {ins, true};
   if (a.reference.empty())
     throw InputError(a.estimate.string() +
-                     ": is no session folder with an ins.csv; name a REFERENCE");
+                     ": is not a session directory with ins.csv; pass a REFERENCE");
   return {path, false};
 }
 

@@ -67,8 +67,8 @@ Json segments_json(const SegmentErrors& segments) {
 
 std::string left_out(const TrajectoryEvaluation& e, const EvaluationOptions& options) {
   const char* inside = options.association == Association::nearest
-                           ? "without a neighbour near enough"
-                           : "in holes of the reference";
+                           ? "without a near enough reference pose"
+                           : "in gaps of the reference";
   return fmt::format("{} before the reference, {} after it, {} {}", e.before, e.after, e.gap,
                      inside);
 }
@@ -87,8 +87,8 @@ void heading_row(std::string* out, const char* name, const HeadingErrors& h) {
 
 void segment_rows(std::string* out, const SegmentErrors& segments) {
   auto at = std::back_inserter(*out);
-  fmt::format_to(at, "\n  segments, from every {}. pose        number   translation    rotation\n",
-                 segments.step);
+  fmt::format_to(at, "\n  {:<34}{:>8}   translation    rotation\n",
+                 fmt::format("segments, step {}", segments.step), "number");
   const auto row = [&](const std::string& name, std::size_t count, double translation,
                        double rotation) {
     if (count == 0)
@@ -162,7 +162,7 @@ std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptio
   statistics_row(&out, "SE(3)-aligned", e.rotation_se3, kDegreesPerRadian, "deg");
   if (e.se3.roll_unobservable)
     out +=
-        "  The path is nearly straight: positions do not hold the rotation about it. Use the "
+        "  The path is nearly straight: positions do not determine the rotation about it. Use the "
         "start-aligned angles.\n";
 
   fmt::format_to(at, "\n  {:<34}{:>11.4f} m = {:.4f} % of the path, {:.4f} deg\n",
@@ -180,9 +180,9 @@ std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& o
   constexpr double kSteps = 20;  // of the number that is proposed, in a second
   const double seconds = interval.to_seconds();
   return fmt::format(
-      "{} poses lie in holes of the reference, whose poses are {:.3g} s apart (median), wider than "
-      "--max-gap {:g}; --max-gap {:g} bridges them",
-      e.gap, seconds, options.max_gap.to_seconds(), std::ceil(kSteps * kRoom * seconds) / kSteps);
+      "{} poses are in gaps of the reference longer than --max-gap {:g}; its poses are {:.3g} s "
+      "apart (median): use --max-gap {:g}",
+      e.gap, options.max_gap.to_seconds(), seconds, std::ceil(kSteps * kRoom * seconds) / kSteps);
 }
 
 std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOptions& options,
@@ -404,20 +404,19 @@ Json mount_json(const FoundMount& found) {
 std::string mount_text(const FoundMount& found) {
   const Mount& m = found.mount;
   std::string out = fmt::format(
-      "mount of the {}, from {} moments (residuals {:.3f} deg, {:.3f} m)\n",
+      "extrinsics of the {}, from {} instants (residuals {:.3f} deg, {:.3f} m)\n",
       found.of_ins ? "left camera in the INS's body" : "estimate's body in the reference's",
       m.moments, m.residual_rotation * kDegreesPerRadian, m.residual_position);
-  out += row("turn about the reference's x", m.rotation[0], kDegreesPerRadian, "deg");
-  out += row("turn about its y", m.rotation[1], kDegreesPerRadian, "deg");
-  out += row("turn about its z", m.rotation[2], kDegreesPerRadian, "deg");
+  out += row("rotation about the reference's x", m.rotation[0], kDegreesPerRadian, "deg");
+  out += row("rotation about its y", m.rotation[1], kDegreesPerRadian, "deg");
+  out += row("rotation about its z", m.rotation[2], kDegreesPerRadian, "deg");
   out += row("lever arm along x", m.lever_arm[0], 1, "m");
   out += row("lever arm along y", m.lever_arm[1], 1, "m");
   out += row("lever arm along z", m.lever_arm[2], 1, "m");
   out += row("reference's stamps are late by", m.clock_offset, 1e3, "ms (reported, not applied)");
   if (const auto b = boresight_deg(found))
-    out +=
-        fmt::format("  as the configuration has it: ins.boresight_deg: [{:.2f}, {:.2f}, {:.2f}]\n",
-                    (*b)[0], (*b)[1], (*b)[2]);
+    out += fmt::format("  for the configuration: ins.boresight_deg: [{:.2f}, {:.2f}, {:.2f}]\n",
+                       (*b)[0], (*b)[1], (*b)[2]);
   return out + "\n";
 }
 

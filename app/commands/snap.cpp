@@ -37,8 +37,9 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "--out", a->request.out,
              "Directory for images and snap.json; must not exist, or be empty", "DIR")
       ->required();
-  add_option(*command, "--count", a->request.count, "Number of sets", "N");
-  add_option(*command, "--wait", a->request.wait_s, "Maximum wait for a set", "SECONDS");
+  add_option(*command, "--count", a->request.count, "Number of image sets [1]", "N");
+  add_option(*command, "--wait", a->request.wait_s, "Maximum wait for each image set [5]",
+             "SECONDS");
   add_option(*command, "--set", a->set, "Set a configuration key; repeatable", "KEY=VALUE")
       ->allow_extra_args(false);
   command->footer(

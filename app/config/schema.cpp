@@ -435,9 +435,9 @@ Group sync() {
           "of one IEEE "
           "1394 cycle timer; `ptp`, stamps of one PTP "
           "clock; `side_by_side`, both images come in one (`cameras.N.image_half`). Not verified: "
-          "`counter`, exposure n of every camera belongs together; "
-          "`software`, what was exposed within "
-          "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
+          "`frame_counter`, images with equal exposure counts; "
+          "`approximate_time`, images stamped within "
+          "`tolerance_ms` by the host's clock, for cameras without a trigger.")
       .number("timeout_ms", &S::timeout_ms, 1, 10000, "ms",
               "Maximum wait for a late image of a pulse.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
@@ -831,10 +831,10 @@ namespace {
 
 constexpr std::string_view kOpening = R"(# Configuration
 
-Every key that `vergence` understands, with its default. Nothing has to be set: without a configuration the defaults act.
+All keys of the configuration with their defaults. No key is required: without a configuration the defaults apply.
 This page is written from the table that the program checks its input with (`app/config/schema.cpp`).
 
-A configuration is a YAML file. Keys stand in groups:
+A configuration is a YAML file. Keys are in groups:
 
 ```yaml
 rig: {name: van}
@@ -844,20 +844,20 @@ odometry:
 threads: 2
 ```
 
-One key can be set on the command line, with any command that runs, as often as needed; the last one wins, over the file too.
-Dots stand for groups, numbers for the items of a list:
+`--set` sets a key on the command line and is repeatable. It overrides the file; the last `--set` of a key wins.
+Dots separate groups; numbers are indices of list items:
 
 ```sh
 vergence replay DATA --format folder --out session --set odometry.features=400 --set odometry.band_px=3
 ```
 
-`--threads N` and `--seed N` are short for `--set threads=N` and `--set odometry.seed=N`.
+`--threads N` and `--seed N` are abbreviations of `--set threads=N` and `--set odometry.seed=N`.
 
-A key that does not exist is an error that names the nearest one that does; so is a value of the wrong type or outside its range,
-a key that is given twice, and two keys that contradict each other. The message names the file and the line; the program exits with 2.
+Errors are: an unknown key (the message suggests the nearest one), a value of the wrong type or outside its range, a key that is given
+twice, and keys that contradict each other. The message names the file and the line; the exit code is 2.
 
-Units stand in the column `unit`; pixels are those of the image as it was taken. `summary.json` of a session holds `configuration_hash`, equal for
-equal values of all keys however they were written.
+Units are in the column `unit`; pixels are those of the captured image. `summary.json` of a session has `configuration_hash`, which is
+equal if all keys have equal values, however they were set.
 )";
 
 std::string cell(const std::string& text) { return text.empty() ? "–" : text; }

@@ -122,12 +122,11 @@ std::string join_names(const std::vector<YamlFile>& files) {
   bool never = false;
   for (const YamlFile& file : files)
     if (const std::string program = find_program(file, &never); !program.empty())
-      throw InputError(
-          fmt::format("{}: {} is missing; the file {}", join_names(files), what, program));
-  throw InputError(
-      fmt::format("{}: {} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS "
-                  "camera_info, OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
-                  join_names(files), what));
+      refuse(join_names(files), 0, "{} is missing; the file {}", what, program);
+  refuse(join_names(files), 0,
+         "{} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS camera_info, "
+         "OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
+         what);
 }
 
 /// Reads intrinsics and transforms of one calibration.
@@ -156,8 +155,7 @@ class RigReader {
     for (int k = 0; k < 2; ++k) (void)model(k);
     if (cameras < 2) fail_missing(files_, "the lens of a second camera");
     if (cameras > kMaxCameras)
-      throw InputError(fmt::format("{}: has {} cameras; a rig has up to {}", join_names(files_),
-                                   cameras, kMaxCameras));
+      refuse(join_names(files_), 0, "has {} cameras; a rig has up to {}", cameras, kMaxCameras);
     RigCalibration& rig = out_.rig;
     rig.cameras = cameras;
     for (int k = 0; k < cameras; ++k) {
@@ -282,7 +280,7 @@ class RigReader {
             set_ros_distortion(equidistant ? "equidistant" : "radtan", values, &lens(k));
         !fault.empty()) {
       if (list != nullptr) fail(*list, " " + fault);
-      throw InputError(join_names(files_) + ": the list of distortion coefficients " + fault);
+      refuse(join_names(files_), 0, "the list of distortion coefficients {}", fault);
     }
   }
 
@@ -295,9 +293,8 @@ class RigReader {
     if (width == nullptr && size_)
       sides = {static_cast<double>(size_->width), static_cast<double>(size_->height)};
     else if (width == nullptr)
-      throw InputError(
-          join_names(files_) +
-          ": holds no image size, as OpenCV's sample writes none; add --size WIDTHxHEIGHT");
+      refuse(join_names(files_), 0,
+             "holds no image size, as OpenCV's sample writes none; add --size WIDTHxHEIGHT");
     else
       sides = width == size ? read_numbers(*size, 2, "[width, height]")
                             : std::vector{number_of(*width), number_of(*height)};
@@ -470,11 +467,11 @@ void check_binning(const std::string& name, const Intrinsics& lens) {
   };
   for (const int parts : {2, 4})
     if (off(1) > 2 * kNear - 0.01 && off(parts) < kNear)
-      throw InputError(fmt::format(
-          "{}: the size is {}x{}, but the principal point ({:.1f}, {:.1f}) is the middle of {}x{}: "
-          "the camera matrix is probably that of binned images; write their size",
-          name, lens.width, lens.height, lens.cx, lens.cy, lens.width / parts,
-          lens.height / parts));
+      refuse(
+          name, 0,
+          "the size is {}x{}, but the principal point ({:.1f}, {:.1f}) is the middle of {}x{}: the "
+          "camera matrix is probably that of binned images; write their size",
+          lens.width, lens.height, lens.cx, lens.cy, lens.width / parts, lens.height / parts);
 }
 
 void finish(const std::string& name, const CalibrationUse& use, CalibrationFile* calibration) {
@@ -483,7 +480,7 @@ void finish(const std::string& name, const CalibrationUse& use, CalibrationFile*
   calibration->source = "given";
   calibration->rig.baseline = calibration->rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&calibration->rig))
-    throw InputError(fmt::format("{}: in the words of calibration.yaml, {}", name, bad->message));
+    refuse(name, 0, "in the words of calibration.yaml, {}", bad->message);
   apply_use(use, &calibration->rig);
 }
 
@@ -528,15 +525,13 @@ CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
   if (kitti) {
     out.rig = *kitti;
   } else {
-    if (files.empty())
-      throw InputError(texts.front().name + ": is empty; a calibration is expected");
+    if (files.empty()) refuse(texts.front().name, 0, "is empty; a calibration is expected");
     for (const YamlFile& file : files) {
       bool never = false;
       if (!file.root().IsMap())
-        throw InputError(file.name() +
-                         ": is not a group of keys (`key: value`); a calibration is expected");
+        refuse(file.name(), 0, "is not a group of keys (`key: value`); a calibration is expected");
       if (const std::string program = find_program(file, &never); never)
-        throw InputError(file.name() + ": " + program);
+        refuse(file.name(), 0, program);
     }
     add_named_files(&files);
     out = RigReader(files, size, use, remarks).read();

@@ -504,7 +504,8 @@ std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* came
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kAssumedStep);
   sequence->assumptions.emplace_back(
-      "there is no times.txt, so pairs are 0.1 s apart (write one line a pair: the time)");
+      "there is no times.txt, so pairs are 0.1 s apart (write the time of each pair, one per "
+      "line)");
   return pairs;
 }
 
@@ -574,7 +575,7 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
   }
   const std::string other = other_calibration(folder);
   refuse(folder, 0,
-         "has no calibration.yaml; give a calibration with --calibration (of vergence, Kalibr, "
+         "has no calibration.yaml; pass a calibration with --calibration (of vergence, Kalibr, "
          "ROS, OpenCV or another program), or --focal and --baseline" +
              (other.empty() ? "" : "; is " + other + " one?"));
 }

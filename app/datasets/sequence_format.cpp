@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 
@@ -15,8 +16,8 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
   constexpr const char* kLayouts =
       "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt "
       "above), EuRoC (mav0), plain (left, right or other usual names, times.txt, "
-      "calibration.yaml), UQ St Lucia, bags of ROS 2 (.mcap, .db3) and ROS 1 (.bag) and sessions "
-      "with a recording (drive.mcap) are what can be read";
+      "calibration.yaml), UQ St Lucia, bags of ROS 2 (.mcap, .db3) and ROS 1 (.bag), sessions "
+      "with a recording (drive.mcap)";
   const std::vector<std::string> words{"kitti", "kitti-raw", "euroc", "folder", "st-lucia",
                                        "mcap",  "rosbag",    "db3",   "session"};
   if (const auto at = std::find(words.begin(), words.end(), word); at != words.end())
@@ -29,17 +30,16 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
     return *bag;
   if (!std::filesystem::is_directory(folder, ignored))
     if (const std::string advice = unpack_advice(folder); !advice.empty())
-      throw InputError(folder.string() + ": " + advice);
+      refuse(folder, 0, advice);
   if (!std::filesystem::is_directory(folder, ignored))
-    throw InputError(
-        folder.string() +
-        ": no such directory; pass a data-set directory, or a .mcap, .db3 or .bag file");
+    refuse(folder, 0,
+           "no such directory; pass a data-set directory, or a .mcap, .db3 or .bag file");
   if (const auto found = find_format(folder)) return *found;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
        it.increment(ignored))
     if (const std::string advice = unpack_advice(it->path()); !advice.empty())
-      throw InputError(it->path().string() + ": " + advice);
-  throw InputError(folder.string() + ": no known data-set format; expected: " + kLayouts);
+      refuse(it->path(), 0, advice);
+  refuse(folder, 0, "no known data-set format; expected: {}", kLayouts);
 }
 
 void check_topics(SequenceFormat format, const BagTopics& topics) {

@@ -154,9 +154,9 @@ class Openings {
       return d.serial;
     }
     const std::string error = driver.last_error();
-    throw DeviceError(
-        fmt::format("{}: no unassigned {} camera was found; {}; check cable and power{}",
-                    camera_key(k), name, format_list(found), error.empty() ? "" : ": " + error));
+    throw DeviceError(fmt::format("{}: no unassigned {} camera ({}); check cable and power{}",
+                                  camera_key(k), name, format_list(found),
+                                  error.empty() ? "" : ": " + error));
   }
 
   const Configuration& configuration_;

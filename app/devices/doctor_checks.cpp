@@ -110,7 +110,7 @@ void check_cameras(const CheckContext& p, std::vector<Finding>* findings) {
     else
       findings->push_back({"cameras",
                            FindingState::problem,
-                           fmt::format("{}: the {} camera{} is not there ({}); check cable, power "
+                           fmt::format("{}: the {} camera{} was not found ({}); check cable, power "
                                        "and serial",
                                        who, n.driver, n.serial.empty() ? "" : " " + n.serial,
                                        format_list(find_driver(p.inventory, n.driver))),
@@ -201,7 +201,7 @@ void check_port(const CheckContext& p, const std::string& group, const std::stri
   if (meant == 0 || (meant > 1 && group == "ins"))
     findings->push_back({group,
                          FindingState::problem,
-                         fmt::format("{}.port: {}: {} serial ports are meant by it; name one that "
+                         fmt::format("{}.port: {}: {} serial ports match; set one that "
                                      "`vergence devices` lists",
                                      group, key.empty() ? "empty" : key, meant),
                          {}});
@@ -334,9 +334,8 @@ void check_receive_buffer(const CheckContext& p, std::vector<Finding>* findings)
   Finding f{
       "receive_buffer",
       FindingState::ok,
-      fmt::format(
-          "net.core.rmem_max is {} KiB; the receive buffer of a GigE camera should have {} KiB",
-          *limit / 1024, requested / 1024),
+      fmt::format("net.core.rmem_max is {} KiB; the receive buffer of a GigE camera needs {} KiB",
+                  *limit / 1024, requested / 1024),
       {}};
   if (*limit < requested && !p.machine.has_capability(CAP_NET_ADMIN)) {
     const bool lost = static_cast<double>(*limit) < kMinImages * image;
@@ -444,11 +443,11 @@ void check_limits(const CheckContext& p, std::vector<Finding>* findings) {
 }
 
 void check_clock(const CheckContext& p, std::vector<Finding>* findings) {
-  Finding f{"clock", FindingState::ok, "the clock is in step", {}};
+  Finding f{"clock", FindingState::ok, "the system clock is synchronised", {}};
   if (!p.machine.clock_synchronised.value_or(false)) {
     f.state = FindingState::advice;
     f.message =
-        "the clock is not in step: the dates of sessions may be wrong, their intervals are not";
+        "the system clock is not synchronised: session dates may be wrong; intervals are correct";
     // Without a clock with a battery a start begins with an old date; timesyncd remembers the last.
     f.fix = {p.machine.exists("/dev/rtc0") ? "sudo apt-get install chrony"
                                            : "sudo apt-get install systemd-timesyncd"};
@@ -460,10 +459,10 @@ void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
   constexpr std::uint64_t kMin = std::uint64_t{200} << 20, kComfortable = std::uint64_t{2} << 30;
   const auto room = p.machine.room_at(p.out);
   if (!room) return;
-  const std::string where = p.out == "." ? "the current folder" : p.out.string();
+  const std::string where = p.out == "." ? "the current directory" : p.out.string();
   Finding f{"disk",
             FindingState::ok,
-            fmt::format("{:.1f} GB are free at {}", static_cast<double>(room->bytes) / 1e9, where),
+            fmt::format("{:.1f} GB are free in {}", static_cast<double>(room->bytes) / 1e9, where),
             {}};
   if (room->read_only) {
     f.state = FindingState::problem;

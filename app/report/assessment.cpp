@@ -540,8 +540,8 @@ class Assessor {
         (p99 > a_.interval_s ||
          static_cast<double>(slow) > kFewOverBudget * static_cast<double>(a_.read)))
       advise(
-          "More than 1 % of the frames took longer than the frame interval; live, work would be "
-          "dropped: lower trigger.rate or odometry.features.");
+          "More than 1 % of the frames took longer than the frame interval. A live run would omit "
+          "work: lower trigger.rate or odometry.features.");
   }
 
   void advise_by_reasons() {
@@ -569,12 +569,11 @@ class Assessor {
       out_.reasons.insert(out_.reasons.end(), same->begin(), same->end());
     out_.message =
         out_.reasons.empty()
-            ? fmt::format(
-                  "every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames "
-                  "ok{}",
-                  percent(a_.drift.value_or(0)), a_.path_m, a_.ok, all_,
-                  a_.waited > 0 ? fmt::format(", {} before the calibration was verified", a_.waited)
-                                : "")
+            ? fmt::format("every check passed: drift {} over {:.0f} m, {} of {} frames ok{}",
+                          percent(a_.drift.value_or(0)), a_.path_m, a_.ok, all_,
+                          a_.waited > 0
+                              ? fmt::format(", {} before the calibration was verified", a_.waited)
+                              : "")
             : fmt::format("{}", fmt::join(out_.reasons, "; "));
     out_.message = capitalised(out_.message) + ".";
     return std::move(out_);
