@@ -85,7 +85,7 @@ constexpr std::array kEventFormats{
     EventFormat{"map_reset", "", "gap_s"},
     EventFormat{"time_gap", "", "gap_s"},
     EventFormat{"relocalised", "", nullptr},
-    EventFormat{"points_dropped", "", "count"},
+    EventFormat{"frame_dropped", "", "older_s"},
     EventFormat{"rig_changed", "", "frames_since_onset"},
     EventFormat{"out_of_sync", "", "lag_frames"},
     EventFormat{"cameras_in_sync", "", nullptr},
@@ -94,7 +94,7 @@ constexpr std::array kEventFormats{
     EventFormat{"focal_length_contradicted", "", "measured_px"},
     EventFormat{"calibration_accepted", "a new calibration is in use", "frames"},
     EventFormat{"calibration_rejected", "a calibration was rejected", "frames"},
-    EventFormat{"calibration_taken_up", "", "fitting_percent"},
+    EventFormat{"calibration_applied", "", "fitting_percent"},
     EventFormat{"calibration_pending", "the calibration is postponed", nullptr},
     EventFormat{"calibration_resumed", "the last calibration is in use again", nullptr}};
 static_assert(kEventFormats.size() ==

@@ -61,8 +61,8 @@ inline constexpr std::array kCalibrationTransitions = {
                           CalibrationState::unverified},
 };
 
-[[nodiscard]] constexpr CalibrationState after(CalibrationState state,
-                                               CalibrationTrigger trigger) noexcept {
+[[nodiscard]] constexpr CalibrationState next_state(CalibrationState state,
+                                                    CalibrationTrigger trigger) noexcept {
   for (const CalibrationTransition& t : kCalibrationTransitions)
     if (t.from == state && t.on == trigger) return t.to;
   return state;

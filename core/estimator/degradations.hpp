@@ -45,8 +45,8 @@ inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradatio
 /// Not thread-safe. Does not allocate.
 class DegradationLedger {
  public:
-  /// Value of `left` for a degradation that only strike() ends.
-  static constexpr int kUntilStruck = std::numeric_limits<int>::max();
+  /// Value of `left` for a degradation that only clear() ends.
+  static constexpr int kUntilCleared = std::numeric_limits<int>::max();
 
   struct Entry {
     /// Reason::none if the degradation does not apply.
@@ -58,22 +58,22 @@ class DegradationLedger {
 
   /// Enters a degradation, or renews it and keeps its first frame.
   void enter(Degradation degradation, Reason reason, std::uint64_t frame,
-             int left = kUntilStruck) noexcept {
+             int left = kUntilCleared) noexcept {
     Entry& e = at(degradation);
     e = {reason, e.reason == Reason::none ? frame : e.since, left};
   }
-  void strike(Degradation degradation) noexcept { at(degradation) = {}; }
-  /// Enters the degradation if `so`, otherwise ends it.
-  void hold(Degradation degradation, bool so, Reason reason, std::uint64_t frame) noexcept {
-    if (so)
+  void clear(Degradation degradation) noexcept { at(degradation) = {}; }
+  /// Enters the degradation if it applies, otherwise ends it.
+  void set(Degradation degradation, bool applies, Reason reason, std::uint64_t frame) noexcept {
+    if (applies)
       enter(degradation, reason, frame);
     else
-      strike(degradation);
+      clear(degradation);
   }
   /// Counts one frame of evidence against a degradation. Returns true if that ended it.
   bool weaken(Degradation degradation) noexcept {
     Entry& e = at(degradation);
-    if (e.reason == Reason::none || e.left == kUntilStruck || --e.left > 0) return false;
+    if (e.reason == Reason::none || e.left == kUntilCleared || --e.left > 0) return false;
     e = {};
     return true;
   }
@@ -81,7 +81,7 @@ class DegradationLedger {
   [[nodiscard]] const Entry& operator[](Degradation degradation) const noexcept {
     return entries_[static_cast<std::size_t>(degradation)];
   }
-  [[nodiscard]] bool stands(Degradation degradation) const noexcept {
+  [[nodiscard]] bool active(Degradation degradation) const noexcept {
     return (*this)[degradation].reason != Reason::none;
   }
   /// Returns the strongest degradation that applies, or nullptr. `late_image` does not count while

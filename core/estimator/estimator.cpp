@@ -94,7 +94,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       p.state == State::stereo_odometry && p.options.online)
     p.suspect_rig(CalibrationCause::requested, frame.number, frame);
 
-  p.odometry.trust_rig(!p.degradations.stands(Degradation::calibration));
+  p.odometry.trust_rig(!p.degradations.active(Degradation::calibration));
   odometry::FrameOutcome out = p.odometry.process(frame, p.options.frame_budget);
   p.follow(out, frame);
   if (p.options.online) {
@@ -105,7 +105,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
         p.watch_estimate(out, frame);
       // Images that are out of sync cannot be used for calibration, even if no lag is visible for a
       // while.
-      if (!p.degradations.stands(Degradation::out_of_sync) || p.state != State::stereo_odometry)
+      if (!p.degradations.active(Degradation::out_of_sync) || p.state != State::stereo_odometry)
         p.calibrator.frames().add(p.odometry, out, frame);
     }
   }
@@ -114,7 +114,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.relinked) {
       p.calibrator.map_rebuilt(p.odometry);
       if (out.relink_due)
-        p.record(EstimatorEvent::Kind::calibration_taken_up, frame.stamp,
+        p.record(EstimatorEvent::Kind::calibration_applied, frame.stamp,
                  "the map uses the accepted calibration", 100 * out.points_kept);
     }
     if (out.renewed) p.calibrator.monitor().map_renewed(p.odometry.map());

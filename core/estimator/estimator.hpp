@@ -80,7 +80,7 @@ struct EstimatorEvent {
     /// Number of frames in the solve.
     calibration_rejected,
     /// Share of map points that fit the accepted calibration, in percent.
-    calibration_taken_up,
+    calibration_applied,
     /// None; `why` names what is missing.
     calibration_pending,
     /// None; the images fit an earlier calibration after tracking was lost.

@@ -92,7 +92,7 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
 }
 
 void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexcept {
-  if (!degradations.stands(Degradation::out_of_sync))
+  if (!degradations.active(Degradation::out_of_sync))
     record(EstimatorEvent::Kind::out_of_sync, stamp, cause_message(CalibrationCause::out_of_sync),
            lag_frames);
   degradations.enter(Degradation::out_of_sync, Reason::out_of_sync, last_number, 1);
@@ -108,13 +108,13 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   using K = calibration::MonitorResult::Kind;
   const RigAssessment v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
   margins = v.margins;
-  degradations.hold(Degradation::rig, v.undecided, Reason::recalibrating, frame.number);
+  degradations.set(Degradation::rig, v.undecided, Reason::recalibrating, frame.number);
   if (v.lag_frames != 0) {
     record_out_of_sync(frame.stamp, v.lag_frames);
     return;
   }
   if (v.cameras_in_sync) {
-    degradations.strike(Degradation::late_image);
+    degradations.clear(Degradation::late_image);
     if (degradations.weaken(Degradation::out_of_sync)) {
       record(EstimatorEvent::Kind::cameras_in_sync, frame.stamp, "the cameras are in sync again",
              0);
@@ -122,7 +122,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     }
   }
   // Cameras out of sync fit no calibration: other results of the monitor are ignored meanwhile.
-  if (degradations.stands(Degradation::out_of_sync)) return;
+  if (degradations.active(Degradation::out_of_sync)) return;
   if (v.kind == K::collapse) {
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
@@ -181,18 +181,18 @@ void Estimator::Parts::record_length_sigma(const CalibrationDecision& decision) 
 /// Adopts a calibration. Poses depend on it once the map is rebuilt with it; until then the status
 /// of the previous one applies.
 void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
-  degradations.strike(Degradation::rig);
+  degradations.clear(Degradation::rig);
   verified_percent = decision.depth_sigma_percent;
   verified_by = {};
   degradations.enter(Degradation::calibration, Reason::unverified_calibration, last_number,
-                     decision.verified ? 1 : DegradationLedger::kUntilStruck);
+                     decision.verified ? 1 : DegradationLedger::kUntilCleared);
   odometry.link(decision.calibration);
 }
 
 /// Acts on the decision of a refinement.
 void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept {
   if (calibrator.last_gate() == calibration::Gate::out_of_sync) return record_out_of_sync(stamp, 0);
-  const bool was_suspect = degradations.stands(Degradation::calibration),
+  const bool was_suspect = degradations.active(Degradation::calibration),
              contradicted = decision.cause == CalibrationCause::contradicted;
   if (contradicted && was_suspect)
     record(EstimatorEvent::Kind::calibration_contradicted, stamp,
@@ -207,11 +207,11 @@ void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Sta
   }
   if (decision.verified && !contradicted) {
     // The calibration before the refinement is verified as well.
-    degradations.strike(Degradation::calibration);
+    degradations.clear(Degradation::calibration);
     verified_percent = decision.depth_sigma_percent;
     if (!decision.accepted) verified_by = decision.evidence;
     if (was_suspect) notify_verified(stamp);
-  } else if (!calibrator.verified() && !degradations.stands(Degradation::calibration)) {
+  } else if (!calibrator.verified() && !degradations.active(Degradation::calibration)) {
     degradations.enter(Degradation::calibration, Reason::unverified_calibration, last_number);
   }
 }
@@ -245,7 +245,7 @@ void Estimator::Parts::apply(const CalibrationDecision& decision, Stamp stamp) n
   switch (calibrator.last_gate()) {
     case calibration::Gate::no_better:
       calibrator.keep();
-      degradations.strike(Degradation::rig);
+      degradations.clear(Degradation::rig);
       odometry.link(calibrator.in_use());
       transition(Trigger::calibration_saved, stamp);
       break;

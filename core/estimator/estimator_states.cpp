@@ -36,8 +36,8 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   in_gap = out.gap_s > 0 && !out.posed;
   // Images of different instants match with no calibration, so they are no evidence against it.
   const bool unmatched =
-      !out.posed && out.images_good && !degradations.stands(Degradation::out_of_sync) &&
-      !degradations.stands(Degradation::late_image) && out.reason == Reason::no_stereo_matches &&
+      !out.posed && out.images_good && !degradations.active(Degradation::out_of_sync) &&
+      !degradations.active(Degradation::late_image) && out.reason == Reason::no_stereo_matches &&
       odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kWindowFrames) {
@@ -62,7 +62,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   without_pose = 0;
   if (out.resumed) {
     calibrator.restore(odometry.rig());
-    degradations.strike(Degradation::rig);
+    degradations.clear(Degradation::rig);
     record(EstimatorEvent::Kind::calibration_resumed, frame.stamp,
            "the previous calibration fits the images again", 0);
   }
@@ -89,7 +89,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
 /// Marks the calibration as unverified, because the rig was not monitored during the missed frames.
 void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
   calibrator.map_lost();
-  if (options.online && !degradations.stands(Degradation::calibration))
+  if (options.online && !degradations.active(Degradation::calibration))
     degradations.enter(Degradation::calibration, Reason::unverified_calibration, number);
 }
 
@@ -116,28 +116,28 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
 /// degradation explains it.
 void Estimator::Parts::check_motion(const odometry::FrameOutcome& out, const Mat6& motion,
                                     double step_m) noexcept {
-  degradations.strike(Degradation::motion);
-  if (degradations.any_up_to(Degradation::rig) || degradations.stands(Degradation::dynamic_scene))
+  degradations.clear(Degradation::motion);
+  if (degradations.any_up_to(Degradation::rig) || degradations.active(Degradation::dynamic_scene))
     return;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
   const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
   const bool measurable = usual.measurable(step_m, sigma_m);
   const bool unusual = measurable && usual.unusual(sigma_m);
   if (measurable) margins.uncertainty = usual.margin();
-  degradations.hold(Degradation::motion, unusual || correction.spoils_motion(),
-                    Reason::weak_geometry, last_number);
+  degradations.set(Degradation::motion, unusual || correction.motion_unreliable(),
+                   Reason::weak_geometry, last_number);
 }
 
 /// Enters the degradations that a posed frame causes.
 void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
                                            Pairing pairing) noexcept {
-  degradations.hold(Degradation::pairing, pairing == Pairing::contradicted,
-                    Reason::pairing_ambiguous, last_number);
+  degradations.set(Degradation::pairing, pairing == Pairing::contradicted,
+                   Reason::pairing_ambiguous, last_number);
   if (out.restarted)
     degradations.enter(Degradation::scene, Reason::map_reset, last_number, kWindowFrames + 1);
-  degradations.hold(Degradation::frame, out.status != PoseStatus::ok,
-                    out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason,
-                    last_number);
+  degradations.set(Degradation::frame, out.status != PoseStatus::ok,
+                   out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason,
+                   last_number);
   if (state == State::recalibrating)
     degradations.enter(Degradation::rig, Reason::recalibrating, last_number);
   if (out.moving && !degradations.any_up_to(Degradation::rig))
@@ -147,10 +147,10 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
   // disturbs later motions. So poses stay degraded for as many frames as were degraded, at most for
   // a window's length.
   if (out.relinked || out.restarted)
-    degradations.strike(Degradation::window);
+    degradations.clear(Degradation::window);
   else if (out.gap_s > 0 || out.renewed)
     degradations.enter(Degradation::window, Reason::time_gap, last_number, kWindowFrames + 1);
-  else if (degradations.stands(Degradation::rig))
+  else if (degradations.active(Degradation::rig))
     degradations.enter(Degradation::window, Reason::recalibrating, last_number,
                        std::min(degradations[Degradation::window].left + 2, kWindowFrames + 1));
 }
@@ -170,7 +170,7 @@ void Estimator::Parts::weaken_degradations(const odometry::FrameOutcome& out,
 /// The most specific known reason for poses of unlinked cameras.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {
   if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
-  if (degradations.stands(Degradation::out_of_sync)) return Reason::out_of_sync;
+  if (degradations.active(Degradation::out_of_sync)) return Reason::out_of_sync;
   if (calibrator.missing() != Reason::none) return calibrator.missing();
   return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated
                                                                            : Reason::recalibrating;

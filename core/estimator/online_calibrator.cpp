@@ -49,7 +49,7 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
 }
 
 void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
-  state_ = after(
+  state_ = next_state(
       state_, found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
   rig_ = found.calibration;
   source_ = calibration::CalibrationOrigin::this_drive;
@@ -59,7 +59,7 @@ void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
 }
 
 void OnlineCalibrator::keep() noexcept {
-  state_ = after(state_, CalibrationTrigger::kept);
+  state_ = next_state(state_, CalibrationTrigger::kept);
   // Measurements from before the rig became suspect do not describe the present rig.
   if (search_.cause != CalibrationCause::requested) clear_rig(&refined_);
   monitor_.expect_rebuilt_scene();
@@ -67,7 +67,7 @@ void OnlineCalibrator::keep() noexcept {
 }
 
 void OnlineCalibrator::restore(const RigCalibration& rig) noexcept {
-  state_ = after(state_, CalibrationTrigger::contradicted);
+  state_ = next_state(state_, CalibrationTrigger::contradicted);
   rig_ = rig;
   keep();
 }
@@ -79,7 +79,7 @@ void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
 }
 
 void OnlineCalibrator::map_rebuilt(const odometry::Odometry& odometry) noexcept {
-  monitor_.map_rebuilt(odometry.map(), rig_, verified() && found());
+  monitor_.map_rebuilt(odometry.map(), rig_, verified() && solved_from_images());
 }
 
 void OnlineCalibrator::clear_frames() noexcept {
@@ -97,7 +97,7 @@ void OnlineCalibrator::map_lost() noexcept {
 void OnlineCalibrator::start_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
                                         std::uint64_t now) noexcept {
   search_ = {.cause = cause.value_or(search_.cause), .onset = onset, .since = now};
-  state_ = after(state_, CalibrationTrigger::suspected);
+  state_ = next_state(state_, CalibrationTrigger::suspected);
   gate_ = Gate::open;
   solve_.discard();
   frames_.begin_segment(onset);
@@ -140,7 +140,7 @@ SolutionReview OnlineCalibrator::review() const noexcept {
            .source = source_,
            .log = frames_.log(),
            .focal = solve_.focal_check(),
-           .may_have_changed = !(estimating() && search_.change_believed)}};
+           .may_have_changed = !(estimating() && search_.frames_before_change_dropped)}};
 }
 
 std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
@@ -211,7 +211,7 @@ void OnlineCalibrator::plan_search() noexcept {
     frames_.want(static_cast<std::size_t>(std::ceil(excess * excess * found.frames)));
   } else if (gate_ == Gate::rig_changed) {
     search_.onset = found.changed_at;
-    search_.change_believed = true;
+    search_.frames_before_change_dropped = true;
     frames_.begin_segment(found.changed_at);
   } else {
     // Solving the same frames again gives the same result, so drop them. Each rejection doubles the
@@ -224,11 +224,11 @@ void OnlineCalibrator::plan_search() noexcept {
 
 /// Applies a verification or contradiction and sets the monitor's expected scatter accordingly.
 void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_px) noexcept {
-  const CalibrationState before = std::exchange(state_, after(state_, what));
+  const CalibrationState before = std::exchange(state_, next_state(state_, what));
   if (state_ == before) return;
-  monitor_.watch(rig_, verified() && found());
+  monitor_.watch(rig_, verified() && solved_from_images());
   // A verified supplied calibration keeps its intrinsics, whose errors vary over the image.
-  if (verified() && !found())
+  if (verified() && !solved_from_images())
     monitor_.expect_scatter(std::max(options_.monitor.verified_bias_px, misfit_px));
 }
 

@@ -93,7 +93,7 @@ class OnlineCalibrator {
     // started.
     std::uint64_t onset = 0, since = 0;
     /// Frames before a change were dropped once; the remaining ones count as frames of one rig.
-    bool change_believed = false;
+    bool frames_before_change_dropped = false;
     /// Number of new frames that the last rejection made the next solve wait for.
     std::size_t wait = 0;
   };
@@ -102,7 +102,7 @@ class OnlineCalibrator {
   void apply_assessment(CalibrationTrigger what, double misfit_px) noexcept;
   /// True if the calibration in use was solved from images together with its intrinsics, in this
   /// run or an earlier one; its epipolar lines are more accurate than those of a supplied one.
-  [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }
+  [[nodiscard]] bool solved_from_images() const noexcept { return !rig_.covariance.empty(); }
   [[nodiscard]] SolutionReview review() const noexcept;
   /// `last`: no more frames follow.
   [[nodiscard]] std::optional<CalibrationDecision> evaluate(Stamp stamp, std::uint64_t number,

@@ -15,7 +15,7 @@ using odometry::MapPoint;
 // Sigmas of a verified calibration solved from images: the residual lens error in one stretch. The
 // solve's own sigmas do not apply, because it determines rotations and principal points only
 // together.
-constexpr std::array kFound = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
+constexpr std::array kVerifiedSigmas = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 // Minimum number of frames in which a point was found. A new point's match was searched for in the
 // band of the calibration in use and cannot test it.
 constexpr int kMinFound = 2;
@@ -26,15 +26,15 @@ constexpr int kGraceFrames = 5;
 constexpr double kFarFromLines = 0.5;
 // Ratio to the previous frame's distance from which an image counts as distorted; 2.5 rows of skew
 // on `sand_rover` give 28 (1.77 px after 0.06).
-constexpr double kSpoilt = 2;
+constexpr double kDistortionRatio = 2;
 // Minimum speed of a moving rig, in m/s; below it, consecutive images are nearly the same.
 constexpr double kMovingSpeed = 0.5;
 
 /// Covariance of a reference with a baseline of `length` metres. Unless it was solved from images
 /// and verified it is wide, so that only a change against earlier frames counts as a knock.
-Mat6 covariance_of(bool solved_and_verified, double length) noexcept {
+Mat6 reference_covariance(bool solved_and_verified, double length) noexcept {
   Vec6 spread = Vec6::Constant(calibration::kUnknownTransform);
-  if (solved_and_verified) spread = Eigen::Map<const Vec6>(kFound.data());
+  if (solved_and_verified) spread = Eigen::Map<const Vec6>(kVerifiedSigmas.data());
   spread.tail<3>() *= length;
   return spread.cwiseAbs2().asDiagonal();
 }
@@ -49,7 +49,7 @@ const Transform& transform(const RigCalibration& rig, int k) noexcept {
 }
 
 /// A rotation by σ about the axis that epipolar lines do not show moves all points by f σ.
-ChangeEvidence evidence_of(const calibration::DisparityJump& jump, double focal_px) noexcept {
+ChangeEvidence to_evidence(const calibration::DisparityJump& jump, double focal_px) noexcept {
   const double sigmas = jump.px / jump.sigma_px, px = std::abs(jump.px);
   return {0.5 * sigmas * sigmas, px, 1e3 * px / focal_px};
 }
@@ -81,7 +81,7 @@ void RigMonitor::watch(const RigCalibration& rig, bool solved_and_verified) noex
   expect_scatter(solved_and_verified ? options_.verified_bias_px : options_.unverified_bias_px);
   for (int k = 1; k < cameras_; ++k) {
     const Transform& T = transform(rig_, k);
-    set_monitor_reference(k, T, covariance_of(solved_and_verified, T.t.norm()));
+    set_monitor_reference(k, T, reference_covariance(solved_and_verified, T.t.norm()));
   }
 }
 
@@ -196,9 +196,9 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   return onset;
 }
 
-MonitorResult RigMonitor::monitor_verdict(int k, const odometry::Odometry& odometry,
-                                          const odometry::FrameOutcome& outcome,
-                                          const RigFrame& frame, int found, bool moving) noexcept {
+MonitorResult RigMonitor::update_monitor(int k, const odometry::Odometry& odometry,
+                                         const odometry::FrameOutcome& outcome,
+                                         const RigFrame& frame, int found, bool moving) noexcept {
   Watched& w = camera(k);
   calibration::MonitorFrame f;
   f.frame = frame.number;
@@ -238,23 +238,21 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
     rig.cameras_in_sync = rig.cameras_in_sync && pairing.cameras_in_sync();
     if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
     // A pose biased by a distorted image changes the disparities of the frames before and after it.
-    const bool spoilt =
-        pairing.distance_px() > kFarFromLines && pairing.distance_px() > kSpoilt * before;
+    const bool distorted =
+        pairing.distance_px() > kFarFromLines && pairing.distance_px() > kDistortionRatio * before;
     calibration::DisparityJump jump;
-    if (both_show(outcome, k) && !spoilt)
+    if (both_show(outcome, k) && !distorted)
       jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
     else
       camera(k).jumps.skip(step);
     MonitorResult v;
-    if (!map_reset_pending_) {
-      v = monitor_verdict(k, odometry, outcome, frame, found, moving);
-      // One frame over the threshold decides nothing until the next one confirms it.
-      if (!v.undecided)
-        rig.margins.change = std::max(rig.margins.change, v.statistic / options_.threshold);
-    }
+    if (!map_reset_pending_) v = update_monitor(k, odometry, outcome, frame, found, moving);
     // A lag moves matches off the epipolar lines, and changes disparities whenever the speed
     // changes. So no change of the rig is reported while cameras may be out of sync.
     const bool may_lag = pairing.suspected() || pairing.questioned();
+    // One frame over the threshold decides nothing until the next one confirms it.
+    if (!v.undecided && !may_lag)
+      rig.margins.change = std::max(rig.margins.change, v.statistic / options_.threshold);
     const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
     if (may_lag || (!verified && change)) {
       v.undecided = v.undecided || v.kind != Kind::quiet || pairing.suspected();
@@ -265,7 +263,7 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
     } else if (jump.confirmed && v.kind < Kind::knock) {
       v.kind = Kind::knock;
       v.onset_frame = jump.onset_frame;
-      v.evidence = evidence_of(jump, pinhole(rig_, k).fx);
+      v.evidence = to_evidence(jump, pinhole(rig_, k).fx);
     }
     rig.margins.jump = std::max(rig.margins.jump, jump.over_limit);
     rig.margins.lag = std::max(rig.margins.lag, pairing.lag_margin());

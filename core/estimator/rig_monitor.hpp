@@ -99,11 +99,10 @@ class RigMonitor {
   void set_monitor_reference(int k, const Transform& T_camera_left,
                              const Mat6& covariance) noexcept;
   /// Result of camera k's monitor; the caller handles jumps.
-  [[nodiscard]] calibration::MonitorResult monitor_verdict(int k,
-                                                           const odometry::Odometry& odometry,
-                                                           const odometry::FrameOutcome& outcome,
-                                                           const RigFrame& frame, int found,
-                                                           bool moving) noexcept;
+  [[nodiscard]] calibration::MonitorResult update_monitor(int k, const odometry::Odometry& odometry,
+                                                          const odometry::FrameOutcome& outcome,
+                                                          const RigFrame& frame, int found,
+                                                          bool moving) noexcept;
   /// Motion of the left camera since the previous monitored frame.
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Fills `stereo_` with camera k's matches. Returns the number of active points among them.

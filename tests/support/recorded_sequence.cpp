@@ -107,7 +107,7 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
         if (knocked && row.reported_at < 0) row.reported_at = at;
         if (!knocked) ++row.knocks;
       }
-      if (event.kind == Kind::calibration_taken_up)
+      if (event.kind == Kind::calibration_applied)
         row.points_kept_percent = std::min(row.points_kept_percent, event.value);
       if (event.kind == Kind::calibration_verified && row.verified_at < 0) row.verified_at = at;
       if (event.kind == Kind::calibration_contradicted && row.contradicted_at < 0) {

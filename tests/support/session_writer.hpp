@@ -150,7 +150,7 @@ struct SessionWriter {
     event(0.085, "calibration_verified", "the calibration in use is verified");
     event(0.09, "enu_alignment", "aligned with ENU after 100.0 m: heading sigma 1.20 deg");
     for (int i = 0; faults && i < 20; ++i)
-      event(0.6 + 0.001 * i, "points_dropped", "points beyond the window's capacity were dropped");
+      event(0.6 + 0.001 * i, "frame_dropped", "the frame is not newer than the one before");
     if (faults) event(0.62, "state", "stereo_odometry to lost: no pose for ten frames");
     if (faults) event(0.64, "relocalised", "found again against the window");
   }

@@ -30,9 +30,10 @@ class CovarianceBaseline {
   }
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
     recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
-    times_ = kept_ >= kMin ? sigma_m / median() : 0;
+    ratio_ = kept_ >= kMin ? sigma_m / median() : 0;
     const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
-    unusual_ = times_ > kTimes || (unusual_ && std::sqrt(squares / kRecent) > kTimes * median());
+    unusual_ =
+        ratio_ > kMaxRatio || (unusual_ && std::sqrt(squares / kRecent) > kMaxRatio * median());
     if (unusual_) return true;
     sigma_[next_] = sigma_m;
     next_ = (next_ + 1) % kKept;
@@ -41,12 +42,12 @@ class CovarianceBaseline {
   }
 
   /// Sigma of the last motion over the one that is unusual; 0 with too few motions to have one.
-  [[nodiscard]] double margin() const noexcept { return times_ / kTimes; }
+  [[nodiscard]] double margin() const noexcept { return ratio_ / kMaxRatio; }
 
  private:
   // Numbers of motions in the baseline, before it is used, and in the test for the end.
   static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 3;
-  static constexpr double kTimes = 3;
+  static constexpr double kMaxRatio = 3;
 
   [[nodiscard]] double median() const noexcept {
     std::array<double, kKept> sorted = sigma_;
@@ -59,7 +60,7 @@ class CovarianceBaseline {
   std::array<double, kRecent> recent_{};
   std::size_t evaluated_ = 0;
   // Sigma of the last motion over the baseline.
-  double times_ = 0;
+  double ratio_ = 0;
   bool unusual_ = false;
 };
 

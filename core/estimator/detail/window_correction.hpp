@@ -19,7 +19,7 @@ struct WindowCorrection {
   double sigma_m = 0;
 
   [[nodiscard]] bool significant() const noexcept { return moved_m > sigma_m; }
-  [[nodiscard]] bool spoils_motion() const noexcept {
+  [[nodiscard]] bool motion_unreliable() const noexcept {
     return significant() && moved_m > kShare * step_m;
   }
 };

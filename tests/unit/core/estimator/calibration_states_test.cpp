@@ -59,10 +59,10 @@ TEST(CalibrationStates, suspectAndVerifiedHaveTheirTriggersOnly) {
     EXPECT_EQ(t.to == S::suspect, t.on == T::suspected);
     EXPECT_EQ(t.to == S::verified, t.on == T::verified || t.on == T::adopted_verified);
     EXPECT_NE(t.to, S::none);
-    EXPECT_EQ(after(t.from, t.on), t.to) << "a row hides another";
+    EXPECT_EQ(next_state(t.from, t.on), t.to) << "a row hides another";
   }
-  EXPECT_EQ(after(S::none, T::suspected), S::none);
-  EXPECT_EQ(after(S::suspect, T::verified), S::suspect);
+  EXPECT_EQ(next_state(S::none, T::suspected), S::none);
+  EXPECT_EQ(next_state(S::suspect, T::verified), S::suspect);
 }
 
 TEST(CalibrationStates, readmeDiagramsMatchTheTables) {

@@ -13,7 +13,7 @@ TEST(DegradationLedger, strongestIsReported) {
   ASSERT_NE(ledger.strongest(true), nullptr);
   EXPECT_EQ(ledger.strongest(true)->reason, Reason::recalibrating);
   EXPECT_TRUE(ledger.any_up_to(Degradation::rig));
-  ledger.strike(Degradation::rig);
+  ledger.clear(Degradation::rig);
   EXPECT_EQ(ledger.strongest(true)->reason, Reason::time_gap);
   EXPECT_FALSE(ledger.any_up_to(Degradation::rig));
 }
@@ -24,20 +24,20 @@ TEST(DegradationLedger, entryEndsAfterItsEvidence) {
   ledger.enter(Degradation::scene, Reason::map_reset, 5, 2);
   EXPECT_FALSE(ledger.weaken(Degradation::scene));
   EXPECT_TRUE(ledger.weaken(Degradation::scene));
-  EXPECT_FALSE(ledger.stands(Degradation::scene));
+  EXPECT_FALSE(ledger.active(Degradation::scene));
   ledger.enter(Degradation::rig, Reason::recalibrating, 5);
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(ledger.weaken(Degradation::rig));
-  EXPECT_TRUE(ledger.stands(Degradation::rig));
+  EXPECT_TRUE(ledger.active(Degradation::rig));
 }
 
 TEST(DegradationLedger, entryKeepsItsFirstFrame) {
   DegradationLedger ledger;
   for (std::uint64_t frame = 11; frame < 15; ++frame)
-    ledger.hold(Degradation::frame, true, Reason::few_inliers, frame);
+    ledger.set(Degradation::frame, true, Reason::few_inliers, frame);
   EXPECT_EQ(ledger[Degradation::frame].since, 11U);
-  ledger.hold(Degradation::frame, false, Reason::few_inliers, 15);
-  EXPECT_FALSE(ledger.stands(Degradation::frame));
-  ledger.hold(Degradation::frame, true, Reason::few_inliers, 16);
+  ledger.set(Degradation::frame, false, Reason::few_inliers, 15);
+  EXPECT_FALSE(ledger.active(Degradation::frame));
+  ledger.set(Degradation::frame, true, Reason::few_inliers, 16);
   EXPECT_EQ(ledger[Degradation::frame].since, 16U);
 }
 
