@@ -180,10 +180,8 @@ void rendered_stretches(const app::Configuration& c) {
   test::RenderedDriveOptions o;
   o.from_s = 20;
   test::RenderedDrive rendered(o);
-  EstimatorOptions options;
-  options.odometry = c.odometry;
-  options.calibration = c.calibration;
-  options.monitor = c.monitor;
+  EstimatorOptions options{
+      .odometry = c.odometry, .calibration = c.calibration, .monitor = c.monitor};
   const auto features = static_cast<std::size_t>(c.odometry.features);
   Arena arena(Estimator::memory_needed(options, o.rig) +
               calibration::SegmentSolver::memory_needed(c.calibration, c.monitor, 2, features));

@@ -127,10 +127,8 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
   street.drive.kind = mock::DriveKind::figure_eight;
   test::RenderedDrive drive(street);
   const app::Configuration c = app::load_configuration(std::nullopt, {});
-  EstimatorOptions options;
-  options.odometry = c.odometry;
-  options.calibration = c.calibration;
-  options.monitor = c.monitor;
+  EstimatorOptions options{
+      .odometry = c.odometry, .calibration = c.calibration, .monitor = c.monitor};
   Arena arena(Estimator::memory_needed(options, drive.rig()));
   SequentialRunner runner;
   ImmediateRunner solver;

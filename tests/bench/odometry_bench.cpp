@@ -113,9 +113,7 @@ DecodedDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
 
 Replay replay(const DecodedDrive& d, const app::Configuration& configuration, int threads,
               bool online) {
-  EstimatorOptions options;
-  options.odometry = configuration.odometry;
-  options.online = online;
+  EstimatorOptions options{.odometry = configuration.odometry, .online = online};
   Arena arena(Estimator::memory_needed(options, d.sequence.calibration));
   SequentialRunner one;
   std::optional<app::ThreadRunner> two;
@@ -128,10 +126,7 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
                       beside ? static_cast<BackgroundRunner&>(*beside) : at_once);
   Replay r;
   for (std::size_t i = 0; i < d.pairs.size(); ++i) {
-    RigFrame frame;
-    frame.number = i;
-    frame.stamp = d.sequence.pairs[i].stamp;
-    frame.cameras = 2;
+    RigFrame frame{.number = i, .stamp = d.sequence.pairs[i].stamp, .cameras = 2};
     for (std::size_t k = 0; k < 2; ++k) {
       const Intrinsics& c = d.sequence.calibration.intrinsics[k];
       frame.images[k] = {d.pairs[i][k].data, c.width, c.height,
@@ -207,8 +202,7 @@ Measured measure(const Excerpt& excerpt, const DecodedDrive& drive, const Argume
     online_means.push_back(static_cast<float>(
         mean(replay(drive, configuration, arguments.threads, true).milliseconds)));
   }
-  EvaluationOptions options;
-  options.segments = {{excerpt.lengths, 1, false}, {excerpt.lengths, 1, true}};
+  EvaluationOptions options{.segments = {{excerpt.lengths, 1, false}, {excerpt.lengths, 1, true}}};
   Measured m;
   m.name = excerpt.name;
   m.frames = drive.pairs.size();

@@ -244,8 +244,7 @@ PlanarFit fit_planar(const DriveOutcome& r, std::size_t first, std::size_t last)
   for (const PoseSample& s : r.samples)
     if (s.frame >= first && s.frame < last && s.status != PoseStatus::lost)
       poses.push_back({stamps.at(s.frame), s.T_world_left});
-  EvaluationOptions options;
-  options.max_gap = Duration::seconds(1e6);
+  EvaluationOptions options{.max_gap = Duration::seconds(1e6)};
   PlanarFit best;
   for (double offset = -5; offset <= 5; offset += 0.05) {
     std::vector<StampedPose> shifted = poses;

@@ -15,8 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::vector<std::uint32_t> quadlets(
       size / 4);  // exactly so many: a read behind the last one is found by ASan
   if (!quadlets.empty()) std::memcpy(quadlets.data(), data, quadlets.size() * 4);
-  ConfigRom rom;
-  rom.guid = 77;
+  ConfigRom rom{.guid = 77};
   const RomStatus status = parse_config_rom(quadlets, &rom);
   if (status != RomStatus::ok && rom.guid != 77)
     std::abort();  // a refused ROM leaves the result alone

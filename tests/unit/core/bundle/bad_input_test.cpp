@@ -10,12 +10,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-SimulationOptions small() {
-  SimulationOptions s;
-  s.points = 30;
-  s.poses = 4;
-  return s;
-}
+SimulationOptions small() { return {.poses = 4, .points = 30}; }
 
 SimulatedRig make() {
   Random random(31);
@@ -150,9 +145,7 @@ TEST(BadBundle, poseWithTwoPointsIsRankDeficient) {
 
 /// Random invalid problems give a named termination and finite results.
 TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
-  SimulationOptions s;
-  s.points = 20;
-  s.poses = 5;
+  SimulationOptions s{.poses = 5, .points = 20};
   OwnAdjuster own(capacities_for(s));
   int usable = 0;
   for (std::uint64_t seed = 1; seed <= 600; ++seed) {
@@ -197,9 +190,8 @@ TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
       }
       if (rig.observations.empty()) break;
     }
-    BundleOptions o;
-    o.configuration = static_cast<BundleConfiguration>(random.below(3));
-    o.loss = static_cast<BundleLoss>(random.below(3));
+    BundleOptions o{.configuration = static_cast<BundleConfiguration>(random.below(3)),
+                    .loss = static_cast<BundleLoss>(random.below(3))};
     o.length[1].kind = static_cast<BundleLength>(random.below(3));
     o.length[1].metres = random.uniform(0.1, 1);
     o.length[1].sigma = random.uniform(1e-4, 1e-1);

@@ -14,9 +14,7 @@ struct OwnAdjuster {
 };
 
 inline BundleOptions calibration_options() {
-  BundleOptions o;
-  o.configuration = BundleConfiguration::stereo_calibration;
-  return o;
+  return {.configuration = BundleConfiguration::stereo_calibration};
 }
 
 /// With covariances; intrinsics exact unless a test says otherwise.
@@ -28,10 +26,8 @@ inline BundleOptions with_covariance() {
 }
 
 inline SimulationOptions tight(int points = SimulationOptions{}.points) {
-  SimulationOptions s;
-  s.generator = SimulationGenerator::tight;
-  s.start_points = -1;
-  s.points = points;
+  SimulationOptions s{
+      .generator = SimulationGenerator::tight, .points = points, .start_points = -1};
   return s;
 }
 

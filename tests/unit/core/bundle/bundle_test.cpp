@@ -13,11 +13,10 @@ namespace {
 constexpr double kExactPixel = 1e-11, kExactMetre = 1e-10, kExactRadian = 1e-11;
 
 TEST(Bundle, calibrationIsExactOnNoiseFreeData) {
-  SimulationOptions s;
-  s.noise = 0;
-  s.generator = SimulationGenerator::tight;
-  s.start_translation = 0.5;
-  s.start_points = -1;
+  SimulationOptions s{.generator = SimulationGenerator::tight,
+                      .noise = 0,
+                      .start_translation = 0.5,
+                      .start_points = -1};
   OwnAdjuster own(capacities_for(s));
   Random random(11);
   for (int run = 0; run < 100; ++run) {
@@ -32,8 +31,7 @@ TEST(Bundle, calibrationIsExactOnNoiseFreeData) {
 }
 
 TEST(Bundle, odometryIsExactAndKeepsTheRig) {
-  SimulationOptions s;
-  s.noise = 0;
+  SimulationOptions s{.noise = 0};
   OwnAdjuster own(capacities_for(s));
   Random random(13);
   for (int run = 0; run < 20; ++run) {
@@ -48,11 +46,9 @@ TEST(Bundle, odometryIsExactAndKeepsTheRig) {
 }
 
 TEST(Bundle, monocularPosesAreExactUpToScale) {
-  SimulationOptions s;
-  s.noise = 0;
+  SimulationOptions s{.noise = 0};
   OwnAdjuster own(capacities_for(s));
-  BundleOptions options;
-  options.configuration = BundleConfiguration::parallel_monocular;
+  BundleOptions options{.configuration = BundleConfiguration::parallel_monocular};
   Random random(14);
   for (int run = 0; run < 20; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
@@ -72,8 +68,7 @@ TEST(Bundle, monocularPosesAreExactUpToScale) {
 }
 
 TEST(Bundle, robustLossesSuppressOutliers) {
-  SimulationOptions s;
-  s.noise = 0.1;
+  SimulationOptions s{.noise = 0.1};
   Random random(17);
   const SimulatedRig original = simulate_rig(s, random);
   OwnAdjuster own(capacities_for(s));
@@ -136,8 +131,7 @@ TEST(Bundle, constantPosesAndPointsAreUnchanged) {
 }
 
 TEST(Bundle, pointsAreFoundWithEveryPoseConstant) {
-  SimulationOptions s;
-  s.noise = 0;
+  SimulationOptions s{.noise = 0};
   Random random(24);
   SimulatedRig rig = simulate_rig(s, random);
   rig.T_camera_left = rig.true_cameras;
@@ -153,15 +147,12 @@ TEST(Bundle, pointsAreFoundWithEveryPoseConstant) {
 }
 
 TEST(Bundle, posePriorFixesTheGauge) {
-  SimulationOptions s;
-  s.noise = 0;
+  SimulationOptions s{.noise = 0};
   Random random(20);
   SimulatedRig rig = simulate_rig(s, random);
   rig.T_camera_left = rig.true_cameras;
-  BundlePosePrior prior;
-  prior.pose = 0;
-  prior.T_left_world = rig.true_poses[0];
-  prior.information = Mat6::Identity() * 1e4;
+  BundlePosePrior prior{
+      .pose = 0, .T_left_world = rig.true_poses[0], .information = Mat6::Identity() * 1e4};
   rig.T_left_world[0] = perturbed(rig.T_left_world[0], {0.01, -0.02, 0.01}, {0.1, 0.1, -0.1});
   std::vector<std::uint8_t> constant(10, 0);
   BundleProblem p = rig.problem();
@@ -185,8 +176,7 @@ TEST(Bundle, solveAllocatesNothing) {
   o.intrinsics[1].prior_mean = {887, 887, 0, 0, 0, 0, 0, 0, 0};
   o.intrinsics[1].prior_sigma = {1, 1, 0, 0, 0, 0, 0, 0, 0};
   o.loss = BundleLoss::cauchy;
-  BundleOptions odometry;
-  odometry.pose_covariance = true;
+  BundleOptions odometry{.pose_covariance = true};
   const BundleProblem p = rig.problem();
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   BundleResult first, second;

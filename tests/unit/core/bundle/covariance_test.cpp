@@ -141,8 +141,7 @@ TEST(BundleCovariance, focalLengthSigmaMatchesItsErrors) {
 
 /// Mean of the newest pose's normalised squared error.
 double newest_pose_error(BundleOptions o, int runs, std::uint64_t seed) {
-  SimulationOptions s;
-  s.points = 60;
+  SimulationOptions s{.points = 60};
   OwnAdjuster own(capacities_for(s));
   Random random(seed);
   o.pose_covariance = true;

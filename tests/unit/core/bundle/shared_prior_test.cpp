@@ -21,8 +21,7 @@ BundleOptions to_the_minimum() {
 }
 
 RigCalibration calibration_of(const SimulatedRig& rig, const RigCovariance& covariance) {
-  RigCalibration c;
-  c.cameras = static_cast<int>(rig.cameras.size());
+  RigCalibration c{.cameras = static_cast<int>(rig.cameras.size())};
   for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
     c.intrinsics[k] = rig.cameras[k].intrinsics();
     c.T_camera_left[k] = rig.T_camera_left[k];

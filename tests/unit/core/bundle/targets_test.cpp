@@ -10,8 +10,7 @@ namespace {
 /// The adjuster's kernels sum in another order on each target, and some fuse products with sums:
 /// the optimum is the same to rounding, and so is the number of steps to it.
 TEST(BundleTargets, everySimdTargetFindsTheSameOptimum) {
-  SimulationOptions s;
-  s.points = 61;
+  SimulationOptions s{.points = 61};
   Random random(22);
   const SimulatedRig original = simulate_rig(s, random);
   OwnAdjuster own(capacities_for(s));

@@ -18,8 +18,7 @@ using FreeVector = Eigen::Matrix<double, kFree, 1>;
 constexpr int row_of(int i) { return i < 6 ? extrinsic_row(1) + i : intrinsic_row(1) + i - 6; }
 
 RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
+  RigCalibration r{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = r.intrinsics[k];
     c.width = 1024, c.height = 768, c.fx = c.fy = 1247, c.cx = 511.5, c.cy = 383.5;

@@ -101,16 +101,12 @@ RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_
   test::FeatureDriveOptions o;
   o.seed = seed;
   o.changes = changes;
-  CalibrationOptions held;
-  held.max_frames = 60;
-  held.intrinsics = IntrinsicsEstimation::fixed;
+  CalibrationOptions held{.max_frames = 60, .intrinsics = IntrinsicsEstimation::fixed};
   test::SolverInArena s(held);
   test::FeatureDrive drive(o);
   test::log_drive(drive, 60, {}, s.solver.log());
   *nominal = test::rig_of(o);
-  RigSolveRequest request;
-  request.rig = *nominal;
-  request.from_rig = true;
+  RigSolveRequest request{.rig = *nominal, .from_rig = true};
   return s.solver.solve(request);
 }
 
@@ -122,9 +118,7 @@ TEST(GateRigChanged, rotationDuringTheFramesIsDated) {
     ASSERT_EQ(s.status, RigSolveStatus::ok);
     EXPECT_GE(s.changed_at, 20U) << axis.transpose();
     EXPECT_LE(s.changed_at, 40U) << axis.transpose();
-    AcceptanceInput q;
-    q.solution = &s;
-    q.nominal = &nominal;
+    AcceptanceInput q{.solution = &s, .nominal = &nominal};
     EXPECT_EQ(check_acceptance(q, {}), Gate::rig_changed) << axis.transpose();
   }
 }
@@ -135,9 +129,7 @@ TEST(GateRigChanged, unchangedRigHasNoChange) {
     const RigSolution s = solve_with({}, seed, &nominal);
     ASSERT_EQ(s.status, RigSolveStatus::ok);
     EXPECT_EQ(s.changed_at, 0U) << seed;
-    AcceptanceInput q;
-    q.solution = &s;
-    q.nominal = &nominal;
+    AcceptanceInput q{.solution = &s, .nominal = &nominal};
     EXPECT_NE(check_acceptance(q, {}), Gate::rig_changed) << seed;
   }
 }

@@ -13,8 +13,7 @@ namespace {
 constexpr double kBaseline = 0.75, kFocal = 1247;
 
 RigCalibration rig_with(double baseline, double focal, int width, int height) {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = rig.intrinsics[k];
     c.width = width, c.height = height, c.fx = c.fy = focal, c.cx = 0.5 * (width - 1),

@@ -37,11 +37,10 @@ class Street {
     move();
     for (const Point& p : points_) {
       const Vec3 r = T_right_left * p.at;
-      StereoObservation s;
-      s.left = pixel(p.at, noise);
-      s.right = pixel(r, noise);
-      s.sigma_px = kNoise;
-      s.track = p.track;
+      StereoObservation s{.left = pixel(p.at, noise),
+                          .right = pixel(r, noise),
+                          .sigma_px = kNoise,
+                          .track = p.track};
       seen.push_back(s);
     }
     return detector_.next(frame_++, seen, step_);

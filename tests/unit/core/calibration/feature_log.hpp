@@ -20,8 +20,7 @@ namespace vergence::test {
 [[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive,
                                            const std::array<Pinhole, 2>& lenses,
                                            const std::array<double, 4>& sigma) {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = rig.intrinsics[k];
     c.width = drive.width, c.height = drive.height;
@@ -92,10 +91,8 @@ inline double log_drive(FeatureDrive& drive, int frames, const LogStart& start,
     f.stereo = static_cast<int>(drive.tracks().size());
     log.begin(f);
     for (const FeatureTrack& t : drive.tracks()) {
-      calibration::LoggedObservation s;
-      s.track = t.id;
-      s.cameras = t.seen;
-      s.sigma = static_cast<float>(t.sigma_px);
+      calibration::LoggedObservation s{
+          .track = t.id, .cameras = t.seen, .sigma = static_cast<float>(t.sigma_px)};
       s.raw[0] = t.left.cast<float>();
       s.raw[right] = t.right.cast<float>();
       if (further != nullptr) {

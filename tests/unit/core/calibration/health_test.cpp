@@ -11,8 +11,7 @@ namespace {
 
 /// Two cameras side by side that see little more than what is straight ahead: x/z within ±0.05.
 RigCalibration narrow_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = rig.intrinsics[k];
     c.width = 700, c.height = 500, c.fx = c.fy = 7000, c.cx = 349.5, c.cy = 249.5;

@@ -33,10 +33,7 @@ class Blocks {
     const Mat5 L = factor.matrixL();
     const Vec5 g =
         L * (std::sqrt(kLambda) * noise + std::sqrt(kObservations / 5) * rms_px * offset);
-    Evidence e;
-    e.g = g;
-    e.A = A_;
-    e.n = kObservations;
+    Evidence e{.g = g, .A = A_, .n = kObservations};
     return e;
   }
   /// `count` blocks one after the other, each against those before it.

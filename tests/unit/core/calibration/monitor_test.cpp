@@ -219,8 +219,7 @@ TEST(Monitor, invalidReferenceOrOptionsAreRefused) {
   EXPECT_FALSE(trial.monitor().set_reference(Transform{}, k, k, Mat6::Zero()));
   EXPECT_EQ(trial.step().kind, Kind::quiet);
   Arena arena(calibration::Monitor::memory_needed({}));
-  MonitorOptions bad;
-  bad.threshold = std::numeric_limits<double>::quiet_NaN();
+  MonitorOptions bad{.threshold = std::numeric_limits<double>::quiet_NaN()};
   EXPECT_THROW(calibration::Monitor(bad, arena), std::invalid_argument);
   EXPECT_NO_THROW(calibration::Monitor(MonitorOptions{}, arena));
 }

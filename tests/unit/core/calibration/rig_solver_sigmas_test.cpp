@@ -16,8 +16,7 @@ using calibration::RigSolveStatus;
 constexpr int kDrives = 50, kFrames = 150;  // 5 s at 30 Hz
 
 CalibrationOptions held() {
-  CalibrationOptions o;
-  o.intrinsics = calibration::IntrinsicsEstimation::fixed;
+  CalibrationOptions o{.intrinsics = calibration::IntrinsicsEstimation::fixed};
   // Nor are lengths off by what lenses usually are.
   o.focal_sigma_percent = o.principal_point_sigma_px = 0;
   return o;

@@ -16,10 +16,7 @@ constexpr LogStart kRough{2e-3, 0.02, 5e-3,
                           0.02};  // what cameras posed each for itself are off, and more
 
 CalibrationOptions held() {
-  CalibrationOptions o;
-  o.max_frames = 60;
-  o.intrinsics = calibration::IntrinsicsEstimation::fixed;
-  return o;
+  return {.max_frames = 60, .intrinsics = calibration::IntrinsicsEstimation::fixed};
 }
 
 /// 40 frames from the same rough start.

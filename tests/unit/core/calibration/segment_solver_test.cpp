@@ -36,9 +36,9 @@ struct Driven {
   std::vector<RigSolution> solved;
 
   static CalibrationOptions small(double extrinsic_random_walk_mrad_per_sqrt_h) {
-    CalibrationOptions o;
-    o.max_frames = static_cast<int>(kStretch);
-    o.extrinsic_random_walk_mrad_per_sqrt_h = extrinsic_random_walk_mrad_per_sqrt_h;
+    CalibrationOptions o{
+        .max_frames = static_cast<int>(kStretch),
+        .extrinsic_random_walk_mrad_per_sqrt_h = extrinsic_random_walk_mrad_per_sqrt_h};
     return o;
   }
   Driven(const FeatureDriveOptions& o, SegmentSolver::Kind kind, const RigCalibration& given,

@@ -23,9 +23,7 @@ struct Log {
     f.stereo = 7;
     log.begin(f);
     for (std::uint32_t i = 0; i < observations; ++i) {
-      LoggedObservation s;
-      s.track = static_cast<std::uint32_t>(100 * number) + i;
-      s.cameras = 0b11;
+      LoggedObservation s{.track = static_cast<std::uint32_t>(100 * number) + i, .cameras = 0b11};
       log.push(s);
     }
   }

@@ -22,15 +22,14 @@ struct Model {
 
 Intrinsics intrinsics(CameraModelKind kind, int width, int height, const std::array<double, 4>& k,
                       const std::array<double, 5>& d) {
-  Intrinsics i;
-  i.kind = kind;
-  i.width = width;
-  i.height = height;
-  i.fx = k[0];
-  i.fy = k[1];
-  i.cx = k[2];
-  i.cy = k[3];
-  i.distortion = d;
+  Intrinsics i{.kind = kind,
+               .width = width,
+               .height = height,
+               .fx = k[0],
+               .fy = k[1],
+               .cx = k[2],
+               .cy = k[3],
+               .distortion = d};
   return i;
 }
 

@@ -38,17 +38,12 @@ struct Bench {
       : options(o), arena(Comparison::bytes_needed(o)), comparison(o, arena) {}
 
   static ComparisonOptions with_mount() {
-    ComparisonOptions o;
-    o.T_ins_left = mount_of({1.2, 0.4, -0.3}, {1 * kDegree, -2 * kDegree, 3 * kDegree});
-    return o;
+    return {.T_ins_left = mount_of({1.2, 0.4, -0.3}, {1 * kDegree, -2 * kDegree, 3 * kDegree})};
   }
   [[nodiscard]] Transform T_enu_left(double t) const { return T_enu_ins(t) * options.T_ins_left; }
 
   [[nodiscard]] InsSample sample(double t, const Vec3& shift = Vec3::Zero()) const {
-    InsSample s;
-    s.stamp = at(t);
-    s.fix = FixStatus::fix_3d;
-    s.attitude_valid = true;
+    InsSample s{.stamp = at(t), .fix = FixStatus::fix_3d, .attitude_valid = true};
     const Transform T = T_enu_ins(t);
     s.position = plane.to_geodetic(T.t + shift);
     const Eigen::Quaterniond q = quaternion(plane.rotation_from(s.position).transpose() * T.R);
@@ -59,10 +54,9 @@ struct Bench {
   }
   /// The odometry without any error: world is the left camera at t = 0.
   [[nodiscard]] PoseSample pose(double t, double scale = 1.0) const {
-    PoseSample p;
-    p.stamp = at(t);
-    p.status = PoseStatus::ok;
-    p.T_world_left = T_enu_left(0).inverse() * T_enu_left(t);
+    PoseSample p{.stamp = at(t),
+                 .status = PoseStatus::ok,
+                 .T_world_left = T_enu_left(0).inverse() * T_enu_left(t)};
     p.T_world_left.t *= scale;
     return p;
   }

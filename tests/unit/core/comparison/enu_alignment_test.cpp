@@ -21,9 +21,8 @@ std::vector<EnuAlignmentPair> drive(double length, double bend, int count,
   std::vector<EnuAlignmentPair> pairs;
   for (int i = 0; i < count; ++i) {
     const double s = length * i / (count - 1);
-    EnuAlignmentPair p;
-    p.stamp = Stamp{} + Duration::seconds(s / 10.0);
-    p.p_world_left = {bend * s * s / length, -0.01 * s, s};
+    EnuAlignmentPair p{.stamp = Stamp{} + Duration::seconds(s / 10.0),
+                       .p_world_left = {bend * s * s / length, -0.01 * s, s}};
     p.p_enu_left = truth() * p.p_world_left;
     p.R_enu_world = truth().R;
     p.position_sigma = sigma[0];
@@ -143,8 +142,7 @@ TEST(FitEnuAlignment, residualsBeyondTheSigmasWidenTheResult) {
 }
 
 TEST(FitEnuAlignment, insufficientPairsGiveTheirStatus) {
-  EnuAlignment alignment;
-  alignment.revision = 7;
+  EnuAlignment alignment{.revision = 7};
   EXPECT_EQ(fit_enu_alignment(drive(100, 0.3, 2), kCorrelation, &alignment),
             EnuAlignmentStatus::too_few);
   EXPECT_EQ(fit_enu_alignment(drive(0.5, 0.0, 50), kCorrelation, &alignment),

@@ -40,13 +40,10 @@ struct How {
 /// The left camera as an odometry would have it (in its own world, drifting a little), and the
 /// mock's INS.
 Drove drove(const How& how) {
-  mock::DriveOptions options;
-  options.kind = how.kind;
-  options.seed = how.seed;
+  mock::DriveOptions options{.kind = how.kind, .seed = how.seed};
   const Transform T_body_left = mock::default_T_body_left();
   const Transform T_body_ins = T_body_left * mount_of(kLever, kBoresight).inverse();
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   const mock::RigTruth truth(test::empty_town(), options, rig, T_body_left, T_body_ins, {});
   const double length = truth.drive().duration().to_seconds();
   Drove d;
@@ -73,8 +70,7 @@ Drove drove(const How& how) {
     const double t = even + how.jitter_s * jitter.uniform(-1, 1);
     const InsSample s = ins.sample(number++, Duration::seconds(t));
     const Mat3 R_enu_local = plane.rotation_from(s.position);
-    MountReference r;
-    r.stamp = kStart + Duration::seconds(t + how.late_s);
+    MountReference r{.stamp = kStart + Duration::seconds(t + how.late_s)};
     r.T_enu_ref.R = R_enu_local * Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1],
                                                      s.q_enu_ins[2])
                                       .toRotationMatrix();
@@ -93,10 +89,7 @@ Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().tra
 
 TEST(Mount, idealReferenceGivesTheExtrinsics) {
   for (const bool velocity : {true, false}) {
-    How how;
-    how.ideal = true;
-    how.velocity = velocity;
-    how.late_s = 0.012;
+    How how{.ideal = true, .velocity = velocity, .late_s = 0.012};
     const Drove d = drove(how);
     Mount m;
     ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
@@ -119,11 +112,7 @@ TEST(Mount, slowReferenceGivesTheExtrinsics) {
   for (const Slow slow : {Slow{0.5, 0}, Slow{1, 0}, Slow{1.33, 0.01}, Slow{2, 0}, Slow{2, 0.005},
                           Slow{2.5, 0}, Slow{2.67, 0.005}, Slow{3, 0.005}}) {
     SCOPED_TRACE(testing::Message() << slow.rate << " Hz, jitter " << slow.jitter_s);
-    How how;
-    how.ideal = true;
-    how.late_s = 0.012;
-    how.rate = slow.rate;
-    how.jitter_s = slow.jitter_s;
+    How how{.ideal = true, .late_s = 0.012, .rate = slow.rate, .jitter_s = slow.jitter_s};
     const Drove d = drove(how);
     Mount m;
     ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
@@ -146,11 +135,10 @@ void sigmas_hold(bool velocity) {
   std::array<std::vector<double>, 7> ratios, sigmas;
   int heights = 0;
   for (int seed = 1; seed <= kDrives; ++seed) {
-    How how;
-    how.kind = seed % 2 == 0 ? mock::DriveKind::loop : mock::DriveKind::figure_eight;
-    how.seed = static_cast<std::uint64_t>(seed);
-    how.velocity = velocity;
-    how.late_s = 0.02;
+    How how{.kind = seed % 2 == 0 ? mock::DriveKind::loop : mock::DriveKind::figure_eight,
+            .seed = static_cast<std::uint64_t>(seed),
+            .velocity = velocity,
+            .late_s = 0.02};
     const Drove d = drove(how);
     Mount m;
     ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok)
@@ -195,9 +183,7 @@ TEST(Mount, sigmasMatchErrorsWithVelocity) { sigmas_hold(true); }
 TEST(Mount, sigmasMatchErrorsByPositionAlone) { sigmas_hold(false); }
 
 TEST(Mount, leverArmIsUnobservableOnAStraight) {
-  How how;
-  how.kind = mock::DriveKind::straight;
-  how.velocity = false;
+  How how{.kind = mock::DriveKind::straight, .velocity = false};
   const Drove d = drove(how);
   Mount m;
   ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
@@ -219,12 +205,8 @@ void reverse(std::vector<MountReference>* reference) {
 TEST(Mount, unrelatedTrajectoriesDoNotConverge) {
   for (const mock::DriveKind kind : {mock::DriveKind::loop, mock::DriveKind::figure_eight})
     for (const bool velocity : {true, false}) {
-      How how;
-      how.kind = kind;
-      how.velocity = velocity;
-      how.late_s = 1;
-      Mount m;
-      m.moments = 77;
+      How how{.kind = kind, .velocity = velocity, .late_s = 1};
+      Mount m{.moments = 77};
       Drove d = drove(how);
       EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
                 MountStatus::not_converged)
@@ -248,9 +230,7 @@ TEST(Mount, unrelatedTrajectoriesDoNotConverge) {
 /// The residuals of 15 degrees that a fit may have at most: half their square is the two degrees
 /// that count as seen.
 TEST(Mount, swayingAttitudeDoesNotConverge) {
-  How how;
-  how.ideal = true;
-  how.velocity = false;
+  How how{.ideal = true, .velocity = false};
   const auto swaying = [&](double degrees) {
     Drove d = drove(how);
     for (MountReference& r : d.reference) {
@@ -269,8 +249,7 @@ TEST(Mount, insufficientDataGivesStatusAndKeepsResult) {
   How still;
   still.kind = mock::DriveKind::still;
   Drove d = drove(still);
-  Mount m;
-  m.moments = 77;
+  Mount m{.moments = 77};
   EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
             MountStatus::no_motion);
   d.estimate.resize(10);
@@ -283,8 +262,7 @@ TEST(Mount, insufficientDataGivesStatusAndKeepsResult) {
             MountStatus::too_few)
       << "no time in common";
   // Three readings a second apart, and none for a dozen seconds: eighteen follow on another.
-  How slow;
-  slow.rate = 1;
+  How slow{.rate = 1};
   d = drove(slow);
   std::vector<MountReference> apart;
   for (std::size_t i = 0; i < d.reference.size(); ++i)

@@ -78,8 +78,7 @@ TEST(Associate, nearestMatchesUpToTheLimitInclusive) {
   const std::vector<StampedPose> reference{pose(1.0, {1, 0, 0}), pose(1.1, {2, 0, 0})};
   const std::vector<StampedPose> estimate{pose(0.994), pose(0.995), pose(1.004), pose(1.05),
                                           pose(1.097), pose(1.105), pose(1.106)};
-  EvaluationOptions options;
-  options.association = Association::nearest;
+  EvaluationOptions options{.association = Association::nearest};
   const MatchedTrajectories m = associate(estimate, reference, options);
   ASSERT_EQ(m.reference.size(), 4U);
   const double expected[] = {1, 1, 2, 2};
@@ -188,8 +187,7 @@ TEST(Evaluate, headingErrorWrapsToTheShorterArc) {
     estimate.push_back(pose(0.1 * i, {1.0 * i, std::sin(i), 0},
                             {0, 0, i == 0 ? 0.0 : yaw + 0.1}));  // 3.2 is −3.08
   }
-  EvaluationOptions options;
-  options.axes = BodyAxes::forward_left_up;
+  EvaluationOptions options{.axes = BodyAxes::forward_left_up};
   EXPECT_NEAR(evaluate(estimate, reference, options).heading_start_aligned.last, 0.1, kRounding);
 }
 
@@ -250,8 +248,7 @@ TEST(Evaluate, shortPathHasNoSegmentErrorInsteadOfZero) {
 
 TEST(Evaluate, scaledSegmentsRemoveTheSim3Scale) {
   const std::vector<StampedPose> reference = helix(300);
-  EvaluationOptions options;
-  options.segments = {{{10, 20}, 1, false}, {{10, 20}, 1, true}};
+  EvaluationOptions options{.segments = {{{10, 20}, 1, false}, {{10, 20}, 1, true}}};
   const TrajectoryEvaluation e = evaluate(moved({}, 1.03, reference), reference, options);
   EXPECT_GT(e.segments[0].translation, 0.02);
   EXPECT_LT(e.segments[1].translation, 1e-10);

@@ -22,9 +22,7 @@ constexpr int kWidth = 320, kHeight = 240;
 constexpr double kDisparity = 12.0;  // px
 
 RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
-  r.baseline = 0.5;
+  RigCalibration r{.cameras = 2, .baseline = 0.5};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = r.intrinsics[k];
     c.width = kWidth;
@@ -38,11 +36,7 @@ RigCalibration rig() {
 }
 
 /// The calibration is taken as it is: a rig that stands could never confirm it.
-EstimatorOptions believing() {
-  EstimatorOptions o;
-  o.online = false;
-  return o;
-}
+EstimatorOptions believing() { return {.online = false}; }
 
 /// A rig that stands before a wall 12 px of disparity away. Every frame has noise of its own, as a
 /// sensor's would.
@@ -69,10 +63,9 @@ struct Standing {
     }
   }
   [[nodiscard]] RigFrame frame(int i) const {
-    RigFrame f;
-    f.number = static_cast<std::uint64_t>(i);
-    f.stamp = Stamp(1'000'000'000 + 50'000'000LL * i);
-    f.cameras = 2;
+    RigFrame f{.number = static_cast<std::uint64_t>(i),
+               .stamp = Stamp(1'000'000'000 + 50'000'000LL * i),
+               .cameras = 2};
     f.images[0] = left[static_cast<std::size_t>(i % kImages)].view();
     f.images[1] = right[static_cast<std::size_t>(i % kImages)].view();
     return f;

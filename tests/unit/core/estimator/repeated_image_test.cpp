@@ -21,8 +21,7 @@ class RepeatedImage : public testing::TestWithParam<std::size_t> {};
 TEST_P(RepeatedImage, repeatedImageIsNotTakenForStandstill) {
   constexpr int kFrozen = 30, kGoesOn = 47, kLast = 60;
   Corridor corridor;
-  EstimatorOptions options;
-  options.online = false;
+  EstimatorOptions options{.online = false};
   Arena arena(Estimator::memory_needed(options, corridor.rig()));
   SequentialRunner runner;
   ImmediateRunner solver;

@@ -154,8 +154,7 @@ Moved match_moved(const Vec2& shift, double degrees, double larger, bool upright
     const auto again = [&](const Vec2& p) {
       return brightness(middle + turn.transpose() * (p - middle - shift) / larger);
     };
-    SurfOptions options;
-    options.min_response = 1;
+    SurfOptions options{.min_response = 1};
     const Described left(draw(kWhole, kWhole, brightness), 600, options, upright),
         right(draw(kWhole, kWhole, again), 600, options, upright);
     Arena arena(SurfMatcher::memory_needed(600) + 600 * sizeof(SurfMatch) + kCacheLine);

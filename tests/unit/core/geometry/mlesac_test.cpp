@@ -68,8 +68,7 @@ TEST_F(RigMlesacTest, pointsSeenByOneCameraGiveThePose) {
 TEST_F(RigMlesacTest, goodPriorEndsEarlyAndBadOneDoesNoHarm) {
   Random random(10);
   const RigScene scene = make_scene(random, 2, 300, 0.1, 0.3, 0.3, 0.6, &table_);
-  MlesacOptions options;
-  options.max_hypotheses = 1000;
+  MlesacOptions options{.max_hypotheses = 1000};
   const MlesacPose good = mlesac_.solve(table_.view(), options, &scene.T_left_world, random);
   EXPECT_TRUE(good.found);
   EXPECT_LE(good.samples, 12);  // w ≥ 0.88 → ln 1e-3 / ln(1 − w³) ≤ 6, min_hypotheses 8
@@ -118,8 +117,7 @@ TEST_F(RigMlesacTest, invalidInputHasNoPose) {
   o = table_.view();
   o.cameras = kMaxCameras + 1;
   EXPECT_FALSE(mlesac_.solve(o, {}, nullptr, random).found);
-  MlesacOptions options;
-  options.confidence = 1.0;
+  MlesacOptions options{.confidence = 1.0};
   EXPECT_FALSE(mlesac_.solve(table_.view(), options, nullptr, random).found);
 
   Arena small_arena(RigMlesac::memory_needed(20));

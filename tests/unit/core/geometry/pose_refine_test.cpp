@@ -110,8 +110,7 @@ TEST_F(PoseRefinerTest, nearOutliersDoNotMoveThePose) {
     EXPECT_NEAR(found.scale, without.scale, 0.01);  // as it is after two steps from two starts
     EXPECT_EQ(found.observations, 306);
 
-    PoseRefineOptions one_round;
-    one_round.gross_chi2 = std::numeric_limits<double>::infinity();
+    PoseRefineOptions one_round{.gross_chi2 = std::numeric_limits<double>::infinity()};
     const RefinedPose pulled = refiner_.refine(table_.view(), Transform{}, {}, one_round);
     EXPECT_GT((pulled.T_left_world.centre() - without.T_left_world.centre()).norm(),
               2.5 * without.translation_sigma)
@@ -179,8 +178,7 @@ TEST_F(PoseRefinerTest, invalidInputHasNoPose) {
   EXPECT_FALSE(refiner_.refine(table_.view(), bad, {}, {}).usable);
   const std::vector<std::uint8_t> use(3, 1);
   EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, use, {}).usable);
-  PoseRefineOptions options;
-  options.huber = 0;
+  PoseRefineOptions options{.huber = 0};
   EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, options).usable);
   options = {};
   options.gross_chi2 = 0;

@@ -47,10 +47,9 @@ class Corridor {
   /// Frame i of a drive of its own: seen from where frame `place` of the usual one is.
   [[nodiscard]] RigFrame frame_at(int i, double place,
                                   const std::array<Transform, kMaxCameras>& T_camera_left) {
-    RigFrame f;
-    f.number = static_cast<std::uint64_t>(i);
-    f.stamp = Stamp(1'000'000'000 + 50'000'000LL * i);
-    f.cameras = rig_.cameras;
+    RigFrame f{.number = static_cast<std::uint64_t>(i),
+               .stamp = Stamp(1'000'000'000 + 50'000'000LL * i),
+               .cameras = rig_.cameras};
     for (std::size_t k = 0; k < images_.size(); ++k) {
       Random noise(static_cast<std::uint64_t>(4 * i) + k);
       const Transform T_left_camera = T_camera_left[k].inverse();

@@ -10,8 +10,7 @@ namespace {
 constexpr int kWidth = 320, kHeight = 240;
 
 RigCalibration blank_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     rig.intrinsics[k].width = kWidth;
     rig.intrinsics[k].height = kHeight;
@@ -26,10 +25,7 @@ RigCalibration blank_rig() {
 class FreeMatches : public ::testing::TestWithParam<int> {
  protected:
   [[nodiscard]] static OdometryOptions options() {
-    OdometryOptions o;
-    o.features = 300;
-    o.init_features = GetParam();
-    return o;
+    return {.features = 300, .init_features = GetParam()};
   }
 };
 
@@ -46,8 +42,7 @@ TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
                               right = features::test::draw(
                                   kWidth, kHeight,
                                   [&](const Vec2&p) { return brightness(p - shift); }, 64);
-  RigFrame frame;
-  frame.cameras = 2;
+  RigFrame frame{.cameras = 2};
   frame.images[0] = left.view();
   frame.images[1] = right.view();
   const std::uint64_t before = AllocationGuard::runtime_allocations();
@@ -75,8 +70,7 @@ TEST_P(FreeMatches, missingOrFlatImageHasNoMatch) {
   EXPECT_TRUE(front.match_free(1).empty());
   const features::test::Image flat(kWidth, kHeight, 64),
       noise = features::test::white_noise(kWidth, kHeight, 1, 64);
-  RigFrame frame;
-  frame.cameras = 2;
+  RigFrame frame{.cameras = 2};
   frame.images[0] = noise.view();
   (void)front.begin(frame);
   EXPECT_TRUE(front.match_free(1).empty());

@@ -11,14 +11,13 @@ namespace vergence::odometry {
 namespace {
 
 Intrinsics wide_lens(CameraModelKind kind) {
-  Intrinsics k;
-  k.kind = kind;
-  k.width = 752;
-  k.height = 480;
-  k.fx = 458.6;
-  k.fy = 457.3;
-  k.cx = 367.2;
-  k.cy = 248.4;
+  Intrinsics k{.kind = kind,
+               .width = 752,
+               .height = 480,
+               .fx = 458.6,
+               .fy = 457.3,
+               .cx = 367.2,
+               .cy = 248.4};
   if (kind == CameraModelKind::pinhole_radtan)
     k.distortion = {-0.28, 0.074, 0.0002, 0.00002, 0};
   else

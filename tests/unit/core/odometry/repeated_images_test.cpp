@@ -33,8 +33,7 @@ struct Pair {
     return FrontEnd::memory_needed(*options, *rig);
   }
   [[nodiscard]] ImageCheck give(const Image& left, const Image& right) {
-    RigFrame frame;
-    frame.cameras = 2;
+    RigFrame frame{.cameras = 2};
     frame.images[0] = left.view();
     frame.images[1] = right.view();
     return front_end.begin(frame);

@@ -13,9 +13,7 @@ namespace vergence::odometry {
 namespace {
 
 RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
-  r.baseline = 0.5;
+  RigCalibration r{.cameras = 2, .baseline = 0.5};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = r.intrinsics[k];
     c.width = 640;
@@ -28,12 +26,7 @@ RigCalibration rig() {
   return r;
 }
 
-OdometryOptions many_steps() {
-  OdometryOptions o;
-  o.window_keyframes = 6;
-  o.window_steps = 30;
-  return o;
-}
+OdometryOptions many_steps() { return {.window_keyframes = 6, .window_steps = 30}; }
 
 /// Six keyframes along a bend before a cloud of points, each seen wherever it falls into an image;
 /// exact but for the rounding to floats, 3e-5 px.

@@ -41,16 +41,12 @@ struct BenchOptions {
 /// A mock rig with tiny pictures in an almost empty town, and the source on top of it.
 struct Bench {
   explicit Bench(const std::vector<std::string>& faults, const BenchOptions& b = {}) {
-    mock::MockRigOptions o;
-    o.duration = Duration::seconds(b.seconds);
-    o.reports_read = true;
+    mock::MockRigOptions o{.duration = Duration::seconds(b.seconds), .reports_read = true};
     rig = std::make_unique<mock::MockRig>(test::small_truth(faults), o);
     for (int k = 0; k < 2; ++k)
       EXPECT_EQ(rig->camera(k).configure(test::small_camera(), nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
-    TriggerConfiguration pulses;
-    pulses.rate_hz = 20;
-    pulses.vary = b.vary;
+    TriggerConfiguration pulses{.rate_hz = 20, .vary = b.vary};
     EXPECT_EQ(rig->trigger().configure(pulses, nullptr), DeviceStatus::ok);
     Acquisition::Options options;
     options.sync.interval = Duration::milliseconds(50);
@@ -189,9 +185,7 @@ TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
 }
 
 TEST(Acquisition, cameraSilentDuringPulsesIsRestarted) {
-  BenchOptions o;
-  o.mode = SyncMode::board;
-  o.seconds = 18;
+  BenchOptions o{.mode = SyncMode::board, .seconds = 18};
   Bench b({}, o);
   b.watched[1]->hangs_from = b.rig->start() + Duration::seconds(4);
   const std::vector<Acquired> items = b.drive();

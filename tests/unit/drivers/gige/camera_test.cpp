@@ -16,8 +16,7 @@ float real(std::uint32_t word) { return std::bit_cast<float>(word); }
 
 TEST(GigeCamera, isConfiguredByOldAndNewFeatureNames) {
   for (const bool old_names : {false, true}) {
-    GigeCameraOptions o;
-    o.old_names = old_names;
+    GigeCameraOptions o{.old_names = old_names};
     GigeBench b(o);
     CameraConfiguration c = b.wish();
     c.width = 160;
@@ -123,8 +122,7 @@ TEST(GigeCamera, everyPulseIsOneFrameAndRestIsNoError) {
 
 TEST(GigeCamera, stampsAreExposureStartsInNanoseconds) {
   for (const bool end : {false, true}) {
-    GigeCameraOptions o;
-    o.tick_frequency = end ? 125'000'000 : 62'500'000;
+    GigeCameraOptions o{.tick_frequency = end ? 125'000'000 : 62'500'000};
     const std::int64_t tick_ns = end ? 8 : 16;
     GigeBench b(o);
     CameraConfiguration c = b.wish();
@@ -154,8 +152,7 @@ TEST(GigeCamera, chunkModeIsSwitchedOff) {
 }
 
 TEST(GigeCamera, cameraWithoutClockIsStampedByArrival) {
-  GigeCameraOptions o;
-  o.tick_frequency = 0;
+  GigeCameraOptions o{.tick_frequency = 0};
   GigeBench b(o);
   b.configure(b.wish());
   EXPECT_NE(b.camera->remark().find("no clock"), std::string::npos) << b.camera->remark();
@@ -173,8 +170,7 @@ TEST(GigeCamera, ptpIsEnabledAndItsStateReported) {
   EXPECT_EQ(b.camera->remark().find("PTP"), std::string::npos)
       << "it is a slave: " << b.camera->remark();
   EXPECT_EQ(b.camera->timing().resolution, Duration::nanoseconds(1));
-  GigeCameraOptions old;
-  old.old_names = true;
+  GigeCameraOptions old{.old_names = true};
   GigeBench without(old, 1);
   EXPECT_EQ(without.camera->configure(c, nullptr), DeviceStatus::unsupported);
   EXPECT_NE(without.camera->last_error().find("PTP"), std::string::npos);

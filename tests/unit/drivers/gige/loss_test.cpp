@@ -46,8 +46,7 @@ TEST(GigeLoss, damagedFramesAreIncompleteOthersWhole) {
 
 TEST(GigeLoss, everyRandomPacketLossIsCounted) {
   for (const std::uint64_t seed : {1, 2}) {
-    GigeCameraOptions o;
-    o.seed = seed;
+    GigeCameraOptions o{.seed = seed};
     GigeBench b(o);
     b.configure(many_packets(b, "off"));
     b.start();

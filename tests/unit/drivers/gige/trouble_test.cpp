@@ -33,9 +33,8 @@ DeviceStatus start_again(GigeBench* b, double limit_s) {
 }
 
 TEST(GigeTrouble, camerasAreDiscoveredAndOpenedBySerial) {
-  GigeCameraOptions o;
-  o.address = GigeCamera::address(200);
-  o.serial = "FIND-" + std::to_string(::getpid() % 100'000);
+  GigeCameraOptions o{.address = GigeCamera::address(200),
+                      .serial = "FIND-" + std::to_string(::getpid() % 100'000)};
   const GigeCamera simulator(o);
   const auto driver = gige::make_driver();
   bool found = false;
@@ -54,8 +53,7 @@ TEST(GigeTrouble, camerasAreDiscoveredAndOpenedBySerial) {
 }
 
 TEST(GigeTrouble, cameraOfAnotherProgramIsBusy) {
-  GigeCameraOptions o;
-  o.address = GigeCamera::address(201);
+  GigeCameraOptions o{.address = GigeCamera::address(201)};
   GigeCamera simulator(o);
   simulator.take_control(true);
   const auto driver = gige::make_driver();

@@ -9,9 +9,7 @@ namespace {
 
 MockBench drive_with(const std::vector<std::string>& faults, double seconds = 3,
                      bool ideal = false) {
-  MockRigOptions o;
-  o.duration = Duration::seconds(seconds);
-  o.ideal_ins = ideal;
+  MockRigOptions o{.ideal_ins = ideal, .duration = Duration::seconds(seconds)};
   MockBench b(faults, o);
   b.drive();
   return b;

@@ -152,8 +152,7 @@ TEST(ClockBounds, changingDriftIsFollowed) {
 TEST(ClockBounds, tenYearsStayExactToTheNanosecond) {
   constexpr std::int64_t kTenYears = 315'576'000'000'000'000;
   for (const std::int64_t offset : {kTenYears, -kTenYears}) {
-    ClockMapperOptions o;
-    o.resolution = Duration::nanoseconds(1);
+    ClockMapperOptions o{.resolution = Duration::nanoseconds(1)};
     ClockMapper one(o), two(o);
     // No jitter, no drift: what is off is arithmetic. A minute of a stamp a second, then one every
     // 20 days or in the next second.

@@ -45,9 +45,8 @@ TEST(RigModes, syncOutIsVerifiedByAnInitialPause) {
       pulses.restart();
     }
     const bool pulsed = sample % 4 == 0;
-    InsReading r;
-    r.measured = DeviceStamp(t.ns() + 123'456'789);
-    r.arrival = t + Duration::milliseconds(4);
+    InsReading r{.measured = DeviceStamp(t.ns() + 123'456'789),
+                 .arrival = t + Duration::milliseconds(4)};
     r.quality.sync_out = pulsed;
     if (sample % 97 != 0 || sample < 8) {  // some readings are lost
       if (const auto p = pulses.reading(r, {t, Duration::microseconds(200)})) {
@@ -170,14 +169,12 @@ TEST(RigModes, masterRestartVerifiesItsSlaves) {
 // ---- what all with pulses share ----
 
 Pulse pulse_at(std::uint64_t number, HostStamp at) {
-  Pulse p;
-  p.number = number;
-  p.edge = DeviceStamp(at.ns() - 70'000'000'000);
-  p.arrival = at + Duration::milliseconds(2);
-  p.mapped = true;
-  p.host = at;
-  p.host_error = Duration::microseconds(15);
-  return p;
+  return {.number = number,
+          .edge = DeviceStamp(at.ns() - 70'000'000'000),
+          .arrival = at + Duration::milliseconds(2),
+          .mapped = true,
+          .host = at,
+          .host_error = Duration::microseconds(15)};
 }
 
 /// Varied by a millisecond, as the board does it.

@@ -16,11 +16,7 @@ namespace {
 constexpr Duration kInterval = Duration::milliseconds(50);
 
 SyncOptions options(int cameras = 2) {
-  SyncOptions o;
-  o.cameras = cameras;
-  o.interval = kInterval;
-  o.hold = kInterval * 2;
-  return o;
+  return {.cameras = cameras, .interval = kInterval, .hold = kInterval * 2};
 }
 
 HostStamp middle_of(std::uint64_t pulse) {
@@ -28,13 +24,12 @@ HostStamp middle_of(std::uint64_t pulse) {
 }
 
 SyncFrame frame(int camera, std::uint64_t counter, std::uint64_t pulse, FrameSlot slot = 0) {
-  SyncFrame f;
-  f.camera = camera;
-  f.slot = slot;
-  f.counter = counter;
-  f.middle = {middle_of(pulse) + Duration::microseconds(30 * camera), Duration::microseconds(100)};
-  f.arrival = middle_of(pulse) + Duration::milliseconds(10 + camera);
-  return f;
+  return {.camera = camera,
+          .slot = slot,
+          .counter = counter,
+          .middle = {middle_of(pulse) + Duration::microseconds(30 * camera),
+                     Duration::microseconds(100)},
+          .arrival = middle_of(pulse) + Duration::milliseconds(10 + camera)};
 }
 
 std::vector<SyncedSet> drain(RigSynchronizer* sync) {

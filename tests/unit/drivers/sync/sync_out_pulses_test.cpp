@@ -29,8 +29,7 @@ struct Account {
 };
 
 std::optional<Pulse> read(SyncOutPulses* pulses, std::int64_t sample) {
-  InsReading r;
-  r.measured = DeviceStamp(sample);
+  InsReading r{.measured = DeviceStamp(sample)};
   r.quality.sync_out = true;
   return pulses->reading(r, {HostStamp(sample + kOffset), Duration::microseconds(9)});
 }

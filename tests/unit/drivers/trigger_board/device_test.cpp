@@ -201,8 +201,7 @@ TEST(Board, stoppedBoardIsStartedAgain) {
 }
 
 TEST(Board, otherBoardOnThePortIsRefused) {
-  test::SimulatedLineOptions line;
-  line.outages = {{at_s(10), at_s(11)}, {at_s(20), at_s(21)}};
+  test::SimulatedLineOptions line{.outages = {{at_s(10), at_s(11)}, {at_s(20), at_s(21)}}};
   BoardRig rig(board_for(Duration::seconds(60)), line, {},
                [&](HostStamp at, std::vector<std::uint8_t>* bytes) {
                  TriggerFrame f = opened(*bytes);

@@ -29,21 +29,11 @@ namespace vergence::test {
 }
 
 /// A line without a converter: the board's own USB, or a UART of the host.
-[[nodiscard]] inline SimulatedLineOptions direct_line() {
-  SimulatedLineOptions o;
-  o.converter = false;
-  return o;
-}
+[[nodiscard]] inline SimulatedLineOptions direct_line() { return {.converter = false}; }
 [[nodiscard]] inline BoardSimulatorOptions board_for(Duration duration) {
-  BoardSimulatorOptions o;
-  o.duration = duration;
-  return o;
+  return {.duration = duration};
 }
-[[nodiscard]] inline TriggerConfiguration thirty_hertz() {
-  TriggerConfiguration c;
-  c.rate_hz = 30;
-  return c;
-}
+[[nodiscard]] inline TriggerConfiguration thirty_hertz() { return {.rate_hz = 30}; }
 
 /// A driver's device on a simulated line to a simulated board, and what the board really did.
 struct BoardRig {

@@ -192,9 +192,7 @@ TEST(Decoder, capturesGiveReadingsInStepWithTheirClock) {
 
 TEST(Decoder, mtdataOfAnotherLengthIsRefused) {
   Decoder decoder;
-  StreamSettings settings;
-  settings.generation = xbus::Generation::legacy;
-  settings.layout = {0x0834, 0x203};
+  StreamSettings settings{.generation = xbus::Generation::legacy, .layout = {0x0834, 0x203}};
   decoder.begin(settings, 115200, {});
   std::vector<std::uint8_t> frame(xbus::kMaxFrame);
   const std::vector<std::uint8_t> payload(74);

@@ -270,10 +270,9 @@ TEST_P(Stamps, errorIsBelow300usAfterTwentySeconds) {
     sensor.clock_ppm = seed == 2 ? -50 : 50;
     sensor.seed = seed;
     sensor.duration = Duration::seconds(80);
-    test::SimulatedLineOptions line;
-    line.converter = t.latency_ms > 0;
-    line.latency_timer = Duration::milliseconds(t.latency_ms);
-    line.seed = seed;
+    test::SimulatedLineOptions line{.converter = t.latency_ms > 0,
+                                    .latency_timer = Duration::milliseconds(t.latency_ms),
+                                    .seed = seed};
     XsensRig rig(sensor, line);
     ASSERT_EQ(rig.device->configure(t.rate, nullptr), DeviceStatus::ok) << rig.device->last_error();
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);

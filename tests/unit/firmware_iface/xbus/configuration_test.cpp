@@ -109,14 +109,14 @@ TEST(Commands, outputConfigurationIsPairsOfIdAndRate) {
 TEST(Configuration, configurationMessageRoundTrips) {
   // Values of an MTi-300, which fills the common fields.
   Bytes payload(kConfigurationSize);
-  DeviceConfiguration written;
-  written.master_id = written.device_id = 0x037003F8;
-  written.period = 1152;
-  written.devices = 1;
-  written.output_mode = 0x0836;
-  written.output_settings = 0x80000203;
-  written.data_length = 75;
-  written.firmware = {2, 4, 6};
+  DeviceConfiguration written{.master_id = 0x037003F8,
+                              .period = 1152,
+                              .devices = 1,
+                              .device_id = 0x037003F8,
+                              .data_length = 75,
+                              .output_mode = 0x0836,
+                              .output_settings = 0x80000203,
+                              .firmware = {2, 4, 6}};
   write_configuration(written, payload);
   EXPECT_EQ(Bytes(payload.begin(), payload.begin() + 8), from_hex("037003F8 0480 0000"));
   EXPECT_EQ(Bytes(payload.begin() + 96, payload.begin() + 102), from_hex("0001 037003F8"));

@@ -128,16 +128,16 @@ std::array<double, N> exact(double first) {
 }
 
 TEST(Mtdata, everyLayoutRoundTrips) {
-  Mtdata all;
-  all.fix = LegacyFix{2500, 3800, 45, 255};
-  all.quaternion = exact<4>(0.5), all.euler_deg = exact<3>(170.5),
-  all.rotation_matrix = exact<9>(0.75);
-  all.latitude_longitude_deg = exact<2>(27.5);
-  all.altitude_m = -12.5;
-  all.velocity = exact<3>(33.25);
-  all.status = 0x47;
-  all.sample_counter = 65535;
-  all.utc = Utc{999'999'999, 2036, 12, 31, 23, 59, 60, 7};
+  Mtdata all{.fix = LegacyFix{2500, 3800, 45, 255},
+             .quaternion = exact<4>(0.5),
+             .euler_deg = exact<3>(170.5),
+             .rotation_matrix = exact<9>(0.75),
+             .latitude_longitude_deg = exact<2>(27.5),
+             .altitude_m = -12.5,
+             .velocity = exact<3>(33.25),
+             .status = 0x47,
+             .sample_counter = 65535,
+             .utc = Utc{999'999'999, 2036, 12, 31, 23, 59, 60, 7}};
   int layouts = 0;
   for (unsigned mode = 0; mode < 0x8000; ++mode) {
     for (const std::uint32_t orientation : {kSettingsQuaternion, kSettingsEuler, kSettingsMatrix})

@@ -18,8 +18,7 @@ const World& bare_world() {
 }
 
 Drive make(DriveKind kind) {
-  DriveOptions options;
-  options.kind = kind;
+  DriveOptions options{.kind = kind};
   return Drive(options, bare_world());
 }
 
@@ -43,9 +42,7 @@ TEST(Drive, derivativesMatchCentralDifferences) {
 }
 
 TEST(Drive, speedAndAccelerationStayWithinLimits) {
-  DriveOptions options;
-  options.vibration = 0;
-  options.suspension = 0;
+  DriveOptions options{.suspension = 0, .vibration = 0};
   const Drive drive(options, bare_world());
   double speed = 0, acceleration = 0, turn = 0, steepest = 0;
   for (Duration t{}; t < drive.duration(); t = t + Duration::milliseconds(20)) {
@@ -65,9 +62,7 @@ TEST(Drive, speedAndAccelerationStayWithinLimits) {
 }
 
 TEST(Drive, vehicleFollowsGroundAndHeading) {
-  DriveOptions options;
-  options.suspension = 0;
-  options.vibration = 0;
+  DriveOptions options{.suspension = 0, .vibration = 0};
   const Drive drive(options, bare_world());
   for (Duration t = Duration::seconds(5); t < drive.duration();
        t = t + Duration::milliseconds(310)) {

@@ -49,13 +49,7 @@ Transform looking_north(const Vec3& position) {
 }
 
 Intrinsics lens(bool distorted) {
-  Intrinsics k;
-  k.width = 320;
-  k.height = 240;
-  k.fx = 290;
-  k.fy = 285;
-  k.cx = 158.3;
-  k.cy = 121.7;
+  Intrinsics k{.width = 320, .height = 240, .fx = 290, .fy = 285, .cx = 158.3, .cy = 121.7};
   if (distorted) k.distortion = {-0.28, 0.08, 0.0007, -0.0004, 0};
   return k;
 }
@@ -76,11 +70,7 @@ RenderedImage take(Renderer* renderer, const Transform& T_camera_enu, const Rend
   return p;
 }
 
-RenderRequest clean() {
-  RenderRequest s;
-  s.vignetting = 0;
-  return s;
-}
+RenderRequest clean() { return {.vignetting = 0}; }
 
 /// Where the brightness from x0 to x1 of a row steps between `left` and `right`: the edge that
 /// would give this sum.
@@ -183,8 +173,7 @@ TEST(Renderer, everySimdTargetDrawsTheSameImage) {
   scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
   const auto town = std::make_shared<const World>(WorldOptions{.seed = 5, .texture_detail = 0});
   const Transform T_town = looking_north({-1.9, 60, town->ground(-1.9, 60) + 1.7});
-  RenderRequest noisy;
-  noisy.noise_seed = 3;
+  RenderRequest noisy{.noise_seed = 3};
   Renderer renderer(town, Camera(lens(true)));
   const auto targets = hwy::SupportedAndGeneratedTargets();
   ASSERT_FALSE(targets.empty());
