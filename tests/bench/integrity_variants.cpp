@@ -12,7 +12,8 @@
 namespace vergence::bench {
 namespace {
 
-constexpr double kFocalOfWidth = 0.58;  // focal length over width: KITTI's; EuRoC's is 0.61
+// Focal length over width of KITTI; EuRoC's is 0.61.
+constexpr double kFocalOfWidth = 0.58;
 
 /// Image moved by (dx, dy) px, turned by `roll_deg` and magnified about its centre.
 void warp(cv::Mat* image, double dx, double dy, double roll_deg, double zoom) {

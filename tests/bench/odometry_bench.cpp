@@ -39,20 +39,24 @@ struct Excerpt {
   const char* name;
   const char* folder;
   app::SequenceFormat format;
-  std::vector<double> lengths;  // m, of the segment error
+  // Lengths of the segments in m.
+  std::vector<double> lengths;
 };
 
 struct DecodedDrive {
   app::StereoSequence sequence;
   std::vector<std::array<cv::Mat, 2>> pairs;
   app::Trajectory truth;
-  double decode_ms = 0;  // mean a pair, one thread
+  // Mean time per pair on one thread.
+  double decode_ms = 0;
 };
 
 struct Replay {
   std::vector<StampedPose> poses;
-  std::vector<float> milliseconds;         // a frame
-  std::array<double, kStages> stage_ms{};  // sums
+  // Time of each frame.
+  std::vector<float> milliseconds;
+  // Sum over all frames.
+  std::array<double, kStages> stage_ms{};
 };
 
 struct Arguments {
@@ -66,7 +70,8 @@ struct Measured {
   const char* name = "";
   std::size_t frames = 0, posed = 0;
   TrajectoryEvaluation evaluation{};
-  double without_mount = 0;  // segment error after the scale and one mounting rotation
+  // Segment error after the scale and one mounting rotation.
+  double without_mount = 0;
   double mean_ms = 0, p50_ms = 0, p99_ms = 0, max_ms = 0, online_mean_ms = 0, decode_ms = 0;
   std::array<double, kStages> stage_ms{};
 };
@@ -119,7 +124,8 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
   std::optional<app::ThreadRunner> two;
   if (threads == 2) two.emplace();
   ImmediateRunner at_once;
-  std::optional<app::BackgroundThread> beside;  // calibrations are solved on it, as in a drive
+  // Calibrations are solved on this thread, as in a live run.
+  std::optional<app::BackgroundThread> beside;
   if (online) beside.emplace();
   Estimator estimator(options, d.sequence.calibration, d.sequence.calibration, arena,
                       two ? static_cast<PairRunner&>(*two) : one,

@@ -45,7 +45,8 @@ using test::RecordedSequence;
 
 struct Bench {
   app::Configuration online, off;
-  std::string variant;  // of `times` and `scenes`: part of its name
+  // Part of a variant's name for `times` and `scenes`.
+  std::string variant;
 };
 
 StereoSequence part(const StereoSequence& s, std::size_t first, std::size_t count) {

@@ -42,8 +42,8 @@ void check(const StereoSequence& s) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::vector<char> bytes(
-      data, data + size);  // exactly so many: a read behind the last one is found by ASan
+  // The exact size lets ASan find a read beyond the last byte.
+  const std::vector<char> bytes(data, data + size);
   const auto format = size > 0 && data[0] == '#'   ? detail::BagFormat::rosbag
                       : size > 0 && data[0] == 'S' ? detail::BagFormat::sqlite
                                                    : detail::BagFormat::mcap;

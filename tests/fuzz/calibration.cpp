@@ -46,7 +46,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Remarks remarks;
   probe([&] {
     const CalibrationFile file = parse_calibration(left, "a.yaml");
-    check(parse_calibration(format_calibration(file), "again.yaml"));  // what is written reads back
+    // A written calibration must read back.
+    check(parse_calibration(format_calibration(file), "again.yaml"));
     return file;
   });
   probe([&] { return parse_calibration(left, "a.yaml", {.length_only = true, .baseline = 0.5}); });

@@ -27,8 +27,10 @@ constexpr std::string_view kPng("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x60\0\0\0\x
 
 struct Layout {
   SequenceFormat format;
-  std::vector<std::string> texts;   // in the order of the pieces
-  std::vector<std::string> images;  // whole
+  // Text files in the order of the pieces.
+  std::vector<std::string> texts;
+  // Image files.
+  std::vector<std::string> images;
 };
 
 const std::vector<Layout>& layouts() {

@@ -85,7 +85,8 @@ void probe(std::span<const std::uint8_t> bytes) {
   // The stream against a reader without memory: the same frames, however the bytes are cut into
   // pieces.
   FrameStream stream;
-  std::size_t at = 0;  // of the reader without memory
+  // Position of the reader without memory.
+  std::size_t at = 0;
   std::span<const std::uint8_t> rest = bytes;
   std::size_t piece = 1 + (bytes.empty() ? 0 : bytes[0] % 67U);
   while (!rest.empty()) {

@@ -218,7 +218,8 @@ TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
     for (const Mat6& m : r.covariance_total) EXPECT_TRUE(m.allFinite()) << seed;
     usable += r.usable() ? 1 : 0;
   }
-  EXPECT_GT(usable, 100);  // the fuzz reaches the solver, not only its gate
+  // The fuzz must reach the solver, not only its input check.
+  EXPECT_GT(usable, 100);
 }
 
 }  // namespace

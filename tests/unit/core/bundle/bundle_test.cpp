@@ -74,8 +74,8 @@ TEST(Bundle, robustLossesSuppressOutliers) {
   OwnAdjuster own(capacities_for(s));
   const auto error_with = [&](BundleLoss loss) {
     SimulatedRig rig = original;
-    for (std::size_t i = 0; i < rig.observations.size(); i += 50)
-      rig.observations[i].x += 20;  // 2 % wrong by 200 sigmas
+    // Two percent of the observations are wrong by 200 sigmas.
+    for (std::size_t i = 0; i < rig.observations.size(); i += 50) rig.observations[i].x += 20;
     BundleOptions o = calibration_options();
     o.loss = loss;
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
@@ -89,7 +89,8 @@ TEST(Bundle, robustLossesSuppressOutliers) {
 
 TEST(Bundle, squaredResidualsAreWhitened) {
   SimulationOptions s;
-  s.points = 37;  // not a multiple of the batch
+  // The number is not a multiple of the batch.
+  s.points = 37;
   Random random(18);
   SimulatedRig rig = simulate_rig(s, random);
   std::vector<float> squared(rig.observations.size());
@@ -212,7 +213,8 @@ TEST(Bundle, everyTerminationIsReached) {
   o.gradient_tolerance = 1e-3;
   EXPECT_EQ(end(o), BundleTermination::small_gradient);
   o = calibration_options();
-  o.length[1].kind = BundleLength::free;  // nothing fixes the scale
+  // Nothing fixes the scale.
+  o.length[1].kind = BundleLength::free;
   EXPECT_EQ(end(o), BundleTermination::rank_deficient);
   o.loss_threshold = -1;
   EXPECT_EQ(end(o), BundleTermination::invalid_input);

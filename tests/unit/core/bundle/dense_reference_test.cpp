@@ -145,7 +145,8 @@ struct Case {
   BundleLoss loss = BundleLoss::none;
   CameraModelKind kind = CameraModelKind::pinhole_radtan;
   std::array<double, 5> distortion{};
-  unsigned free = 0;  // intrinsics of every camera
+  // Free intrinsics of every camera.
+  unsigned free = 0;
   BundleConfiguration configuration = BundleConfiguration::stereo_calibration;
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -179,8 +180,8 @@ TEST_P(DenseReference, oneStepMatchesTheDenseStep) {
     d.options.length[k] = {k > 1 ? BundleLength::free : c.length,
                            c.length == BundleLength::measured ? 0.8 : 0.0, 0.01};
   }
-  for (BundleObservation& o : d.rig.observations) {  // the truth seen through this lens, the noise
-                                                     // kept small against the curvature
+  // The truth is seen through this lens. The noise is small against the curvature.
+  for (BundleObservation& o : d.rig.observations) {
     Vec2 pixel;
     ASSERT_EQ(
         d.rig.cameras[o.camera].project(

@@ -11,7 +11,8 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr int kFree = 15;  // the transform of camera 1 and its intrinsics
+// The free parameters are the transform of camera 1 and its intrinsics.
+constexpr int kFree = 15;
 using Free = Eigen::Matrix<double, kFree, kFree>;
 using FreeVector = Eigen::Matrix<double, kFree, 1>;
 
@@ -116,10 +117,10 @@ TEST(Agreement, conditionalCovarianceOfCorrelatedIntrinsics) {
   const Free given = C.topLeftCorner<kFree, kFree>() -
                      cross * C.bottomRightCorner<4, 4>().ldlt().solve(cross.transpose());
   const RigCovariance left = noise_only(wide);
+  // The tolerance is for numbers near 20.
   for (int i = 0; i < kFree; ++i)
     for (int j = 0; j <= i; ++j)
-      EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10)
-          << i << ' ' << j;  // of numbers near 20
+      EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10) << i << ' ' << j;
 }
 
 TEST(Agreement, covarianceWithoutFixedIntrinsicsIsUnchanged) {

@@ -11,9 +11,11 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kBaseline = 0.54;  // m, KITTI's
+// The baseline is KITTI's, in m.
+constexpr double kBaseline = 0.54;
 constexpr Pinhole kPinhole{718, 718, 607, 185};
-constexpr double kNoise = 0.2;  // px, of a coordinate
+// Noise of a coordinate, in px.
+constexpr double kNoise = 0.2;
 constexpr std::size_t kTracks = 150;
 
 Transform rig(double yaw_deg) {

@@ -33,13 +33,15 @@ namespace vergence::test {
 }
 /// Rig with exact intrinsics.
 [[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive) {
-  constexpr double kExact = 1e-6;  // px; zero would say that nothing is known of them
+  // A sigma of zero px would mean that the intrinsics are unknown.
+  constexpr double kExact = 1e-6;
   return rig_of(drive, {drive.left, drive.right}, {kExact, kExact, kExact, kExact});
 }
 
 /// Another camera that sees every track, with the left one's lens and a third of a pixel of noise.
 struct FurtherCamera {
-  std::size_t number = 2;  // 1: the drive's right camera then is camera 2
+  // With number 1 the drive's right camera becomes camera 2.
+  std::size_t number = 2;
   Transform T_camera_left;
 };
 
@@ -58,8 +60,10 @@ struct FurtherCamera {
 /// Errors of the logged poses and transforms, from which a solve starts; tracks have errors of
 /// their own.
 struct LogStart {
-  double pose_rad = 0, pose_m = 0;  // of every frame's pose but the first, each axis, sigma
-  double rig_rad = 0, rig_m = 0;    // of every frame's T_camera_left
+  // Sigma of each axis of every frame's pose except the first.
+  double pose_rad = 0, pose_m = 0;
+  // Sigma of each axis of every frame's T_camera_left.
+  double rig_rad = 0, rig_m = 0;
 };
 
 /// The next `frames` frames of a drive as the estimator would log them; how far they drive, m.

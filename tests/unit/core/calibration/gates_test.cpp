@@ -81,7 +81,8 @@ TEST(Gates, depthErrorAboveUsableIsRefused) {
 
 TEST(Gates, shortPathNeedsMotion) {
   Case c;
-  c.solution.travelled_m = 2.24;  // three baselines are 2.25 m
+  // Three baselines are 2.25 m.
+  c.solution.travelled_m = 2.24;
   EXPECT_EQ(c.ask(), Gate::needs_motion);
   c.solution.travelled_m = 2.26;
   EXPECT_EQ(c.ask(), Gate::open);
@@ -130,7 +131,8 @@ TEST(Gates, lagIsOutOfSync) {
 
 TEST(Gates, heldOutFramesRejectAWrongSolution) {
   Case c;
-  c.turn(&c.solution.rig, {0.2, 0, 0});  // 4.4 px of row, against 1.5 allowed
+  // The rotation moves rows by 4.4 px; 1.5 px are allowed.
+  c.turn(&c.solution.rig, {0.2, 0, 0});
   EXPECT_EQ(c.ask(), Gate::does_not_fit);
   const HeldOut h = held_out(c.log, c.solution.newest, c.solution.rig);
   EXPECT_NEAR(h.median_px, 1247 * 0.2 * kDegree, 0.3);
@@ -167,7 +169,8 @@ TEST(Gates, knockOfTheThirdCameraIsAccepted) {
   Case c(kThird);
   c.question.in_use = &c.in_use;
   EXPECT_EQ(c.ask(), Gate::no_better) << "the same";
-  c.turn(&c.in_use, {0.4, 0, 0}, 2);  // 8.7 px of row
+  // The rotation moves rows by 8.7 px.
+  c.turn(&c.in_use, {0.4, 0, 0}, 2);
   EXPECT_EQ(c.ask(), Gate::open);
   EXPECT_NEAR(held_out(c.log, c.solution.newest, c.in_use).median_px, 1247 * 0.4 * kDegree, 0.5)
       << "of the camera that fits worst";
@@ -201,7 +204,8 @@ TEST(Gates, uncertainCameraHidesNoContradiction) {
     Case c(kThird);
     const std::size_t poor = 3 - wrong;
     const int yaw = extrinsic_row(static_cast<int>(poor)) + 1;
-    constexpr double kUnknown = 0.01;  // rad: more than the turn
+    // The sigma, in rad, exceeds the rotation below.
+    constexpr double kUnknown = 0.01;
     c.solution.rig.covariance.set(yaw, yaw, kUnknown * kUnknown);
     const auto assessed = [&] {
       return assess(c.solution.rig, c.in_use, CalibrationOrigin::elsewhere, c.log,

@@ -66,11 +66,13 @@ TEST(Health, rigIsRatedByItsBestPair) {
   rig.cameras = 3;
   rig.intrinsics[2] = rig.intrinsics[1];
   rig.T_camera_left[2].t = Vec3(-0.05, 0, 0);
-  know(&rig, 1, 3, 0.001);  // 1 %
-  know(&rig, 2, 3, 0.004);  // 8 %
+  // The depth errors are 1 % and 8 %.
+  know(&rig, 1, 3, 0.001);
+  know(&rig, 2, 3, 0.004);
   EXPECT_NEAR(depth_error_percent(rig, 20.0), 1.0, 1e-9);
   EXPECT_EQ(health(rig, {}), CalibrationRating::good);
-  know(&rig, 1, 3, 0.02);  // 20 %
+  // The depth error is 20 %.
+  know(&rig, 1, 3, 0.02);
   EXPECT_NEAR(depth_error_percent(rig, 20.0), 8.0, 1e-9);
   EXPECT_EQ(health(rig, {}), CalibrationRating::recalibrate);
 }

@@ -38,7 +38,8 @@ Sums watch(const FeatureDriveOptions& o, const Transform& T_reference, int frame
     (void)trial.step();
     const MonitorFrame& f = trial.frame();
     const StereoResiduals a = looks->stereo(reference, f, 30, true);
-    if (i < 30 || !a.usable) continue;  // tracks of the first frames are not of full age
+    // Tracks of the first frames have not reached their full age.
+    if (i < 30 || !a.usable) continue;
     ++sums.frames;
     sums.stereo.add(a.evidence);
     sums.spread_now += a.spread_now;

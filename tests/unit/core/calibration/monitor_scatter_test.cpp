@@ -11,8 +11,10 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr double kLambda = 3;          // px² of a unit of information: what noise is inflated by
-constexpr double kObservations = 4e4;  // of a block, each of 1 px
+// Inflation of the noise, in px² per unit of information.
+constexpr double kLambda = 3;
+// Observations of a block, each with a sigma of 1 px.
+constexpr double kObservations = 4e4;
 
 /// Blocks of a drive, each with an offset of its own besides the noise of its tracks.
 class Blocks {

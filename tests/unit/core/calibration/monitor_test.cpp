@@ -19,7 +19,8 @@ using calibration::MonitorOptions;
 using calibration::MonitorResult;
 using Kind = MonitorResult::Kind;
 
-constexpr int kBefore = 300;  // frames driven before the rig changes: ten seconds
+// The rig changes after ten seconds.
+constexpr int kBefore = 300;
 
 FeatureDriveOptions street(double speed, std::uint64_t seed, int tracks = 220) {
   FeatureDriveOptions o;
@@ -32,7 +33,8 @@ FeatureDriveOptions street(double speed, std::uint64_t seed, int tracks = 220) {
 struct KnockRow {
   const char* name;
   Vec3 rotation_deg, translation_mm;
-  int limit;  // moving frames
+  // Maximum number of moving frames until detection.
+  int limit;
 };
 
 /// A recalibration that starts at the onset must hold next to nothing of the old rig: 10 of the 60
@@ -100,13 +102,15 @@ TEST(Monitor, evidenceStatesTheShiftOfAPitch) {
 }
 
 TEST(Monitor, slowRotationIsDriftBefore0_03Degrees) {
-  for (const double rate : {0.02, -0.02}) {  // ° a minute
+  // The rates are in degrees per minute.
+  for (const double rate : {0.02, -0.02}) {
     FeatureDriveOptions o = street(8, 2);
     o.changes = {{kBefore, Vec3(10 * rate, 0, 0) / kRadian, Vec3::Zero(), 18000}};
     const TrialReference reference = calibrated(o);
     MonitorTrial trial(o, reference.T_right_left, reference.covariance);
     for (int i = 0; i < kBefore; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
-    const auto frames = trial.frames_until(2700);  // 0.03°
+    // The limit corresponds to 0.03°.
+    const auto frames = trial.frames_until(2700);
     ASSERT_TRUE(frames.has_value());
     const auto as_drift = trial.verdict().kind == Kind::drift
                               ? frames
@@ -204,7 +208,8 @@ TEST(Monitor, evaluationAllocatesNothing) {
   FeatureDriveOptions o = street(8, 11);
   o.changes = {{40, Vec3(0, 0.3, 0) / kRadian, Vec3::Zero(), 0}};
   MonitorTrial trial(o);
-  for (int i = 0; i < 80; ++i) (void)trial.step();  // vectors of the trial have grown
+  // The vectors of the trial grow in the first frames.
+  for (int i = 0; i < 80; ++i) (void)trial.step();
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;

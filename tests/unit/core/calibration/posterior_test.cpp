@@ -37,8 +37,8 @@ TEST(Posterior, driftAddsTheRandomWalkOfItsTime) {
     };
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(added(extrinsic_row(1) + i), walk, 1e-9 * walk) << i;
-      EXPECT_NEAR(added(extrinsic_row(1) + 3 + i), walk * 0.75 * 0.75, 1e-9 * walk)
-          << i;  // t turns by as much
+      // The translation rotates by the same angle.
+      EXPECT_NEAR(added(extrinsic_row(1) + 3 + i), walk * 0.75 * 0.75, 1e-9 * walk) << i;
       EXPECT_NEAR(added(extrinsic_row(2) + 3 + i), walk * 0.5 * 0.5, 1e-9 * walk) << i;
     }
     for (int i = 0; i < kIntrinsicsSize - 1; ++i) EXPECT_GT(added(intrinsic_row(1) + i), 0) << i;

@@ -12,8 +12,8 @@ using calibration::CalibrationOptions;
 using calibration::RigSolution;
 using calibration::RigSolveStatus;
 
-constexpr LogStart kRough{2e-3, 0.02, 5e-3,
-                          0.02};  // what cameras posed each for itself are off, and more
+// Independently posed cameras have smaller errors than these.
+constexpr LogStart kRough{2e-3, 0.02, 5e-3, 0.02};
 
 CalibrationOptions held() {
   return {.max_frames = 60, .intrinsics = calibration::IntrinsicsEstimation::fixed};

@@ -21,8 +21,8 @@ using calibration::SegmentSolver;
 using calibration::TrackLog;
 
 constexpr std::size_t kStretch = 30, kFeatures = 300, kLogged = 40;
-constexpr std::array<double, 4> kNotGiven = {
-    0, 0, 0, 0};  // sigmas of a lens: priors as the options have them
+// Sigmas of zero select the priors of the options.
+constexpr std::array<double, 4> kNotGiven = {0, 0, 0, 0};
 
 /// A drive whose estimator's log is shown to the stretches after every few frames, as an
 /// application does.
@@ -155,7 +155,8 @@ TEST(SegmentSolver, repeatedFramesAreTakenOnce) {
 TEST(SegmentSolver, lastSegmentIsSolvedFromTheMinimumOn) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
-  for (const int frames : {24, 25}) {  // CalibrationOptions::min_frames is 25
+  // CalibrationOptions::min_frames is 25.
+  for (const int frames : {24, 25}) {
     Driven d(o, SegmentSolver::Kind::joined, given, given);
     log_drive(d.drive, frames, {}, d.log);
     EXPECT_FALSE(d.stretches.take(d.log).has_value());

@@ -17,7 +17,8 @@ namespace {
 struct Model {
   const char* name;
   Intrinsics k;
-  double widest;  // rad from the axis up to which this lens is looked at
+  // Largest angle from the axis, in rad, at which this lens is tested.
+  double widest;
 };
 
 Intrinsics intrinsics(CameraModelKind kind, int width, int height, const std::array<double, 4>& k,

@@ -65,7 +65,8 @@ struct Bench {
     while (comparison.next(&c)) out.push_back(c);
   }
 
-  using EditSample = std::function<bool(double, InsSample*)>;  // false: not sent
+  // Returns false if the sample is not sent.
+  using EditSample = std::function<bool(double, InsSample*)>;
   using EditPose = std::function<void(double, PoseSample*)>;
   /// INS at 120 Hz, poses at 20 Hz, the pose a little before the INS samples around it.
   void drive(double from, double to, const EditSample& edit_sample = {},
@@ -92,10 +93,12 @@ struct Bench {
 
 TEST(MountOf, cameraAxesBecomeVehicleAxes) {
   const Transform T = mount_of({1, 2, 3}, Vec3::Zero());
-  EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);  // seen ahead is ahead
-  EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(),
-            1e-15);  // seen on the right is on the right
-  EXPECT_LT((T * Vec3(0, 5, 0) - Vec3(1, 2, -2)).norm(), 1e-15);  // seen below is below
+  // A point seen ahead is ahead.
+  EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);
+  // A point seen on the right is on the right.
+  EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(), 1e-15);
+  // A point seen below is below.
+  EXPECT_LT((T * Vec3(0, 5, 0) - Vec3(1, 2, -2)).norm(), 1e-15);
   // A rig turned to the left by yaw sees ahead of it what lies ahead and left of the INS.
   EXPECT_LT(
       (mount_of(Vec3::Zero(), {0, 0, std::numbers::pi / 2}) * Vec3(0, 0, 1) - Vec3(0, 1, 0)).norm(),
@@ -144,7 +147,8 @@ TEST(Comparison, shortDriveIsAlignedAtItsEnd) {
 
 TEST(Comparison, errorIsTheDriftSinceTheAlignment) {
   Bench b;
-  const Vec3 drift(0.5, -0.25, 0.125);  // m in the world's axes, from 50 s on
+  // Drift in the world's axes from 50 s on, in m.
+  const Vec3 drift(0.5, -0.25, 0.125);
   b.drive(0, 60, {}, [&](double t, PoseSample* p) {
     if (t > 50) {
       p->T_world_left.t += drift;
@@ -157,13 +161,15 @@ TEST(Comparison, errorIsTheDriftSinceTheAlignment) {
   // The world's y axis points down but for the mounting and the slope at the start; the view is
   // level but for them.
   EXPECT_NEAR(c.error_yaw, 0.01, 0.001);
-  EXPECT_EQ(b.comparison.alignment().revision, 1U);  // frozen
+  // The alignment is frozen.
+  EXPECT_EQ(b.comparison.alignment().revision, 1U);
 }
 
 TEST(Comparison, posesDuringInsOutageAreNotCompared) {
   struct Away {
     const char* what;
-    double from, to;  // s: without a reading, or a fix
+    // Interval without a sample or without a fix, in s.
+    double from, to;
     InsMatch match;
     bool no_fix = false;
   };
@@ -217,9 +223,11 @@ TEST(Comparison, fixWithoutHeightCountsForEastAndNorthOnly) {
 
 TEST(Comparison, poseIsReleasedAfterTheMaximumWait) {
   Bench b;
-  for (int i = 0; i < 20; ++i) b.comparison.add(b.pose(0.05 * i));  // no INS at all
+  // No INS sample ever arrives.
+  for (int i = 0; i < 20; ++i) b.comparison.add(b.pose(0.05 * i));
   b.take();
-  EXPECT_EQ(b.out.size(), 9U);  // those that lie more than 0.5 s before the newest, 0.95 s
+  // The newest pose is at 0.95 s; released are those more than 0.5 s older.
+  EXPECT_EQ(b.out.size(), 9U);
   EXPECT_EQ(b.out.front().ins, InsMatch::none);
 }
 
@@ -371,7 +379,8 @@ TEST(Comparison, standstillKeepsTheLastCourse) {
   for (const ComparedPose& c : b.out) {
     const double t = (c.pose.stamp - at(0)).to_seconds();
     if (t < 0.9) {
-      EXPECT_NE(c.ins, InsMatch::ok) << t;  // no heading was ever known
+      // No heading was known yet.
+      EXPECT_NE(c.ins, InsMatch::ok) << t;
     } else if (t > 1.1) {
       EXPECT_EQ(c.ins, InsMatch::ok) << t;
     }
@@ -397,8 +406,9 @@ TEST(Comparison, scaleErrorAboveTwoPercentIsReported) {
 TEST(Comparison, invalidSamplesAreRefusedAndCounted) {
   Bench b;
   b.comparison.add(b.sample(1.0));
-  b.comparison.add(b.sample(1.0));  // the same stamp
-  b.comparison.add(b.sample(0.5));  // older
+  // The second sample has the same stamp, the third is older.
+  b.comparison.add(b.sample(1.0));
+  b.comparison.add(b.sample(0.5));
   EXPECT_EQ(b.comparison.counters().ins_refused, 2U);
   InsSample s = b.sample(1.1);
   std::swap(s.position.latitude_deg, s.position.longitude_deg);

@@ -20,7 +20,8 @@ namespace {
 
 constexpr Stamp kStart{1'000'000'000'000};
 const Vec3 kLever(0.9, 0.375, 0.5);
-const Vec3 kBoresight(0.02, -0.03, 0.05);  // rad
+// Boresight in rad.
+const Vec3 kBoresight(0.02, -0.03, 0.05);
 
 struct Drove {
   std::vector<StampedPose> estimate;
@@ -32,9 +33,12 @@ struct How {
   std::uint64_t seed = 1;
   bool ideal = false;
   bool velocity = true;
-  double late_s = 0;    // of the reference's stamps
-  double rate = 60;     // Hz, of the reference
-  double jitter_s = 0;  // of the reference's stamps, with what they stamp: either way at most
+  // Delay of the reference's stamps.
+  double late_s = 0;
+  // Rate of the reference in Hz.
+  double rate = 60;
+  // Maximum shift of a reference sample and its stamp in either direction.
+  double jitter_s = 0;
 };
 
 /// The left camera as an odometry would have it (in its own world, drifting a little), and the
@@ -48,7 +52,8 @@ Drove drove(const How& how) {
   const double length = truth.drive().duration().to_seconds();
   Drove d;
   Random random(how.seed, 40);
-  constexpr double kFrames = 20;  // Hz
+  // Frame rate in Hz.
+  constexpr double kFrames = 20;
   const Transform T_enu_first = truth.camera_in_enu(0, {});
   Transform T_world_left, before = T_enu_first;
   for (double t = 0; t < length; t += 1 / kFrames) {
@@ -121,7 +126,8 @@ TEST(Mount, slowReferenceGivesTheExtrinsics) {
       const MountValue &turn = m.rotation[k], &arm = m.lever_arm[k];
       EXPECT_NEAR(turn.value, true_turn()[i], 3 * turn.sigma);
       EXPECT_NEAR(arm.value, kLever[i], 3 * arm.sigma);
-      EXPECT_LT(turn.sigma, 1e-3);  // what poses are interpolated by between frames
+      // Interpolation between frames limits the rotation sigma.
+      EXPECT_LT(turn.sigma, 1e-3);
       EXPECT_LT(arm.sigma, 5e-3);
     }
     EXPECT_NEAR(m.clock_offset.value, 0.012, 3 * m.clock_offset.sigma);

@@ -26,8 +26,8 @@ struct Drive {
   std::optional<Estimator> estimator;
   std::vector<PoseSample> samples;
   std::vector<EstimatorEvent> events;
-  std::vector<CalibrationDecision>
-      decisions;  // those sought; what the drive learns on the way is verifying_test's
+  // Decisions of requested estimations; verifying_test covers refinements.
+  std::vector<CalibrationDecision> decisions;
 
   explicit Drive(CalibrationTrust trust) : given(corridor.rig()), nominal(given) {
     options.trust = trust;
@@ -139,7 +139,8 @@ TEST(Calibrating, adoptionWaitsForSixConfirmingFrames) {
 // epipolar line shows a yaw: frames of both are never one solve, and those after confirm nothing
 // that was found before. 10 mrad are 2.8 px here.
 TEST(Calibrating, yawKnockDuringEstimationRestartsIt) {
-  constexpr int kKnock = 28;  // after the first snapshot, before its solution is judged
+  // The knock is after the first snapshot and before its solution is evaluated.
+  constexpr int kKnock = 28;
   Drive d(CalibrationTrust::none);
   d.begin();
   d.drive(0, kKnock);
@@ -182,7 +183,8 @@ TEST(Calibrating, pitchKnockIsDetectedAndRecalibrated) {
   Drive d(CalibrationTrust::given);
   d.begin();
   std::array<Transform, kMaxCameras> knocked = d.corridor.rig().T_camera_left;
-  knocked[1] = perturbed(knocked[1], {0.012, 0, 0}, Vec3::Zero());  // 3.4 px of row
+  // The pitch moves rows by 3.4 px.
+  knocked[1] = perturbed(knocked[1], {0.012, 0, 0}, Vec3::Zero());
   d.drive(0, 12);
   d.drive(12, 85, knocked);
   EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating,

@@ -19,7 +19,8 @@ using features::test::Image;
 using features::test::Texture;
 
 constexpr int kWidth = 320, kHeight = 240;
-constexpr double kDisparity = 12.0;  // px
+// Disparity in px.
+constexpr double kDisparity = 12.0;
 
 RigCalibration rig() {
   RigCalibration r{.cameras = 2, .baseline = 0.5};

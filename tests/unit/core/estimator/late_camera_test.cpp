@@ -21,8 +21,10 @@ struct StopAndGo {
   static constexpr int kStop = 70, kRepeat = 76, kGo = 96, kFrames = 156;
   // Each step is 2.5 mm more than the last one; 10 mm are three sigmas of a motion here.
   static constexpr int kMoves = kGo + 4;
-  static constexpr double kSpeed = 0.7;         // steps a frame, of 0.15 m and 50 ms: 2 m/s
-  static constexpr double kGathers = 0.05 / 3;  // of it a frame: 1 m/s²
+  // Speed in steps of 0.15 m per frame of 50 ms, which is 2 m/s.
+  static constexpr double kSpeed = 0.7;
+  // Acceleration in steps per frame, which is 1 m/s².
+  static constexpr double kGathers = 0.05 / 3;
 
   Corridor corridor;
   EstimatorOptions options;

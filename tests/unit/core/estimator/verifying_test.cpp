@@ -28,13 +28,16 @@ struct SuppliedRig {
   std::optional<Estimator> estimator;
   std::vector<PoseSample> samples;
   std::vector<Kind> kinds;
-  std::vector<std::uint64_t> frames;  // of the events
+  // Frame numbers of the events.
+  std::vector<std::uint64_t> frames;
   std::vector<CalibrationDecision> decisions;
   std::string story;
-  int dark_from = -1, dark_to = -1;  // frames without images: from, and the first one after them
+  // First frame without images and first frame with images again.
+  int dark_from = -1, dark_to = -1;
   // The corridor has an end: after so many frames the same way back, and forth again.
   static constexpr int kTurnAfter = 120;
-  static constexpr Duration kInterval = Duration::milliseconds(50);  // the corridor's
+  // Frame interval of the corridor.
+  static constexpr Duration kInterval = Duration::milliseconds(50);
 
   SuppliedRig() {
     nominal.T_camera_left[1] = {Mat3::Identity(), {-given.baseline, 0, 0}};
@@ -142,7 +145,8 @@ TEST(Verifying, yawKnockDuringOutageIsNeverOk) {
 // A full segment's result is the prior of later solves, but must not be after the rig has changed.
 void expect_mended_once(double yaw_rad) {
   SCOPED_TRACE(yaw_rad);
-  constexpr int kKnock = 80;  // after the first full segment
+  // The knock is after the first full segment.
+  constexpr int kKnock = 80;
   const Vec3 knock(0, yaw_rad, 0);
   SuppliedRig c;
   c.options.calibration.max_frames = 60;
@@ -212,7 +216,8 @@ TEST(Verifying, wrongYawIsContradictedAndReplaced) {
 // While the calibration is a claim, epipolar lines cannot say whether a yaw is new; disparities
 // that move all at once can. 10 mrad are 2.8 px here.
 TEST(Verifying, yawKnockBeforeVerificationIsDetected) {
-  constexpr int kKnock = 22;  // after the first snapshot, before it is decided
+  // The knock is after the first snapshot and before its decision.
+  constexpr int kKnock = 22;
   SuppliedRig c;
   c.drive(45, kKnock, {0, 0.01, 0});
   const int noticed = c.first(Kind::rig_changed);

@@ -10,7 +10,8 @@ WindowCorrection of(double moved_m) { return {moved_m, 0.5, 0.02}; }
 
 TEST(WindowCorrection, correctionBeyondSigmaAndShareIsReported) {
   EXPECT_FALSE(of(0.0).spoils_motion());
-  EXPECT_FALSE(of(0.0249).spoils_motion());  // 1.2 sigmas, 4.98 %
+  // The correction is 1.2 sigmas and 4.98 % of the motion.
+  EXPECT_FALSE(of(0.0249).spoils_motion());
   EXPECT_TRUE(of(0.0251).spoils_motion());
 }
 

@@ -65,7 +65,8 @@ TEST(Pyramid, smallImageHasFewerLevels) {
   const Image image = white_noise(70, 200, 1);
   const Built b(image.view(), 6);
   EXPECT_EQ(b.pyramid.level(0).data, image.bytes.data());
-  ASSERT_EQ(b.pyramid.levels(), 2);  // 70 → 35 → 18, and no side falls below 32
+  // The widths are 70, 35 and 18 px; no side may be below 32 px.
+  ASSERT_EQ(b.pyramid.levels(), 2);
   EXPECT_EQ(b.pyramid.level(1).width, 35);
 }
 

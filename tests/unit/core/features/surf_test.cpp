@@ -22,8 +22,10 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 struct Blob {
   Vec2 at;
-  double sigma;      // px
-  double amplitude;  // grey levels
+  // Sigma in px.
+  double sigma;
+  // Amplitude in grey levels.
+  double amplitude;
 };
 
 /// Gaussian blobs on a grey ground.
@@ -210,11 +212,16 @@ class Matching : public ::testing::Test {
 
 TEST_F(Matching, matchIsMutualUniqueAndOfOneSign) {
   Set left, right;
-  left.add(0, 0, false, 0.00);   // nearest: right 0, which prefers left 1
-  left.add(1, 0, false, 0.05);   // mutual with right 0
-  left.add(2, 0, true, 1.00);    // nearest of its sign: right 2
-  left.add(3, 0, false, 2.00);   // two equally near: refused
-  left.add(4, 0, false, -1.50);  // too far from all
+  // The nearest point is right 0, which prefers left 1.
+  left.add(0, 0, false, 0.00);
+  // The match with right 0 is mutual.
+  left.add(1, 0, false, 0.05);
+  // The nearest point of the same sign is right 2.
+  left.add(2, 0, true, 1.00);
+  // Two points are equally near, so the match is refused.
+  left.add(3, 0, false, 2.00);
+  // This point is too far from all others.
+  left.add(4, 0, false, -1.50);
   right.add(0, 0, false, 0.06);
   right.add(0, 0, false, 1.01);
   right.add(0, 0, true, 1.10);
@@ -232,9 +239,11 @@ TEST_F(Matching, matchIsMutualUniqueAndOfOneSign) {
 TEST_F(Matching, matchLiesInTheEpipolarBand) {
   Set left, right;
   left.add(50, 20, false, 0);
-  right.add(10, 40, false, 0);  // looks the same, 20 px beside the line
+  // The point looks the same but is 20 px off the line.
+  right.add(10, 40, false, 0);
   right.add(30, 21.5F, false, 0.2);
-  EpipolarBand rectified;  // y' = y
+  // The band requires y' = y.
+  EpipolarBand rectified;
   rectified.F << 0, 0, 0, 0, 0, -1, 0, 1, 0;
   rectified.px = 2;
   ASSERT_EQ(matcher.match(left.view(), right.view(), {}, &rectified, &out), SurfMatchStatus::ok);
@@ -272,7 +281,8 @@ TEST(Surf, smallFlatOrInvalidImageHasNoPoint) {
   Arena arena(Surf::memory_needed(100, 80) + 50 * sizeof(SurfPoint) + kCacheLine);
   Surf surf(100, 80, arena);
   BoundedVector<SurfPoint> points(arena.make<SurfPoint>(50, "points"));
-  EXPECT_EQ(surf.detect({}, &points), 0);  // no image yet
+  // No image was set yet.
+  EXPECT_EQ(surf.detect({}, &points), 0);
   for (const auto& [w, h] : {std::pair(1, 1), std::pair(26, 80), std::pair(27, 27),
                              std::pair(100, 3), std::pair(28, 29)}) {
     const Image noise = test::white_noise(w, h, 1);

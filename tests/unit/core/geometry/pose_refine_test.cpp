@@ -78,7 +78,8 @@ TEST_F(PoseRefinerTest, informationIsTheCurvatureAtZeroResiduals) {
   const RigScene scene = make_scene(random, 2, 67, 0.0, 0.3, 0.0, 0.5, &table_);
   problem_.gather(table_.view());
   const Mat6 H = problem_.sums(scene.T_left_world, 1.0, 2.0).H;
-  Mat6 numeric;  // dg/dδ = −H
+  // The derivative dg/dδ is −H.
+  Mat6 numeric;
   const double h = 1e-6;
   for (int i = 0; i < 6; ++i)
     numeric.col(i) =
@@ -107,7 +108,8 @@ TEST_F(PoseRefinerTest, nearOutliersDoNotMoveThePose) {
     ASSERT_TRUE(found.usable && without.usable) << seed;
     const Vec6 apart = step_between(found.T_left_world, without.T_left_world);
     EXPECT_LT(apart.dot(without.information * apart), 1e-4) << seed;
-    EXPECT_NEAR(found.scale, without.scale, 0.01);  // as it is after two steps from two starts
+    // The scales follow from two steps and two starting points.
+    EXPECT_NEAR(found.scale, without.scale, 0.01);
     EXPECT_EQ(found.observations, 306);
 
     PoseRefineOptions one_round{.gross_chi2 = std::numeric_limits<double>::infinity()};
@@ -137,7 +139,8 @@ TEST_F(PoseRefinerTest, informationPredictsTheSpreadOfThePose) {
     EXPECT_LE(std::sqrt(covariance(5, 5)), found.translation_sigma * (1 + 1e-9));
   }
   EXPECT_NEAR(nees, 6.0, 1.2);
-  EXPECT_NEAR(rms, 0.4, 0.02);  // the 1 % beyond the χ² threshold are not in it
+  // The 1 % beyond the χ² threshold is excluded.
+  EXPECT_NEAR(rms, 0.4, 0.02);
 }
 
 TEST_F(PoseRefinerTest, farPointsLeaveThePositionUncertain) {
@@ -187,13 +190,15 @@ TEST_F(PoseRefinerTest, invalidInputHasNoPose) {
   PoseRefiner small(20, small_arena);
   EXPECT_FALSE(small.refine(table_.view(), Transform{}, {}, {}).usable);
 
-  table_.clear();  // all points on one line: the turn about it is free
+  // All points are on one line, so the rotation about it is free.
+  table_.clear();
   for (int i = 0; i < 50; ++i) {
     ASSERT_TRUE(table_.push(Vec3(0.1 * i, 0, 10), 0.3));
     table_.see(0, Vec2(318 + 5.2 * i, 243));
   }
   EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, {}).usable);
-  table_.clear();  // and all behind the camera
+  // All points are behind the camera.
+  table_.clear();
   for (int i = 0; i < 50; ++i) {
     ASSERT_TRUE(table_.push(test::visible_point(random, -9, -2), 0.3));
     table_.see(0, Vec2(318, 243));

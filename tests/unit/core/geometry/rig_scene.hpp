@@ -11,7 +11,8 @@ namespace vergence::test {
 struct RigScene {
   RigCalibration rig;
   Transform T_left_world;
-  std::vector<bool> good;  // by point: all its observations are the true ones with noise
+  // True for points whose observations are the true ones with noise.
+  std::vector<bool> good;
 };
 
 /// A rig of up to four 640×480 cameras, 0.5 m apart and slightly turned.

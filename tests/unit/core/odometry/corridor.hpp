@@ -98,7 +98,8 @@ class Corridor {
   }
   /// The panel's grey value is added where the ray (frame: left camera) meets it.
   [[nodiscard]] bool on_panel(const Vec3& from, const Vec3& ray, double* grey) const {
-    constexpr double kDepth = 2.3, kLeft = -0.9, kRight = 0.7;  // m
+    // All three are in m.
+    constexpr double kDepth = 2.3, kLeft = -0.9, kRight = 0.7;
     if (!panel_ || ray.z() <= 0) return false;
     const Vec3 p = from + (kDepth - from.z()) / ray.z() * ray;
     if (p.x() < kLeft || p.x() > kRight) return false;

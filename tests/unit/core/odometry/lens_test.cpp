@@ -40,7 +40,8 @@ TEST(UndistortedCamera, idealPixelIsThePinholePixelOfTheRay) {
       ASSERT_TRUE(lens.undistort(raw, &ideal, &magnification));
       ASSERT_TRUE(lens.ideal().unproject(ideal, &ray));
       ASSERT_EQ(lens.raw().project(ray, &back, nullptr), ProjectStatus::ok);
-      EXPECT_LT((back - raw).norm(), 1e-8);  // Newton of unproject() ends there
+      // Newton's method in unproject() ends at this accuracy.
+      EXPECT_LT((back - raw).norm(), 1e-8);
     }
   }
 }
@@ -51,8 +52,8 @@ TEST(UndistortedCamera, derivativesMatchFiniteDifferences) {
     Random random(4);
     for (int i = 0; i < 100; ++i) {
       const Vec2 raw(random.uniform(20, 732), random.uniform(20, 460));
-      constexpr double kStep =
-          1e-3;  // px: the third derivative leaves 1e-6 of that, Newton's end 1e-8 / step
+      // Step in px. The third derivative leaves 1e-6 of it, Newton's end 1e-8 / step.
+      constexpr double kStep = 1e-3;
       Vec3 ray;
       Mat2 J, ideal_by_raw, ray_by_raw;
       ASSERT_TRUE(lens.ray_jacobian(raw, &ray, &J));
@@ -92,8 +93,8 @@ TEST(UndistortedCamera, undistortedLensMovesNothing) {
 
 TEST(UndistortedCamera, pixelBeyondTheFoldIsRefused) {
   Intrinsics k = wide_lens(CameraModelKind::pinhole_radtan);
-  k.distortion = {-0.5, 0, 0, 0,
-                  0};  // folds at r² = 2/3: no ray is seen further out than 0.54 · 458 px
+  // The lens folds at r² = 2/3, so no ray is seen beyond 0.54 · 458 px.
+  k.distortion = {-0.5, 0, 0, 0, 0};
   const UndistortedCamera lens(k);
   Vec2 ideal(1, 2);
   Vec3 ray;

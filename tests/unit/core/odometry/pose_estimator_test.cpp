@@ -25,7 +25,8 @@ struct Scene {
   Map map;
   Random random{17};
   Transform T_left_world{exp_so3({0.3, -0.2, 0.1}), {1, -2, 3}};
-  std::array<Transform, kMaxCameras> T_camera_left{};  // true; the rig's may be another
+  // The true transforms, which may differ from the rig's.
+  std::array<Transform, kMaxCameras> T_camera_left{};
 
   explicit Scene(int cameras = 2)
       : arena(Map::memory_needed() + PoseEstimator::memory_needed()), map(10, arena) {

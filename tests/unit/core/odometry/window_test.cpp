@@ -106,7 +106,8 @@ TEST(WindowAdjuster, exactObservationsRestoreThePoses) {
   const int before = b.observations();
   const WindowOutcome out = b.adjuster.adjust(b.map);
   EXPECT_LT(b.worst_pose_error(), 1e-6);
-  EXPECT_LT(out.rms_px, 1e-4);  // what rounding to floats leaves
+  // Rounding to floats leaves this much.
+  EXPECT_LT(out.rms_px, 1e-4);
   EXPECT_GT(out.points, 100);
   EXPECT_EQ(out.dropped, 0);
   EXPECT_EQ(b.observations(), before);
@@ -183,7 +184,8 @@ double turn_left(const Bend& b) {
       .norm();
 }
 
-constexpr double kTurned = 2e-3;  // rad: a disparity of 1 px
+// The rotation in rad is a disparity of 1 px.
+constexpr double kTurned = 2e-3;
 
 TEST(WindowAdjuster, extrinsicRotationErrorIsEstimated) {
   Bend b;

@@ -93,8 +93,10 @@ struct Bench {
 
   std::unique_ptr<mock::MockRig> rig;
   std::vector<std::unique_ptr<WatchedCamera>> watched;
-  std::vector<Duration> times;                  // of all pulses
-  std::vector<std::array<int, 2>> pulses_of{};  // of every set that came, by camera; −1: none
+  // Times of all pulses.
+  std::vector<Duration> times;
+  // Pulse of every received set per camera; −1 if there is none.
+  std::vector<std::array<int, 2>> pulses_of{};
   std::unique_ptr<Acquisition> source;
 };
 
@@ -171,7 +173,8 @@ TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
   options.sync.mode = SyncMode::approximate_time;
   Acquisition source({&left, &right}, nullptr, &board, options);
   ASSERT_FALSE(source.start());
-  constexpr int kTwiceAgain = 3;  // starts
+  // Number of starts.
+  constexpr int kTwiceAgain = 3;
   while (left.starts < kTwiceAgain || right.starts < kTwiceAgain || board.starts < kTwiceAgain) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     source.wake();
@@ -248,9 +251,11 @@ TEST(Acquisition, pulsesVerifyEveryPairWithinASecond) {
 struct LossCase {
   const char* name;
   std::vector<std::string> faults;
-  int acquisitions;  // verified, in all
+  // Number of verified pairings in total.
+  int acquisitions;
   DeviceEvent::Kind kind;
-  int items;  // of that kind
+  // Number of events of this kind.
+  int items;
 };
 class AcquisitionByPulses : public ::testing::TestWithParam<LossCase> {};
 

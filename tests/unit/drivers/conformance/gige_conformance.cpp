@@ -53,9 +53,8 @@ class GigeConformance final : public ConformanceRig {
     return true;
   }
   void replug() override { simulator_.replug(); }
-  Duration gone_within() const override {
-    return Duration::seconds(25);
-  }  // two unanswered calls and the longest pause
+  // The limit covers two unanswered calls and the longest pause.
+  Duration gone_within() const override { return Duration::seconds(25); }
   bool lose(int exposures) override {
     simulator_.lose_frames(exposures);
     return true;

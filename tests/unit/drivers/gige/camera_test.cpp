@@ -201,7 +201,8 @@ TEST(GigeCamera, packetSizeAndDelayFitTheLink) {
 
 TEST(GigeCamera, receiveBufferPrecedesTheFirstPacket) {
   GigeBench b;
-  for (const int kib : {64, 150}) {  // below what any system allows
+  // The sizes are below the limit of any system.
+  for (const int kib : {64, 150}) {
     CameraConfiguration c = b.wish();
     test::give<gige::Options>(&c, "socket_buffer_kb", std::to_string(kib));
     b.configure(c);

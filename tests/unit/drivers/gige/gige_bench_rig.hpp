@@ -73,7 +73,8 @@ struct GigeBench {
 
   std::unique_ptr<GigeCamera> simulator;
   std::unique_ptr<CameraDevice> camera;
-  std::vector<std::uint64_t> numbers;  // of the complete frames taken
+  // Numbers of the complete frames.
+  std::vector<std::uint64_t> numbers;
 };
 
 }  // namespace vergence::test

@@ -8,7 +8,8 @@ namespace {
 
 using namespace iidc;
 constexpr std::uint64_t kCommand = kRegisterSpace + 0xF00000, kFormat7 = kRegisterSpace + 0xF08000;
-constexpr Duration kSlack = Duration::milliseconds(300);  // of a busy machine
+// Slack for a busy machine.
+constexpr Duration kSlack = Duration::milliseconds(300);
 
 using IidcFaults = WithCamera;
 
@@ -80,7 +81,8 @@ TEST_F(IidcFaults, unpluggedCameraReturnsAsConfigured) {
   c.start();
   c.bus->expose(2);
   c.bus->unplug();
-  c.bus->expose(1);  // nothing follows
+  // The frame is not delivered.
+  c.bus->expose(1);
   EXPECT_EQ(c.take_and_release().counter, 0U);
   const Frame held = c.take();
   Frame f;
@@ -137,7 +139,8 @@ TEST_F(IidcFaults, silentCameraRestartsWhileAnImageIsHeld) {
   const std::uint8_t seen = c.camera->view(held.slot).at(0, 1);
   Frame f;
   DeviceStatus status = DeviceStatus::timeout;
-  for (int i = 0; i < 300 && status == DeviceStatus::timeout; ++i)  // 30 s at most
+  // The loop takes 30 s at most.
+  for (int i = 0; i < 300 && status == DeviceStatus::timeout; ++i)
     status = c.camera->wait(Duration::milliseconds(100), &f);
   ASSERT_EQ(status, DeviceStatus::disconnected);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->last_error();
@@ -169,7 +172,8 @@ TEST_F(IidcFaults, restartedCounterIsFollowedAfterTwoFrames) {
   c.start();
   c.bus->expose(5);
   for (int i = 0; i < 5; ++i) (void)c.take_and_release();
-  c.bus->model().frames_made = 0;  // the camera rebooted by itself
+  // The camera rebooted.
+  c.bus->model().frames_made = 0;
   c.bus->expose(3);
   EXPECT_EQ(c.take_and_release().counter, 5U);
   EXPECT_EQ(c.take_and_release().counter, 6U);

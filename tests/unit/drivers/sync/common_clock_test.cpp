@@ -23,7 +23,8 @@ TEST_P(CommonClock, pairsAreFormedByItsStampsAlone) {
   RigSynchronizer sync(rig_options(GetParam()));
   RigSets out;
   Random random(3);
-  for (int n = 0; n < 6000; ++n) {  // four minutes: the bus's clock wraps once
+  // During four minutes the bus's clock wraps once.
+  for (int n = 0; n < 6000; ++n) {
     const DeviceStamp t(50'000'000'000 + (kRigInterval * n).ns());
     // Counters mean nothing, and the host's stamps are off by nearly half an interval.
     for (int k = 0; k < 2; ++k) {

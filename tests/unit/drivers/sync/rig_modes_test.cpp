@@ -41,14 +41,16 @@ TEST(RigModes, syncOutIsVerifiedByAnInitialPause) {
       EXPECT_FALSE(asked);
       asked = true;
       while (sample % 4 != 0) ++sample;
-      t = t + Duration::microseconds(313'700);  // GoToConfig, GoToMeasurement
+      // The pause is GoToConfig and GoToMeasurement.
+      t = t + Duration::microseconds(313'700);
       pulses.restart();
     }
     const bool pulsed = sample % 4 == 0;
     InsReading r{.measured = DeviceStamp(t.ns() + 123'456'789),
                  .arrival = t + Duration::milliseconds(4)};
     r.quality.sync_out = pulsed;
-    if (sample % 97 != 0 || sample < 8) {  // some readings are lost
+    // Some samples are lost.
+    if (sample % 97 != 0 || sample < 8) {
       if (const auto p = pulses.reading(r, {t, Duration::microseconds(200)})) {
         EXPECT_TRUE(pulsed) << sample;
         sync.pulse(*p);
@@ -111,7 +113,8 @@ struct MasterRig {
     time = time + Duration::microseconds(233'400);
     sync.absent(0);
     sync.restarted(0);
-    counters[0] = static_cast<std::uint64_t>(-1);  // the pulse under way counts it to 0
+    // The pulse in progress increments the counter to 0.
+    counters[0] = static_cast<std::uint64_t>(-1);
     out.drain(&sync);
   }
 

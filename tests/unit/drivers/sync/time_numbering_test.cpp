@@ -5,7 +5,8 @@
 namespace vergence {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;  // ns
+// One millisecond in ns.
+constexpr std::int64_t kMs = 1'000'000;
 
 SyncOptions options(SyncMode mode) {
   SyncOptions o{

@@ -77,9 +77,10 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
   const auto all = rig.drive(requested);
   ASSERT_GT(all.size(), 500U);
   expect_gapless(all);
+  // The tolerance is one tick.
   const auto near_us = [](Duration d, std::int64_t us) {
     return std::abs(d.ns() - us * 1000) <= 1000;
-  };  // a tick
+  };
   for (const Pulse& p : all) {
     ASSERT_TRUE(p.exposure[0].seen);
     ASSERT_TRUE(near_us(p.exposure[0].start, 35) && near_us(p.exposure[0].end, 8035)) << p.number;
@@ -115,8 +116,8 @@ TEST(Board, pauseIsAGapWithoutLoss) {
 
 TEST(Board, rebootGivesANewBootAndResumes) {
   test::BoardSimulatorOptions board = board_for(Duration::seconds(40));
-  for (int i = 0; i < 20; ++i)
-    board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
+  // The restart hits any byte of any frame.
+  for (int i = 0; i < 20; ++i) board.reboots.push_back(at_s(10 + i + 0.000'137 * i));
   BoardRig rig(board, direct_line());
   const auto all = rig.drive();
   EXPECT_EQ(rig.disconnects, 0) << "it answers all the while";
@@ -206,7 +207,8 @@ TEST(Board, otherBoardOnThePortIsRefused) {
                [&](HostStamp at, std::vector<std::uint8_t>* bytes) {
                  TriggerFrame f = opened(*bytes);
                  if (at <= at_s(10) || at >= at_s(20) || f.type != trigger_info) return;
-                 f.payload[27] ^= 1U;  // of the serial number
+                 // The byte is part of the serial number.
+                 f.payload[27] ^= 1U;
                  *bytes = closed(f);
                });
   const auto all = rig.drive();

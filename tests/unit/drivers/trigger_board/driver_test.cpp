@@ -10,14 +10,16 @@ namespace {
 struct Machine {
   struct Port {
     SerialPortInfo info;
-    std::shared_ptr<test::DeviceModel> device;  // null: it does not open
+    // Null if the port does not open.
+    std::shared_ptr<test::DeviceModel> device;
   };
   std::vector<Port> ports;
 
   void add_board(const char* port, std::uint8_t last_of_serial) {
     test::BoardSimulatorOptions o;
     o.serial[11] = last_of_serial;
-    o.baud = 115200;  // a board's own USB takes every rate; this one the first
+    // A board's own USB supports every rate; this one supports the first only.
+    o.baud = 115200;
     ports.push_back({{port, "", 0x0483, 0x5740, "", {}},
                      std::make_shared<test::BoardSimulator>(test::PulseSource{}, o)});
   }

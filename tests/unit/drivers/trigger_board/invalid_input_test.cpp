@@ -37,13 +37,16 @@ void set_back(Bytes* bytes, std::uint64_t ticks) {
 
 /// Result of half a minute with tampered frames, from the fifth second on.
 struct Outcome {
-  std::uint64_t tampered = 0, events = 0;  // frames in all, and those of them that are EVENTs
+  // Number of tampered frames and of EVENTs among them.
+  std::uint64_t tampered = 0, events = 0;
   TriggerStatistics statistics;
 };
 struct Way {
   const char* name;
-  double share;      // of the frames
-  bool events_only;  // of them EVENTs alone
+  // Share of frames that are tampered with.
+  double share;
+  // True if only EVENTs are tampered with.
+  bool events_only;
   void (*tamper)(Random*, Bytes*);
   void (*check)(const Outcome&);
 };
@@ -177,9 +180,11 @@ Talker::Answer answering(std::function<TriggerFrame(const TriggerFrame&)> answer
 struct Stranger {
   const char* name;
   DeviceStatus status;
-  std::vector<std::string> words;  // of the error
+  // Words that the error contains.
+  std::vector<std::string> words;
   std::string mentions;
-  std::optional<TriggerFrame> answers{};  // to every frame
+  // Answer to every frame.
+  std::optional<TriggerFrame> answers{};
 };
 struct Strangers : ::testing::TestWithParam<Stranger> {};
 

@@ -51,8 +51,8 @@ struct BoardRig {
     device = std::make_unique<trigger_board::Device>(std::move(owned), options);
   }
 
-  std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp>
-      edges;  // by boot and number; of the device's thread while it runs
+  // Edges by boot and number; used by the device's thread while it runs.
+  std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp> edges;
   PulseSource exposures;
   std::shared_ptr<BoardSimulator> simulator;
   std::shared_ptr<Tampered> between;

@@ -65,7 +65,8 @@ TEST_P(BothGenerations, isFoundConfiguredAndReadInEnu) {
     ASSERT_EQ(all[i].quality.utc_ns, sensor.unix_ns_at_power_on + times[i + skipped]);
   }
   EXPECT_EQ(all.back().quality.filter_valid, true);
-  if (!legacy()) {  // the receiver's word comes along at this rate and baud
+  // The receiver's data fit this rate and baud rate.
+  if (!legacy()) {
     EXPECT_EQ(all.back().quality.satellites, 11);
     EXPECT_NEAR(all.back().sample.position_sigma, 1.5, 1e-3);
     EXPECT_NEAR(all.back().sample.height_sigma, 3, 1e-3);
@@ -176,7 +177,8 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
 TEST_P(BothGenerations, otherBaudRateIsFoundAndChanged) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 30);
   sensor.baud = 57600;
-  sensor.layout = {0x0004, 0x001};  // what that rate carries
+  // The baud rate can carry this layout.
+  sensor.layout = {0x0004, 0x001};
   Options options;
   options.baud = 460800;
   XsensRig rig(sensor, {}, options);
@@ -248,7 +250,8 @@ struct Timing {
   Generation generation;
   double rate;
   std::uint32_t baud;
-  int latency_ms;  // 0: no converter
+  // 0 if there is no converter.
+  int latency_ms;
 };
 
 class Stamps : public ::testing::TestWithParam<Timing> {};

@@ -41,7 +41,8 @@ TEST(Commands, bytesAreThoseDocumented) {
 }
 
 TEST(Commands, legacySyncOutHoldsOneParameterPerMessage) {
-  constexpr std::uint32_t kMillisecond = 29491;  // of the 29.4912 MHz clock
+  // One millisecond of the 29.4912 MHz clock.
+  constexpr std::uint32_t kMillisecond = 29491;
   EXPECT_EQ(kMillisecond, static_cast<std::uint32_t>(kLegacySyncClock * 1e-3));
   const auto message = [](LegacySync p, std::uint32_t v) {
     return frame(MessageId::legacy_sync_out, legacy_sync(p, v));
@@ -177,8 +178,10 @@ TEST(LineBudget, legacyLayoutsHaveTheTabulatedLoad) {
     std::uint16_t mode;
     std::uint32_t settings;
     std::size_t bytes;
-    double percent;  // at 115200 and 120 Hz
-    double ms;       // on the wire
+    // Load in percent at 115200 baud and 120 Hz.
+    double percent;
+    // Time on the wire in ms.
+    double ms;
   };
   for (const Row& r : {Row{0x0834, 0x001, 48, 50, 4.17},
                        {0x0834, 0x201, 68, 71, 5.90},

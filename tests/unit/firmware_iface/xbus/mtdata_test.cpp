@@ -23,7 +23,8 @@ Mtdata decoded(const Bytes& frame_bytes, const MtdataLayout& layout) {
   return out;
 }
 
-constexpr double kQuarter = 0.70710678118654752;  // cos 45°
+// The cosine of 45°.
+constexpr double kQuarter = 0.70710678118654752;
 
 void expect_place(const Mtdata& m, double tolerance_deg) {
   ASSERT_TRUE(m.latitude_longitude_deg && m.altitude_m);
@@ -49,7 +50,8 @@ TEST(Mtdata, floatFieldsAreDecoded) {
                        "3B"),
               {0x0836, 0x001});
   expect_attitude(m, 1e-7);
-  expect_place(m, 1.4e-5);  // half a step of a float at 153
+  // The tolerance is half a step of a float at 153.
+  expect_place(m, 1.4e-5);
   EXPECT_EQ(m.velocity, (Three{10.5, -0.125, 0.0625}));
   EXPECT_EQ(m.frame, LocalFrame::nwu);
   EXPECT_EQ(m.status, 7);

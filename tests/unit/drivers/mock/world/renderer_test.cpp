@@ -101,7 +101,8 @@ TEST(Renderer, edgesLieWhereTheLensModelPutsThem) {
     const Camera camera(lens(distorted));
     Renderer renderer(scene.world(), camera);
     for (double shift = 0; shift < 0.03;
-         shift += 0.0041) {  // a pixel at 6 m is 0.02 m: every sub-pixel phase
+         // A pixel at 6 m is 0.02 m, so the shifts cover every sub-pixel phase.
+         shift += 0.0041) {
       const Transform T_camera_enu = looking_north({shift, 0, 0});
       const RenderedImage p = take(&renderer, T_camera_enu, clean());
       const double dark = p.at(2, 120), bright = p.at(160, 120);
@@ -125,9 +126,11 @@ TEST(Renderer, edgesLieWhereTheLensModelPutsThem) {
 
 TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   Plates scene;
-  const double width = 0.3 * 8.0 / 290;  // 0.3 px at 8 m
+  // The width is 0.3 px at 8 m.
+  const double width = 0.3 * 8.0 / 290;
   scene.plate(0, width, -3, 3, 8.0, 1);
-  scene.plate(-2, -0.5, -3, 3, 8.0, 1);  // wide, for the brightness of its like
+  // The wide plate gives the brightness.
+  scene.plate(-2, -0.5, -3, 3, 8.0, 1);
   Renderer renderer(scene.world(), Camera(lens(false)));
   for (double shift = 0; shift < 0.03; shift += 0.0037) {
     const RenderedImage p = take(&renderer, looking_north({shift, 0, 0}), clean());
@@ -135,7 +138,8 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
     ASSERT_GT(step, 150);
     double sum = 0;
     for (int x = 150; x < 180; ++x) sum += p.at(x, 120) - p.at(2, 120);
-    EXPECT_NEAR(sum, 0.3 * step, 2.0) << shift;  // three pixels and the step are rounded
+    // Three pixels and the step are rounded.
+    EXPECT_NEAR(sum, 0.3 * step, 2.0) << shift;
   }
 }
 
@@ -159,8 +163,8 @@ TEST(Renderer, noiseHasTheStatedVarianceAndSeed) {
     difference2 += std::pow(a.pixels[i] - b.pixels[i], 2) / n;
     product += (a.pixels[i] - mean) * (b.pixels[i] - mean) / n;
   }
-  const double variance = shot.shot_noise * mean + shot.read_noise * shot.read_noise +
-                          1.0 / 12;  // the last from rounding
+  // The last term is the variance of rounding.
+  const double variance = shot.shot_noise * mean + shot.read_noise * shot.read_noise + 1.0 / 12;
   // Standard errors over n pixels: of a variance √(2/n), of a product √(1/n) of the variance; four
   // of them.
   EXPECT_NEAR(0.5 * difference2, variance, 4 * std::sqrt(2 / n) * variance + 0.01 * variance);

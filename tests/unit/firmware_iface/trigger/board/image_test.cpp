@@ -47,7 +47,8 @@ class QemuBoard {
       ::_exit(127);
     }
     ::close(ends[1]);
-    (void)wait(trigger_status);  // it listens now
+    // The image now listens.
+    (void)wait(trigger_status);
   }
   ~QemuBoard() {
     ::kill(pid_, SIGKILL);
