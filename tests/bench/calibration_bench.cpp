@@ -15,7 +15,6 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
-#include <filesystem>
 #include <functional>
 #include <span>
 #include <string>

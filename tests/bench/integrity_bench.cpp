@@ -7,9 +7,7 @@
 // poses whose 20 frames, or as many as there were since the last pose that was not `ok`, are; "over
 // 20" says how many there are when poses before that count, too, although they were told as
 // `degraded`.
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdlib>
 #include <numbers>
 #include <string>

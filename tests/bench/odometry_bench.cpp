@@ -28,7 +28,6 @@
 #include "app/runtime/version.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace {

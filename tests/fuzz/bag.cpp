@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "app/datasets/detail/bag_images.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/bag_in_memory.hpp"
 

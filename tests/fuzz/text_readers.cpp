@@ -2,7 +2,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <string_view>
 
 #include "app/datasets/times_file.hpp"
 #include "app/datasets/trajectory_files.hpp"

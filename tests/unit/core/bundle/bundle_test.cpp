@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/bundle/bundle_fixture.hpp"
 
 namespace vergence {
@@ -179,14 +179,11 @@ TEST(Bundle, solveAllocatesNothing) {
   o.loss = BundleLoss::cauchy;
   BundleOptions odometry{.pose_covariance = true};
   const BundleProblem p = rig.problem();
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   BundleResult first, second;
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     first = own.adjuster.solve(p, o);
     second = own.adjuster.solve(p, odometry);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   EXPECT_TRUE(first.has_covariance);
   EXPECT_TRUE(second.has_pose_covariance);
 }

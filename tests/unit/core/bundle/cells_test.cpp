@@ -2,9 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
-#include <string>
 
 #include "tests/unit/core/bundle/bundle_fixture.hpp"
 

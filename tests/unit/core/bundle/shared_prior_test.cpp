@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "tests/unit/core/bundle/bundle_fixture.hpp"
 

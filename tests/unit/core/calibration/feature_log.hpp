@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <memory>
 
 #include "core/calibration/rig_solver.hpp"
 #include "core/math/random.hpp"

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "core/math/so3.hpp"
 
 namespace vergence::calibration {

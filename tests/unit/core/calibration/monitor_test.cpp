@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/calibration/monitor_trial.hpp"
 
 namespace vergence::test {
@@ -210,12 +210,7 @@ TEST(Monitor, evaluationAllocatesNothing) {
   MonitorTrial trial(o);
   // The vectors of the trial grow in the first frames.
   for (int i = 0; i < 80; ++i) (void)trial.step();
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    (void)trial.monitor().update(trial.frame());
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  expect_no_allocations([&] { (void)trial.monitor().update(trial.frame()); });
 }
 
 TEST(Monitor, invalidReferenceOrOptionsAreRefused) {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/calibration/feature_log.hpp"
 
 namespace vergence::test {
@@ -287,12 +287,8 @@ TEST(RigSolver, solveUsesTheArenaAndNoHeap) {
   EXPECT_LE(s.arena.used(), s.arena.capacity());
   FeatureDrive d(drive);
   log_drive(d, 30, kRough, s.solver.log());
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    EXPECT_EQ(s.solver.solve(rig_of(drive)).status, RigSolveStatus::ok);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  expect_no_allocations(
+      [&] { EXPECT_EQ(s.solver.solve(rig_of(drive)).status, RigSolveStatus::ok); });
 }
 
 }  // namespace

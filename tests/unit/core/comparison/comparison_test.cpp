@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 
 namespace vergence {
 namespace {
@@ -447,10 +447,8 @@ TEST(Comparison, insClockSetBackIsAcceptedAfterASecond) {
 
 TEST(Comparison, hourAt120HzAllocatesNothing) {
   Bench b;
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::uint64_t out = 0;
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     ComparedPose c;
     for (int i = 0; i < 3600 * 120; ++i) {
       const double t = i / 120.0;
@@ -460,8 +458,7 @@ TEST(Comparison, hourAt120HzAllocatesNothing) {
     }
     b.comparison.finish();
     while (b.comparison.next(&c)) ++out;
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   EXPECT_EQ(out, 108000U);
   EXPECT_GT(b.comparison.counters().compared, 107000U);
 }

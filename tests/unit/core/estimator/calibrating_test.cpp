@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/estimator/estimator.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/math/random.hpp"
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence {
@@ -250,12 +250,9 @@ TEST(Estimator, tooSmallArenaIsRefused) {
 TEST(Estimator, processingUsesTheArenaAndNoHeap) {
   Standing s;
   EXPECT_LE(s.arena.used(), s.arena.capacity());
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     for (int i = 0; i < 6; ++i) (void)s.give(i);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <optional>
-#include <string>
 
 #include "core/estimator/estimator.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tests/unit/core/calibration/feature_log.hpp"
 
 namespace vergence {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/features/detail/corner_kernel.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {

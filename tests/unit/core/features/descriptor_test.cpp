@@ -4,7 +4,6 @@
 
 #include <numbers>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {

@@ -4,7 +4,6 @@
 
 #include <functional>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {

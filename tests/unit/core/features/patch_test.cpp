@@ -3,10 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <memory>
 #include <numbers>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {

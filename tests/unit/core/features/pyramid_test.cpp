@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
@@ -75,12 +75,7 @@ TEST(Pyramid, buildUsesTheArenaAndNoHeap) {
   Arena arena(Pyramid::memory_needed(640, 480, 4));
   Pyramid pyramid(640, 480, 4, arena);
   EXPECT_LE(arena.used(), arena.capacity());
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    pyramid.build(image.view());
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  vergence::test::expect_no_allocations([&] { pyramid.build(image.view()); });
 }
 
 }  // namespace

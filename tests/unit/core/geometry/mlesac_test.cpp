@@ -2,10 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <limits>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/geometry/rig_scene.hpp"
 
 namespace vergence {

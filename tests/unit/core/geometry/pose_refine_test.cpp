@@ -2,10 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <limits>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/geometry/rig_scene.hpp"
 
 namespace vergence {

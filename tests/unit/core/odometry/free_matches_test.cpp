@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "core/memory/allocation_guard.hpp"
 #include "core/odometry/front_end.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::odometry {
@@ -45,14 +45,11 @@ TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
   RigFrame frame{.cameras = 2};
   frame.images[0] = left.view();
   frame.images[1] = right.view();
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::span<const FreeMatch> matches;
-  {
-    const SealedScope sealed;
+  vergence::test::expect_no_allocations([&] {
     (void)front.begin(frame);
     matches = front.match_free(1);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   ASSERT_GE(matches.size(), 30U);
   std::size_t right_ones = 0;
   // Three sigmas of a corner's place: both are the same pixels but for the rounding of grey values.

@@ -6,8 +6,8 @@
 
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "core/odometry/undistorted_camera.hpp"
+#include "tests/support/no_allocations.hpp"
 
 namespace vergence::odometry {
 namespace {
@@ -222,12 +222,7 @@ TEST(WindowAdjuster, certainCalibrationIsKeptFixed) {
 TEST(WindowAdjuster, adjustmentAllocatesNothing) {
   Bend b;
   b.disturb();
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    (void)b.adjuster.adjust(b.map);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  vergence::test::expect_no_allocations([&] { (void)b.adjuster.adjust(b.map); });
 }
 
 }  // namespace

@@ -6,8 +6,6 @@
 #include <cstdint>
 #include <deque>
 #include <set>
-#include <thread>
-#include <vector>
 
 #include "tests/support/idle_camera.hpp"
 

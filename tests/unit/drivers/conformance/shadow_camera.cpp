@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <time.h>
 
-#include <algorithm>
 #include <chrono>
 #include <thread>
 

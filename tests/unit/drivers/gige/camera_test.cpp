@@ -1,7 +1,6 @@
 #include <sys/socket.h>
 
 #include <bit>
-#include <cmath>
 
 #include "drivers/gige/detail/link.hpp"
 #include "tests/support/camera_options.hpp"

@@ -1,8 +1,6 @@
 #include <arv.h>
 #include <gtest/gtest.h>
 
-#include <memory>
-
 #include "drivers/gige/detail/glib.hpp"
 #include "drivers/gige/gige.hpp"
 #include "tests/support/camera_options.hpp"

@@ -4,12 +4,10 @@
 #include <chrono>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "drivers/gige/gige.hpp"
 #include "tests/support/gige_camera.hpp"
-#include "tests/support/gvsp_sender.hpp"
 
 namespace vergence::test {
 

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <set>
 
 #include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"

@@ -1,15 +1,12 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
-#include <string>
 #include <vector>
 
 #include "drivers/gige/detail/frame_receiver.hpp"
 #include "drivers/gige/detail/grey.hpp"
 #include "drivers/gige/detail/link.hpp"
 #include "drivers/gige/detail/slot_returns.hpp"
-#include "drivers/gige/gige.hpp"
 
 namespace vergence::gige {
 namespace {

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +9,7 @@
 #include "drivers/sync/rig_synchronizer.hpp"
 #include "drivers/sync/sync_out_pulses.hpp"
 #include "firmware_iface/trigger/trigger.h"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/drivers/sync/rig_frames.hpp"
 
 /// The modes with other pulses than a board's: the INS's, those of one camera that triggers the
@@ -249,11 +248,9 @@ TEST(RigModes, synchronisationAllocatesNothing) {
     GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   RigSynchronizer sync(rig_options(SyncMode::board));
   ClockMapper clock{ClockMapperOptions{}};
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   HostStamp t(80'000'000'000);
   std::uint64_t sets = 0;
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     for (std::uint64_t n = 0; n < 500; ++n) {
       clock.ping(t, DeviceStamp(t.ns() + 1000), DeviceStamp(t.ns() + 2000),
                  t + Duration::microseconds(3));
@@ -268,8 +265,7 @@ TEST(RigModes, synchronisationAllocatesNothing) {
       (void)sync.wants_pause();
       t = t + varied(n);
     }
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   EXPECT_GT(sets, 400U);
 }
 

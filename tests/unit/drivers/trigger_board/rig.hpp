@@ -1,8 +1,6 @@
 #pragma once
-#include <algorithm>
 #include <map>
 #include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
-#include <array>
 #include <vector>
 
 #include "core/math/random.hpp"

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <string_view>
-#include <vector>
 
 #include "tests/unit/firmware_iface/iidc/rom_vector.hpp"
 

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/support/gnss_bytes.hpp"
 
 namespace vergence::ubx {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
-#include <string>
 
 #include "tests/unit/firmware_iface/xbus/hex.hpp"
 

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "firmware_iface/xbus/bytes.hpp"
 #include "firmware_iface/xbus/frame.hpp"

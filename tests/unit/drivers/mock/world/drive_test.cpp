@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "drivers/mock/world/detail/scene.hpp"
 

@@ -4,7 +4,6 @@
 #include <hwy/targets.h>
 
 #include <cmath>
-#include <stdexcept>
 #include <vector>
 
 #include "drivers/mock/world/detail/town.hpp"
