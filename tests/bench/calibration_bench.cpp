@@ -37,14 +37,9 @@
 namespace vergence::bench {
 namespace {
 
-using app::StartingCalibration;
-using app::StereoSequence;
-using calibration::RigSolution;
-using calibration::SegmentSolver;
-using test::drive_recorded;
-using test::DriveOutcome;
-using test::RecordedSequence;
-using test::with_right_turned;
+using namespace app;
+using namespace calibration;
+using namespace test;
 
 void print(const std::string& drive_name, const std::string& what, const DriveOutcome& r) {
   fmt::print(

@@ -38,10 +38,8 @@
 namespace vergence::bench {
 namespace {
 
-using app::StartingCalibration;
-using app::StereoSequence;
-using test::DriveOutcome;
-using test::RecordedSequence;
+using namespace app;
+using namespace test;
 
 struct Bench {
   app::Configuration online, off;

@@ -11,10 +11,8 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
-#include "app/runtime/errors.hpp"
+#include "tests/fuzz/input_errors.hpp"
 #include "tests/fuzz/scratch_folder.hpp"
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace {
 
@@ -60,13 +58,7 @@ const std::vector<Layout>& layouts() {
   return all;
 }
 
-template <class Read>
-void probe(const Read& read) {
-  try {
-    read();
-  } catch (const InputError&) {
-  }
-}
+using test::probe;
 
 void check(const StereoSequence& s) {
   if (s.calibration.cameras < 2) std::abort();

@@ -8,8 +8,6 @@
 
 #include "firmware_iface/iidc/config_rom.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence::iidc;
   // The exact size lets ASan find a read beyond the last byte.

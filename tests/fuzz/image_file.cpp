@@ -7,8 +7,6 @@
 
 #include "app/datasets/image_file.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence::app;
   constexpr std::size_t kMaxPixels = 1U << 20;

@@ -2,20 +2,15 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <span>
 
 #include "firmware_iface/xbus/xbus.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace vergence::xbus {
 namespace {
 
-void require(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "xbus: %s\n", what);
-  std::abort();
-}
+using test::require;
 
 /// Reading and writing a layout gives the same bytes: no field is lost, shifted or made up.
 void probe_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout) {

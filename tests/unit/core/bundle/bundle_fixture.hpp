@@ -12,6 +12,15 @@ struct OwnAdjuster {
   BundleAdjuster adjuster;
 };
 
+/// A simulated rig and an adjuster with room for it.
+struct Simulated {
+  explicit Simulated(std::uint64_t seed, const SimulationOptions& s = {})
+      : own(capacities_for(s)), random(seed), rig(simulate_rig(s, random)) {}
+  OwnAdjuster own;
+  Random random;
+  SimulatedRig rig;
+};
+
 inline BundleOptions calibration_options() {
   return {.configuration = BundleConfiguration::stereo_calibration};
 }

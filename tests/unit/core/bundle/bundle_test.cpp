@@ -68,17 +68,14 @@ TEST(Bundle, monocularPosesAreExactUpToScale) {
 }
 
 TEST(Bundle, robustLossesSuppressOutliers) {
-  SimulationOptions s{.noise = 0.1};
-  Random random(17);
-  const SimulatedRig original = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
+  Simulated s(17, {.noise = 0.1});
   const auto error_with = [&](BundleLoss loss) {
-    SimulatedRig rig = original;
+    SimulatedRig rig = s.rig;
     // Two percent of the observations are wrong by 200 sigmas.
     for (std::size_t i = 0; i < rig.observations.size(); i += 50) rig.observations[i].x += 20;
     BundleOptions o = calibration_options();
     o.loss = loss;
-    const BundleResult r = own.adjuster.solve(rig.problem(), o);
+    const BundleResult r = s.own.adjuster.solve(rig.problem(), o);
     EXPECT_TRUE(r.usable());
     return rotation_error(rig, 1);
   };
@@ -88,16 +85,13 @@ TEST(Bundle, robustLossesSuppressOutliers) {
 }
 
 TEST(Bundle, squaredResidualsAreWhitened) {
-  SimulationOptions s;
-  // The number is not a multiple of the batch.
-  s.points = 37;
-  Random random(18);
-  SimulatedRig rig = simulate_rig(s, random);
+  // The number of points is not a multiple of the batch.
+  Simulated s(18, {.points = 37});
+  SimulatedRig& rig = s.rig;
   std::vector<float> squared(rig.observations.size());
   BundleProblem p = rig.problem();
   p.squared_residuals = squared;
-  OwnAdjuster own(capacities_for(s));
-  ASSERT_TRUE(own.adjuster.solve(p, calibration_options()).converged());
+  ASSERT_TRUE(s.own.adjuster.solve(p, calibration_options()).converged());
   for (std::size_t i = 0; i < squared.size(); ++i) {
     const BundleObservation& o = rig.observations[i];
     Vec2 pixel;
@@ -112,9 +106,8 @@ TEST(Bundle, squaredResidualsAreWhitened) {
 }
 
 TEST(Bundle, constantPosesAndPointsAreUnchanged) {
-  SimulationOptions s;
-  Random random(19);
-  SimulatedRig rig = simulate_rig(s, random);
+  Simulated s(19);
+  SimulatedRig& rig = s.rig;
   const SimulatedRig before = rig;
   std::vector<std::uint8_t> pose_constant(10, 0), point_constant(100, 0);
   pose_constant[0] = pose_constant[4] = 1;
@@ -122,8 +115,7 @@ TEST(Bundle, constantPosesAndPointsAreUnchanged) {
   BundleProblem p = rig.problem();
   p.pose_constant = pose_constant;
   p.point_constant = point_constant;
-  OwnAdjuster own(capacities_for(s));
-  ASSERT_TRUE(own.adjuster.solve(p, calibration_options()).usable());
+  ASSERT_TRUE(s.own.adjuster.solve(p, calibration_options()).usable());
   EXPECT_EQ(rig.T_left_world[4].t, before.T_left_world[4].t);
   EXPECT_EQ(rig.points[3], before.points[3]);
   EXPECT_EQ(rig.points[99], before.points[99]);
@@ -132,25 +124,22 @@ TEST(Bundle, constantPosesAndPointsAreUnchanged) {
 }
 
 TEST(Bundle, pointsAreFoundWithEveryPoseConstant) {
-  SimulationOptions s{.noise = 0};
-  Random random(24);
-  SimulatedRig rig = simulate_rig(s, random);
+  Simulated s(24, {.noise = 0});
+  SimulatedRig& rig = s.rig;
   rig.T_camera_left = rig.true_cameras;
   rig.T_left_world = rig.true_poses;
   const std::vector<std::uint8_t> constant(rig.T_left_world.size(), 1);
   BundleProblem p = rig.problem();
   p.pose_constant = constant;
-  OwnAdjuster own(capacities_for(s));
-  const BundleResult r = own.adjuster.solve(p, {});
+  const BundleResult r = s.own.adjuster.solve(p, {});
   ASSERT_TRUE(r.converged());
   for (std::size_t i = 0; i < rig.points.size(); ++i)
     EXPECT_LT((rig.points[i] - rig.true_points[i]).norm(), kExactMetre);
 }
 
 TEST(Bundle, posePriorFixesTheGauge) {
-  SimulationOptions s{.noise = 0};
-  Random random(20);
-  SimulatedRig rig = simulate_rig(s, random);
+  Simulated s(20, {.noise = 0});
+  SimulatedRig& rig = s.rig;
   rig.T_camera_left = rig.true_cameras;
   BundlePosePrior prior{
       .pose = 0, .T_left_world = rig.true_poses[0], .information = Mat6::Identity() * 1e4};
@@ -159,18 +148,14 @@ TEST(Bundle, posePriorFixesTheGauge) {
   BundleProblem p = rig.problem();
   p.pose_constant = constant;
   p.pose_priors = {&prior, 1};
-  OwnAdjuster own(capacities_for(s));
-  const BundleResult r = own.adjuster.solve(p, {});
+  const BundleResult r = s.own.adjuster.solve(p, {});
   ASSERT_TRUE(r.converged());
   EXPECT_LT(pose_error(rig), 1e-8);
   EXPECT_LT(rotation_angle(rig.T_left_world[0].R * rig.true_poses[0].R.transpose()), 1e-9);
 }
 
 TEST(Bundle, solveAllocatesNothing) {
-  SimulationOptions s;
-  Random random(21);
-  SimulatedRig rig = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
+  Simulated s(21);
   BundleOptions o = calibration_options();
   o.covariance = true;
   o.intrinsics[1].free = 0b11;
@@ -178,24 +163,21 @@ TEST(Bundle, solveAllocatesNothing) {
   o.intrinsics[1].prior_sigma = {1, 1, 0, 0, 0, 0, 0, 0, 0};
   o.loss = BundleLoss::cauchy;
   BundleOptions odometry{.pose_covariance = true};
-  const BundleProblem p = rig.problem();
+  const BundleProblem p = s.rig.problem();
   BundleResult first, second;
   test::expect_no_allocations([&] {
-    first = own.adjuster.solve(p, o);
-    second = own.adjuster.solve(p, odometry);
+    first = s.own.adjuster.solve(p, o);
+    second = s.own.adjuster.solve(p, odometry);
   });
   EXPECT_TRUE(first.has_covariance);
   EXPECT_TRUE(second.has_pose_covariance);
 }
 
 TEST(Bundle, everyTerminationIsReached) {
-  SimulationOptions s;
-  Random random(23);
-  const SimulatedRig original = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
+  Simulated s(23);
   const auto end = [&](const BundleOptions& o) {
-    SimulatedRig rig = original;
-    return own.adjuster.solve(rig.problem(), o).termination;
+    SimulatedRig rig = s.rig;
+    return s.own.adjuster.solve(rig.problem(), o).termination;
   };
   BundleOptions o = calibration_options();
   EXPECT_EQ(end(o), BundleTermination::small_cost_change);

@@ -7,6 +7,7 @@
 
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -19,13 +20,9 @@ using FreeVector = Eigen::Matrix<double, kFree, 1>;
 constexpr int row_of(int i) { return i < 6 ? extrinsic_row(1) + i : intrinsic_row(1) + i - 6; }
 
 RigCalibration rig() {
-  RigCalibration r{.cameras = 2};
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = r.intrinsics[k];
-    c.width = 1024, c.height = 768, c.fx = c.fy = 1247, c.cx = 511.5, c.cy = 383.5;
-  }
-  r.T_camera_left[1] = {exp_so3({5e-3, -8e-3, 3e-3}), {-0.75, 0, 0}};
-  r.baseline = 0.75;
+  RigCalibration r = test::parallel_rig(
+      {.width = 1024, .height = 768, .fx = 1247, .fy = 1247, .cx = 511.5, .cy = 383.5}, 0.75);
+  r.T_camera_left[1].R = exp_so3({5e-3, -8e-3, 3e-3});
   return r;
 }
 

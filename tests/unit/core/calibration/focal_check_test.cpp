@@ -9,11 +9,7 @@
 namespace vergence::test {
 namespace {
 
-using calibration::CalibrationOptions;
-using calibration::check_focal_length;
-using calibration::RigSolution;
-using calibration::RigSolveRequest;
-using calibration::RigSolveStatus;
+using namespace calibration;
 
 /// The rig of a drive with a focal length that is `factor` of the true one.
 RigCalibration given_rig(const FeatureDriveOptions& drive, double factor) {

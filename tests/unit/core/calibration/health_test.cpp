@@ -3,20 +3,15 @@
 #include <gtest/gtest.h>
 
 #include "core/math/so3.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::calibration {
 namespace {
 
 /// Two cameras side by side that see little more than what is straight ahead: x/z within ±0.05.
 RigCalibration narrow_rig() {
-  RigCalibration rig{.cameras = 2};
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = rig.intrinsics[k];
-    c.width = 700, c.height = 500, c.fx = c.fy = 7000, c.cx = 349.5, c.cy = 249.5;
-  }
-  rig.T_camera_left[1].t = Vec3(-0.1, 0, 0);
-  rig.baseline = 0.1;
-  return rig;
+  return test::parallel_rig(
+      {.width = 700, .height = 500, .fx = 7000, .fy = 7000, .cx = 349.5, .cy = 249.5}, 0.1);
 }
 
 void know(RigCalibration* rig, std::size_t k, int what, double sigma) {

@@ -12,8 +12,7 @@ namespace vergence::test {
 namespace {
 
 using calibration::MonitorResult;
-using calibration::detail::ChangeDetector;
-using calibration::detail::Decision;
+using namespace calibration::detail;
 
 // An hour has this many frames at 30 Hz.
 constexpr int kHour = 108000;

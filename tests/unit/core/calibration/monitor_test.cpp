@@ -15,8 +15,7 @@
 namespace vergence::test {
 namespace {
 
-using calibration::MonitorOptions;
-using calibration::MonitorResult;
+using namespace calibration;
 using Kind = MonitorResult::Kind;
 
 // The rig changes after ten seconds.

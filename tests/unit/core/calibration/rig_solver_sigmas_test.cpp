@@ -9,9 +9,7 @@
 namespace vergence::test {
 namespace {
 
-using calibration::CalibrationOptions;
-using calibration::RigSolution;
-using calibration::RigSolveStatus;
+using namespace calibration;
 
 // The frames are 5 s at 30 Hz.
 constexpr int kDrives = 50, kFrames = 150;

@@ -12,13 +12,7 @@
 namespace vergence::test {
 namespace {
 
-using calibration::CalibrationOptions;
-using calibration::LoggedFrame;
-using calibration::LoggedObservation;
-using calibration::RigSolution;
-using calibration::RigSolveStatus;
-using calibration::SegmentSolver;
-using calibration::TrackLog;
+using namespace calibration;
 
 constexpr std::size_t kStretch = 30, kFeatures = 300, kLogged = 40;
 // Sigmas of zero select the priors of the options.
@@ -70,9 +64,13 @@ FeatureDriveOptions little_noise() {
   return o;
 }
 
-TEST(SegmentSolver, independentSegmentsFindTheTransform) {
+/// A drive and its rig, of whose lenses no sigma is given.
+struct Segments : testing::Test {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+};
+
+TEST_F(Segments, independentSegmentsFindTheTransform) {
   Driven d(o, SegmentSolver::Kind::alone, given, rough(given));
   d.go(90);
   ASSERT_EQ(d.solved.size(), 3U);
@@ -93,9 +91,7 @@ TEST(SegmentSolver, independentSegmentsFindTheTransform) {
       << "disjoint tracks";
 }
 
-TEST(SegmentSolver, joinedSegmentsReduceTheSigmas) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, joinedSegmentsReduceTheSigmas) {
   Driven joined(o, SegmentSolver::Kind::joined, given, rough(given)),
       alone(o, SegmentSolver::Kind::alone, given, rough(given));
   joined.go(90);
@@ -121,12 +117,11 @@ TEST(SegmentSolver, joinedSegmentsReduceTheSigmas) {
   EXPECT_NE(joined.solved[1].rig.T_camera_left[1].t, alone.solved[1].rig.T_camera_left[1].t);
 }
 
-TEST(SegmentSolver, wrongPrincipalPointIsEstimated) {
-  const FeatureDriveOptions o = little_noise();
+TEST_F(Segments, wrongPrincipalPointIsEstimated) {
   Pinhole wrong = o.right;
   wrong.cx -= 5;
-  const RigCalibration given = rig_of(o, {o.left, wrong}, kNotGiven);
-  Driven d(o, SegmentSolver::Kind::joined, given, given);
+  const RigCalibration off = rig_of(o, {o.left, wrong}, kNotGiven);
+  Driven d(o, SegmentSolver::Kind::joined, off, off);
   d.go(90);
   ASSERT_EQ(d.solved.size(), 3U);
   const RigSolution& s = d.solved.back();
@@ -139,9 +134,7 @@ TEST(SegmentSolver, wrongPrincipalPointIsEstimated) {
   EXPECT_LT(std::abs(lens.cx - o.right.cx), 2.5) << "and most of the five pixels are found";
 }
 
-TEST(SegmentSolver, repeatedFramesAreTakenOnce) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, repeatedFramesAreTakenOnce) {
   Driven d(o, SegmentSolver::Kind::alone, given, given);
   log_drive(d.drive, 20, {}, d.log);
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(d.stretches.take(d.log).has_value());
@@ -152,9 +145,7 @@ TEST(SegmentSolver, repeatedFramesAreTakenOnce) {
   EXPECT_EQ(d.stretches.frames(), 30U);
 }
 
-TEST(SegmentSolver, lastSegmentIsSolvedFromTheMinimumOn) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, lastSegmentIsSolvedFromTheMinimumOn) {
   // CalibrationOptions::min_frames is 25.
   for (const int frames : {24, 25}) {
     Driven d(o, SegmentSolver::Kind::joined, given, given);
@@ -172,9 +163,7 @@ TEST(SegmentSolver, lastSegmentIsSolvedFromTheMinimumOn) {
 
 // An angle of the walk of an hour, 0.3 mrad, is many times what 30 frames leave open: after a day
 // what was known hardly counts.
-TEST(SegmentSolver, oldPriorHasLessWeight) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, oldPriorHasLessWeight) {
   double sigma[2];
   for (const bool later : {false, true}) {
     Driven d(o, SegmentSolver::Kind::joined, given, given);
@@ -190,9 +179,7 @@ TEST(SegmentSolver, oldPriorHasLessWeight) {
 }
 
 // The prior is widened once for the time that has passed, whether or not a solve failed meanwhile.
-TEST(SegmentSolver, failedSegmentLeavesTheNextUnchanged) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, failedSegmentLeavesTheNextUnchanged) {
   RigSolution third[2];
   for (const bool tried : {false, true}) {
     Driven d(o, SegmentSolver::Kind::joined, given, given, 10);

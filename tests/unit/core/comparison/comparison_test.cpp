@@ -85,6 +85,17 @@ struct Bench {
       take();
     }
   }
+  /// The INS at 120 Hz with the sample of each instant from `sample_at`, and poses at 40 Hz, each
+  /// given `late_s` after its stamp.
+  template <class SampleAt>
+  void drive_by_samples(double seconds, double late_s, const SampleAt& sample_at) {
+    for (int i = 0; i <= static_cast<int>(std::lround(seconds * 120)); ++i) {
+      const double t = i / 120.0;
+      comparison.add(sample_at(i, t));
+      if (t >= late_s && i % 3 == 1) comparison.add(pose(t - late_s));
+      take();
+    }
+  }
   void finish() {
     comparison.finish();
     take();
@@ -246,12 +257,8 @@ TEST(Comparison, fullQueueReleasesAndCountsTheOldest) {
 TEST(Comparison, jumpOf100MetresIsCountedNotInterpolated) {
   Bench b;
   const Vec3 jump(0, 100, 0);
-  for (int i = 0; i <= 40 * 120; ++i) {
-    const double t = i / 120.0;
-    b.comparison.add(b.sample(t, t > 30.0 ? jump : Vec3::Zero()));
-    if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
-    b.take();
-  }
+  b.drive_by_samples(40, 0.004,
+                     [&](int, double t) { return b.sample(t, t > 30.0 ? jump : Vec3::Zero()); });
   EXPECT_EQ(b.comparison.counters().jumps, 1U);
   int jumped = 0;
   for (const ComparedPose& c : b.out) jumped += c.ins == InsMatch::jump ? 1 : 0;
@@ -265,14 +272,11 @@ TEST(Comparison, jumpOf100MetresIsCountedNotInterpolated) {
 void expect_placed_behind_a_leap(int last_before, int without_fix) {
   Bench b;
   const Vec3 jump(30, 100, 0);
-  for (int i = 0; i <= 40 * 120; ++i) {
-    const double t = i / 120.0;
+  b.drive_by_samples(40, 0.004, [&](int i, double t) {
     InsSample s = b.sample(t, i > last_before ? jump : Vec3::Zero());
     if (i > last_before && i <= last_before + without_fix) s.fix = FixStatus::none;
-    b.comparison.add(s);
-    if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
-    b.take();
-  }
+    return s;
+  });
   EXPECT_EQ(b.comparison.counters().jumps, 1U);
   ASSERT_TRUE(b.out.back().compared);
   EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
@@ -295,14 +299,10 @@ TEST(Comparison, severalJumpsBeforeAPoseAreAllCounted) {
   const Vec3 first(30, 100, 0), second(-60, -100, 0);
   for (const Vec3& between : {first, second}) {
     Bench b;
-    for (int i = 0; i <= 60 * 120; ++i) {
-      const double t = i / 120.0;
-      Vec3 shift = Vec3::Zero();
-      if (t > 9.9 && t < 10.6) shift = t < 10.3 ? first : between;
-      b.comparison.add(b.sample(t, shift));
-      if (t > 1 && i % 3 == 1) b.comparison.add(b.pose(t - 1.004));
-      b.take();
-    }
+    b.drive_by_samples(60, 1.004, [&](int, double t) {
+      if (t <= 9.9 || t >= 10.6) return b.sample(t);
+      return b.sample(t, t < 10.3 ? first : between);
+    });
     EXPECT_EQ(b.comparison.counters().jumps, between == first ? 2U : 3U);
     ASSERT_TRUE(b.out.back().compared);
     EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);

@@ -89,15 +89,18 @@ Drove drove(const How& how) {
 
 Mat3 nominal() { return mount_of(Vec3::Zero(), Vec3::Zero()).R; }
 
+MountStatus estimate(const Drove& d, Mount* m) {
+  return estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, m);
+}
+
 /// Ground truth in Mount's parameters.
 Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().transpose()); }
 
 TEST(Mount, idealReferenceGivesTheExtrinsics) {
   for (const bool velocity : {true, false}) {
-    How how{.ideal = true, .velocity = velocity, .late_s = 0.012};
-    const Drove d = drove(how);
+    const Drove d = drove({.ideal = true, .velocity = velocity, .late_s = 0.012});
     Mount m;
-    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    ASSERT_EQ(estimate(d, &m), MountStatus::ok);
     for (std::size_t k = 0; k < 3; ++k) {
       ASSERT_TRUE(m.rotation[k].observable) << k;
       EXPECT_NEAR(m.rotation[k].value, true_turn()[static_cast<int>(k)], 1e-4);
@@ -117,10 +120,10 @@ TEST(Mount, slowReferenceGivesTheExtrinsics) {
   for (const Slow slow : {Slow{0.5, 0}, Slow{1, 0}, Slow{1.33, 0.01}, Slow{2, 0}, Slow{2, 0.005},
                           Slow{2.5, 0}, Slow{2.67, 0.005}, Slow{3, 0.005}}) {
     SCOPED_TRACE(testing::Message() << slow.rate << " Hz, jitter " << slow.jitter_s);
-    How how{.ideal = true, .late_s = 0.012, .rate = slow.rate, .jitter_s = slow.jitter_s};
-    const Drove d = drove(how);
+    const Drove d =
+        drove({.ideal = true, .late_s = 0.012, .rate = slow.rate, .jitter_s = slow.jitter_s});
     Mount m;
-    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    ASSERT_EQ(estimate(d, &m), MountStatus::ok);
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       const MountValue &turn = m.rotation[k], &arm = m.lever_arm[k];
@@ -141,14 +144,13 @@ void sigmas_hold(bool velocity) {
   std::array<std::vector<double>, 7> ratios, sigmas;
   int heights = 0;
   for (int seed = 1; seed <= kDrives; ++seed) {
-    How how{.kind = seed % 2 == 0 ? mock::DriveKind::loop : mock::DriveKind::figure_eight,
-            .seed = static_cast<std::uint64_t>(seed),
-            .velocity = velocity,
-            .late_s = 0.02};
-    const Drove d = drove(how);
+    const Drove d =
+        drove({.kind = seed % 2 == 0 ? mock::DriveKind::loop : mock::DriveKind::figure_eight,
+               .seed = static_cast<std::uint64_t>(seed),
+               .velocity = velocity,
+               .late_s = 0.02});
     Mount m;
-    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok)
-        << seed;
+    ASSERT_EQ(estimate(d, &m), MountStatus::ok) << seed;
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       sigmas[k].push_back(m.rotation[k].sigma);
@@ -189,10 +191,9 @@ TEST(Mount, sigmasMatchErrorsWithVelocity) { sigmas_hold(true); }
 TEST(Mount, sigmasMatchErrorsByPositionAlone) { sigmas_hold(false); }
 
 TEST(Mount, leverArmIsUnobservableOnAStraight) {
-  How how{.kind = mock::DriveKind::straight, .velocity = false};
-  const Drove d = drove(how);
+  const Drove d = drove({.kind = mock::DriveKind::straight, .velocity = false});
   Mount m;
-  ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+  ASSERT_EQ(estimate(d, &m), MountStatus::ok);
   EXPECT_FALSE(m.lever_arm[0].observable) << m.lever_arm[0].sigma;
   EXPECT_FALSE(m.lever_arm[2].observable) << m.lever_arm[2].sigma;
   EXPECT_EQ(m.T_ref_est.t.x(), 0) << "no number";
@@ -214,21 +215,15 @@ TEST(Mount, unrelatedTrajectoriesDoNotConverge) {
       How how{.kind = kind, .velocity = velocity, .late_s = 1};
       Mount m{.moments = 77};
       Drove d = drove(how);
-      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-                MountStatus::not_converged)
-          << "a second late";
+      EXPECT_EQ(estimate(d, &m), MountStatus::not_converged) << "a second late";
       how.late_s = 0;
       d = drove(how);
       reverse(&d.reference);
-      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-                MountStatus::not_converged)
-          << "reversed";
+      EXPECT_EQ(estimate(d, &m), MountStatus::not_converged) << "reversed";
       how.seed = 2;
       how.kind = mock::DriveKind::straight;
       d.reference = drove(how).reference;
-      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-                MountStatus::not_converged)
-          << "another drive";
+      EXPECT_EQ(estimate(d, &m), MountStatus::not_converged) << "another drive";
       EXPECT_EQ(m.moments, 77U);
     }
 }
@@ -245,7 +240,7 @@ TEST(Mount, swayingAttitudeDoesNotConverge) {
       r.T_enu_ref.R = exp_so3(Vec3(0, 0, sway)) * r.T_enu_ref.R;
     }
     Mount m;
-    return estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m);
+    return estimate(d, &m);
   };
   EXPECT_EQ(swaying(13), MountStatus::ok);
   EXPECT_EQ(swaying(18), MountStatus::not_converged);
@@ -256,17 +251,13 @@ TEST(Mount, insufficientDataGivesStatusAndKeepsResult) {
   still.kind = mock::DriveKind::still;
   Drove d = drove(still);
   Mount m{.moments = 77};
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::no_motion);
+  EXPECT_EQ(estimate(d, &m), MountStatus::no_motion);
   d.estimate.resize(10);
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::too_few);
+  EXPECT_EQ(estimate(d, &m), MountStatus::too_few);
   EXPECT_EQ(estimate_ins_extrinsics({}, {}, nominal(), {}, &m), MountStatus::too_few);
   d = drove({});
   for (MountReference& r : d.reference) r.stamp = r.stamp + Duration::seconds(1e6);
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::too_few)
-      << "no time in common";
+  EXPECT_EQ(estimate(d, &m), MountStatus::too_few) << "no time in common";
   // Three readings a second apart, and none for a dozen seconds: eighteen follow on another.
   How slow{.rate = 1};
   d = drove(slow);
@@ -274,8 +265,7 @@ TEST(Mount, insufficientDataGivesStatusAndKeepsResult) {
   for (std::size_t i = 0; i < d.reference.size(); ++i)
     if (i % 15 < 3) apart.push_back(d.reference[i]);
   d.reference = apart;
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::too_few);
+  EXPECT_EQ(estimate(d, &m), MountStatus::too_few);
   EXPECT_EQ(m.moments, 77U);
 }
 

@@ -9,31 +9,21 @@
 
 #include "core/math/random.hpp"
 #include "tests/support/no_allocations.hpp"
+#include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence {
 namespace {
 
-using features::test::draw;
-using features::test::Image;
-using features::test::Texture;
+using namespace features::test;
 
 constexpr int kWidth = 320, kHeight = 240;
 // Disparity in px.
 constexpr double kDisparity = 12.0;
 
 RigCalibration rig() {
-  RigCalibration r{.cameras = 2, .baseline = 0.5};
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = r.intrinsics[k];
-    c.width = kWidth;
-    c.height = kHeight;
-    c.fx = c.fy = 280;
-    c.cx = 160;
-    c.cy = 120;
-  }
-  r.T_camera_left[1].t = Vec3(-0.5, 0, 0);
-  return r;
+  return test::parallel_rig(
+      {.width = kWidth, .height = kHeight, .fx = 280, .fy = 280, .cx = 160, .cy = 120}, 0.5);
 }
 
 /// The calibration is taken as it is: a rig that stands could never confirm it.

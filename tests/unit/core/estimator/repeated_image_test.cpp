@@ -10,8 +10,7 @@
 namespace vergence {
 namespace {
 
-using features::test::copy_of;
-using features::test::Image;
+using namespace features::test;
 using odometry::test::Corridor;
 
 /// Camera `frozen` gives its image of frame 30 until frame 46: 0.8 s, 2.4 m.

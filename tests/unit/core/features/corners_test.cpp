@@ -12,10 +12,7 @@
 namespace vergence::features {
 namespace {
 
-using test::draw;
-using test::Image;
-using test::Texture;
-using test::white_noise;
+using namespace test;
 
 constexpr int kWidth = 333, kHeight = 247;
 

@@ -9,10 +9,7 @@
 namespace vergence::features {
 namespace {
 
-using test::Built;
-using test::draw;
-using test::Image;
-using test::Texture;
+using namespace test;
 
 constexpr int kWidth = 480, kHeight = 320;
 using Grey = std::function<double(const Vec2&)>;

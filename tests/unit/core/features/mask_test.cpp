@@ -11,9 +11,7 @@
 namespace vergence::features {
 namespace {
 
-using test::draw;
-using test::Image;
-using test::Texture;
+using namespace test;
 
 constexpr int kWidth = 333, kHeight = 247;
 

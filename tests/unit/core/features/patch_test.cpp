@@ -10,10 +10,7 @@
 namespace vergence::features {
 namespace {
 
-using test::Built;
-using test::draw;
-using test::Image;
-using test::Texture;
+using namespace test;
 
 constexpr int kWidth = 180, kHeight = 160;
 // Without noise but rounding to 8 bits (0.29 grey levels). A window's information is some thousand

@@ -9,9 +9,7 @@
 namespace vergence::features {
 namespace {
 
-using test::Built;
-using test::Image;
-using test::white_noise;
+using namespace test;
 
 int different_pixels(const ImageView& a, const ImageView& b) {
   if (a.width != b.width || a.height != b.height) return -1;

@@ -14,9 +14,7 @@
 namespace vergence::features {
 namespace {
 
-using test::draw;
-using test::Image;
-using test::Texture;
+using namespace test;
 
 constexpr double kDegree = std::numbers::pi / 180;
 

@@ -9,8 +9,7 @@
 namespace vergence {
 namespace {
 
-using test::make_scene;
-using test::RigScene;
+using namespace test;
 
 constexpr std::size_t kCapacity = 512;
 

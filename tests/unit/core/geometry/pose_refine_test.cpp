@@ -9,9 +9,7 @@
 namespace vergence {
 namespace {
 
-using test::make_scene;
-using test::random_vector;
-using test::RigScene;
+using namespace test;
 
 constexpr std::size_t kCapacity = 512;
 

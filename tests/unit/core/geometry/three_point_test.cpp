@@ -11,8 +11,7 @@
 namespace vergence {
 namespace {
 
-using test::random_transform;
-using test::visible_point;
+using namespace test;
 
 struct Problem {
   Transform T_camera_world;

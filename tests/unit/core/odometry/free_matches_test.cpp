@@ -2,6 +2,7 @@
 
 #include "core/odometry/front_end.hpp"
 #include "tests/support/no_allocations.hpp"
+#include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::odometry {
@@ -10,15 +11,8 @@ namespace {
 constexpr int kWidth = 320, kHeight = 240;
 
 RigCalibration blank_rig() {
-  RigCalibration rig{.cameras = 2};
-  for (std::size_t k = 0; k < 2; ++k) {
-    rig.intrinsics[k].width = kWidth;
-    rig.intrinsics[k].height = kHeight;
-    rig.intrinsics[k].fx = rig.intrinsics[k].fy = 300;
-    rig.intrinsics[k].cx = 160;
-    rig.intrinsics[k].cy = 120;
-  }
-  return rig;
+  return vergence::test::parallel_rig(
+      {.width = kWidth, .height = kHeight, .fx = 300, .fy = 300, .cx = 160, .cy = 120}, 0);
 }
 
 /// 0: corners, 1: SURF-64.

@@ -12,12 +12,7 @@ constexpr int kSettled = 10;
 
 /// An image of nothing known.
 features::test::Image noise(const ImageView& like) {
-  features::test::Image image(like.width, like.height);
-  Random random(5);
-  for (int y = 0; y < like.height; ++y)
-    for (int x = 0; x < like.width; ++x)
-      image.at(x, y) = static_cast<std::uint8_t>(random.below(256));
-  return image;
+  return features::test::white_noise(like.width, like.height, 5);
 }
 
 TEST(OdometryReasons, gapAfterAnUnposedFrameIsReported) {

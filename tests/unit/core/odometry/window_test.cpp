@@ -8,20 +8,14 @@
 #include "core/math/so3.hpp"
 #include "core/odometry/undistorted_camera.hpp"
 #include "tests/support/no_allocations.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::odometry {
 namespace {
 
 RigCalibration rig() {
-  RigCalibration r{.cameras = 2, .baseline = 0.5};
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = r.intrinsics[k];
-    c.width = 640;
-    c.height = 480;
-    c.fx = c.fy = 500;
-    c.cx = 320;
-    c.cy = 240;
-  }
+  RigCalibration r = vergence::test::parallel_rig(
+      {.width = 640, .height = 480, .fx = 500, .fy = 500, .cx = 320, .cy = 240}, 0.5);
   r.T_camera_left[1] = {exp_so3(Vec3(0.01, -0.02, 0.015)), Vec3(-0.5, 0.01, 0.02)};
   return r;
 }

@@ -20,12 +20,7 @@
 namespace vergence {
 namespace {
 
-using test::count;
-using test::frame_of;
-using test::reading_of;
-using test::same;
-using test::WatchedCamera;
-using test::worst_acquisition;
+using namespace test;
 
 constexpr Stamp kStart{1'577'836'800'000'000'000};
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/camera_options.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/iidc/camera_under_test.hpp"
 
 namespace vergence::test {
@@ -9,8 +10,7 @@ namespace {
 using namespace iidc;
 
 void expect_mentions(const std::string& message, std::initializer_list<const char*> parts) {
-  for (const char* part : parts)
-    EXPECT_NE(message.find(part), std::string::npos) << '"' << part << "\" in: " << message;
+  for (const char* part : parts) EXPECT_TRUE(mentions(message, part));
 }
 
 using IidcConfigure = WithCamera;

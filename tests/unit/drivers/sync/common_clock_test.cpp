@@ -10,12 +10,7 @@
 namespace vergence {
 namespace {
 
-using testing::kRigInterval;
-using testing::rig_frame;
-using testing::rig_options;
-using testing::rig_time;
-using testing::RigSets;
-using testing::sets_of;
+using namespace testing;
 
 struct CommonClock : ::testing::TestWithParam<SyncMode> {};
 

@@ -9,10 +9,7 @@
 namespace vergence {
 namespace {
 
-using testing::board;
-using testing::PulseRig;
-using testing::PulseRigOptions;
-using testing::PulseRigTruth;
+using namespace testing;
 
 PulseRigTruth run(const PulseRigOptions& o, double seconds, SyncCounters* counters = nullptr,
                   SyncOptions sync = board()) {

@@ -17,10 +17,7 @@
 namespace vergence {
 namespace {
 
-using testing::kRigInterval;
-using testing::rig_frame;
-using testing::rig_options;
-using testing::RigSets;
+using namespace testing;
 
 // ---- the INS's SyncOut ----
 

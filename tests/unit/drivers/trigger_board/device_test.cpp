@@ -2,18 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
 namespace {
 
-using test::at_s;
-using test::board_for;
-using test::BoardRig;
-using test::closed;
-using test::direct_line;
-using test::opened;
-using test::thirty_hertz;
+using namespace test;
 
 /// Numbers without a hole, in order, stamps that ascend.
 void expect_gapless(const std::vector<Pulse>& all) {
@@ -253,7 +248,7 @@ TEST(Configuration, invalidValueIsRefusedWithItsKey) {
     TriggerConfiguration requested = thirty_hertz();
     r.change(&requested);
     EXPECT_EQ(rig.device->configure(requested, nullptr), r.status);
-    EXPECT_NE(rig.device->last_error().find(r.key), std::string::npos) << rig.device->last_error();
+    EXPECT_TRUE(mentions(rig.device->last_error(), r.key));
     EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration);
     if (r.options.pps != Edge::none || r.options.ins != Edge::none) continue;
     EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)

@@ -7,10 +7,7 @@
 namespace vergence::trigger_board {
 namespace {
 
-using test::board_for;
-using test::BoardRig;
-using test::direct_line;
-using test::thirty_hertz;
+using namespace test;
 
 struct Case {
   const char* name;

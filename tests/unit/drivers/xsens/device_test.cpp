@@ -9,14 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/xsens/rig.hpp"
 
 namespace vergence::xsens {
 namespace {
 
-using test::easy_drive;
-using test::simulated;
-using test::XsensRig;
+using namespace test;
 using xbus::Generation;
 
 class BothGenerations : public ::testing::TestWithParam<Generation> {
@@ -30,7 +29,7 @@ TEST_P(BothGenerations, isFoundConfiguredAndReadInEnu) {
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.device->identity().generation, GetParam());
   EXPECT_EQ(rig.device->info().serial, legacy() ? "00500123" : "07701234");
-  EXPECT_NE(rig.device->info().model.find("G"), std::string::npos);
+  EXPECT_TRUE(mentions(rig.device->info().model, "G"));
   double actual = 0;
   ASSERT_EQ(rig.device->configure(100, &actual), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(actual, 100);
@@ -169,8 +168,7 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
     EXPECT_EQ(entries[1], (xbus::SyncEntry{xbus::kSyncIntervalTransition, xbus::kSyncLineOut,
                                            xbus::kSyncPositive, 0, 0, 12, 20, 0}));
     EXPECT_NEAR(rig.device->stream().sync_out_hz, 30.77, 0.01);
-    EXPECT_NE(rig.device->remark().find("30.77"), std::string::npos)
-        << "it cannot make 30 Hz, and says so";
+    EXPECT_TRUE(mentions(rig.device->remark(), "30.77")) << "it cannot make 30 Hz, and says so";
   }
 }
 
@@ -193,10 +191,8 @@ TEST_P(BothGenerations, slowLineIsRefusedNamingTheNeededRate) {
   XsensRig rig(simulated(GetParam()));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok);
   EXPECT_EQ(rig.device->configure(400, nullptr), DeviceStatus::no_bandwidth);
-  EXPECT_NE(rig.device->last_error().find("115200 baud"), std::string::npos)
-      << rig.device->last_error();
-  EXPECT_NE(rig.device->last_error().find("ins.baud"), std::string::npos)
-      << rig.device->last_error();
+  EXPECT_TRUE(mentions(rig.device->last_error(), "115200 baud"));
+  EXPECT_TRUE(mentions(rig.device->last_error(), "ins.baud"));
   EXPECT_EQ(rig.simulator->writes().outputs + rig.simulator->writes().layout +
                 rig.simulator->writes().period,
             0)
@@ -358,7 +354,7 @@ TEST(AnotherMake, isNamed) {
                       std::make_shared<test::Talker>(mentions, 9600), test::SimulatedLineOptions{}),
                   {});
     EXPECT_EQ(device.connect(), DeviceStatus::not_found);
-    EXPECT_NE(device.last_error().find(word), std::string::npos) << device.last_error();
+    EXPECT_TRUE(test::mentions(device.last_error(), word));
   }
 }
 
