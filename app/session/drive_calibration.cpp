@@ -7,6 +7,7 @@
 #include <iterator>
 #include <memory>
 #include <numbers>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -23,7 +24,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kMiddleDepth = 2;  // of Agreement::kDepthM: 20 m
+// Depth in metres at which independent solutions are compared.
+constexpr double kComparedDepth = 20;
 constexpr const char* kInterrupted = "interrupted";
 constexpr int kMoreFeatures = 2,
               kMaxFeatures = 1000;  // of a calibration pass, which is not bound to the frame rate
@@ -153,9 +155,11 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   }
   keep(joined.end());
   keep_solution(alone.end());
-  for (std::size_t i = 1; i < result.stretches.size(); ++i)
-    result.agreements.push_back(
-        calibration::agreement(result.stretches[i - 1].rig, result.stretches[i].rig, 1));
+  for (std::size_t i = 1; i < result.stretches.size(); ++i) {
+    const RigCalibration &a = result.stretches[i - 1].rig, &b = result.stretches[i].rig;
+    result.agreements.push_back(calibration::agreement(a, b, 1));
+    result.depth_differences.push_back(calibration::depth_error_percent(a, b, 1, kComparedDepth));
+  }
   if (!last) return result;
   result.rig = last->rig;
   result.why.clear();
@@ -221,16 +225,14 @@ std::string describe(const DriveCalibration& found) {
   fmt::format_to(out, "depth sigma at {:.1f} m: {:.2f} % (1 sigma), from {} moving frames\n",
                  found.depth_m, found.depth_sigma_percent, rig.frames);
   if (found.agreements.empty()) return text;
-  double sigmas = 0, percent = 0;
-  for (const calibration::Agreement& a : found.agreements) {
-    sigmas += a.transform / static_cast<double>(found.agreements.size());
-    percent = std::max(percent, a.depth_percent[kMiddleDepth]);
-  }
+  const auto& all = found.agreements;
+  const double mean =
+      std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size());
   fmt::format_to(out,
                  "{} segments solved independently: transforms differ by {:.1f} sigma, depths at "
                  "{:g} m by at most {:.2f} %\n",
-                 found.stretches.size(), std::sqrt(sigmas),
-                 calibration::Agreement::kDepthM[kMiddleDepth], percent);
+                 found.stretches.size(), std::sqrt(mean), kComparedDepth,
+                 std::ranges::max(found.depth_differences));
   return text;
 }
 

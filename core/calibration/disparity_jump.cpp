@@ -8,30 +8,18 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kMinTracks = 25;
-constexpr int kReweightings = 6;
 // Minimum residual scale, in pixels; corners are not localised better.
 constexpr double kMinScale = 0.05;
-// Relative depth step of the numeric derivatives.
-constexpr double kDepthStep = 1e-3;
-// Minimum jump in pixels, twice the 95 % quantile of undisturbed frames.
-constexpr double kMinJump = 0.6;
-// Minimum jump in sigmas of the frame's own tracks.
-constexpr double kJumpSigmas = 8.0;
-// Minimum jump as a multiple of the rms shift of this run.
-constexpr double kJumpScatter = 5.0;
-// Number of measured frames until the rms shift is usable.
-constexpr int kFirstFrames = 5;
-// Length of the running mean square, in frames.
-constexpr int kScatterFrames = 20;
+// Usual rms shift of undisturbed frames at least, in pixels (build/bench/margin_bench).
+constexpr double kUsualShift = 0.12;
+// Minimum jump, as a multiple of the usual shift and of the frame's own sigma.
+constexpr double kJumpSigmas = 5.0;
+// Number of measured frames until the usual shift is known, and over which it is averaged.
+constexpr int kFirstFrames = 5, kScatterFrames = 20;
 // Share of a shift that the next frame must revert for it not to be a change.
 constexpr double kGoesBack = 0.5;
-// Number of frames without enough tracks after which a shift counts as a change.
-constexpr int kUnmeasured = 2;
-// Maximum number of skipped frames between two that are compared.
-constexpr int kMaxSkipped = 3;
-// Minimum parallax in rad; the disparity of farther points does not depend on depth.
-constexpr double kMinParallax = 1e-4;
+// Maximum number of frames without a measurement between two that are compared.
+constexpr int kMaxSkipped = 2;
 
 Vec3 ray(const Pinhole& k, const Vec2& pixel) noexcept {
   return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy, 1.0};
@@ -41,14 +29,20 @@ Vec2 project(const Pinhole& k, const Vec3& p) noexcept {
   return {k.fx * p.x() / p.z() + k.cx, k.fy * p.y() / p.z() + k.cy};
 }
 
+/// Derivative of project(), in px per unit of `p`.
+Mat23 derivative(const Pinhole& k, const Vec3& p) noexcept {
+  Mat23 G;
+  G << k.fx, 0, -k.fx * p.x() / p.z(), 0, k.fy, -k.fy * p.y() / p.z();
+  return G / p.z();
+}
+
 /// Depth of the left ray where it is nearest to the other camera's ray; not positive if there is
 /// none.
 double depth_of(const Vec3& left, const Vec3& other, const Transform& T_other_left) noexcept {
   // other ∥ z R left + t, so other × (R left) z = − other × t.
   const Vec3 a = other.cross(T_other_left.R * left), b = -other.cross(T_other_left.t);
   const double aa = a.squaredNorm();
-  if (aa < kMinParallax * kMinParallax * other.squaredNorm() * left.squaredNorm()) return -1.0;
-  return a.dot(b) / aa;
+  return aa > 0 ? a.dot(b) / aa : -1.0;
 }
 
 }  // namespace
@@ -105,15 +99,12 @@ bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObs
   if (!(depth > 0)) return false;
   const Vec3 moved = T_now_previous * Vec3(depth * a);
   if (!(moved.z() > 0)) return false;
-  const auto disparity = [this](const Vec3& p) noexcept {
-    return Vec2(project(camera_, T_camera_left_ * p) - project(left_, p));
-  };
-  const double step = kDepthStep * moved.z();
-  const Vec2 predicted = disparity(moved);
-  const Vec2 by_depth = (disparity(moved + Vec3(0, 0, step)) - predicted) / step;
+  const Vec3 other = T_camera_left_ * moved;
+  const Mat23 G = derivative(camera_, other);
+  const Vec2 predicted = project(camera_, other) - project(left_, moved);
+  const Vec2 by_depth = G * T_camera_left_.R.col(2) - derivative(left_, moved).col(2);
   // Direction of the epipolar line, along which the point moves in the other image with its depth.
-  const Vec2 farther = project(camera_, T_camera_left_ * Vec3(moved * (1.0 + kDepthStep))) -
-                       project(camera_, T_camera_left_ * moved);
+  const Vec2 farther = G * (T_camera_left_.R * moved);
   const double length = farther.norm();
   if (!(length > 0)) return false;
   const Vec2 direction = farther / length;
@@ -125,7 +116,7 @@ bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObs
 DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
   DisparityJump jump;
   jump.tracks = static_cast<int>(rows.size());
-  if (rows.size() < kMinTracks) return jump;
+  if (rows.size() < kMinCommonTracks) return jump;
   double s = 0, along = 0, scale = 0, variance = 0;
   const auto median_of = [&](auto value) noexcept {
     for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
@@ -161,7 +152,7 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
 
 void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) noexcept {
   if (pending_.any) {
-    if (!jump->measured && ++pending_.unmeasured < kUnmeasured) {
+    if (!jump->measured && ++pending_.unmeasured < kMaxSkipped) {
       jump->suspected = true;
       return;
     }
@@ -176,8 +167,8 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
     return;
   }
   if (!jump->measured) return;
-  const double limit =
-      std::max({kMinJump, kJumpSigmas * jump->sigma_px, kJumpScatter * std::sqrt(mean_square_)});
+  const double limit = kJumpSigmas * std::sqrt(std::max(kUsualShift * kUsualShift, mean_square_) +
+                                               jump->sigma_px * jump->sigma_px);
   if (measured_ >= kFirstFrames) jump->over_limit = std::abs(jump->px) / limit;
   if (jump->over_limit > 1) {
     jump->suspected = true;

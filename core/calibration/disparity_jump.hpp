@@ -8,6 +8,9 @@
 
 namespace vergence::calibration {
 
+/// Minimum number of tracks whose median shows a common change of two frames.
+inline constexpr std::size_t kMinCommonTracks = 25;
+
 /// Change of one frame's disparities against their prediction from the previous frame.
 struct DisparityJump {
   /// False if there are too few tracks.

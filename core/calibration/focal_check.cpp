@@ -2,13 +2,14 @@
 
 #include <cmath>
 
+#include "core/math/robust.hpp"
+
 namespace vergence::calibration {
 namespace {
 
 // Systematic error of the measured focal length: at most 3.2 % on recorded sequences after 25
-// frames (docs/calibration.md). A contradiction must exceed it and kCertain sigmas of noise.
+// frames (docs/calibration.md). A contradiction must exceed it and kCertainSigmas of noise.
 constexpr double kSystematic = 0.04;
-constexpr double kCertain = 3.0;
 
 }  // namespace
 
@@ -26,7 +27,7 @@ FocalMeasurement check_focal_length(const RigSolution& found,
   } else if (found.status == RigSolveStatus::ok && lens.sigma[0] > 0) {
     m.measured_px = lens.fx;
     m.sigma_px = std::hypot(lens.sigma[0], kSystematic * lens.fx);
-    m.contradicted = off > kSystematic + kCertain * lens.sigma[0] / lens.fx;
+    m.contradicted = off > kSystematic + kCertainSigmas * lens.sigma[0] / lens.fx;
   }
   return m;
 }

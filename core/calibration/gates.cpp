@@ -16,11 +16,10 @@ namespace {
 
 // Minimum number of held-out frames of a test.
 constexpr int kMinHeldOut = 3;
-// Median distance in px from the epipolar lines above which held-out frames contradict a solution.
-constexpr double kWorstFit = 1.5;
-// On held-out frames the distance may be kTimesUsed times that on the frames used, or kMinMisfit
-// px; on recorded sequences both are 0.08 to 0.25 px.
-constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
+// Ratio of the median distance from epipolar lines on held-out frames to that on the frames used
+// above which they contradict a solution. The latter counts as at least a corner's noise and at
+// most kWorstUsed px; on recorded sequences both are 0.08 to 0.25 px.
+constexpr double kTimesUsed = 3.0, kWorstUsed = 0.5;
 // Sigma in rad of the rotation that no epipolar line shows: for a calibration without sigmas that
 // is the rig's, and for one that is not. With the first, every published calibration of the seven
 // recorded sequences is verified (robustness_bench drives); the second is the size of a mounting
@@ -102,21 +101,18 @@ HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibrat
 /// Returns true if held-out frames contradict camera k of `rig`, compared with the fit of `solved`
 /// on its own frames.
 bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
-                  std::uint64_t newest, int k) noexcept {
+                  std::uint64_t newest, int k, double pixel_sigma) noexcept {
   const HeldOut fit = fit_of_held_out(log, newest, rig, k);
   if (fit.frames < kMinHeldOut) return false;
   const HeldOut used = fit_of_used(log, newest, solved, k);
-  const double worst = used.frames < kMinHeldOut
-                           ? kWorstFit
-                           : std::clamp(kTimesUsed * used.median_px, kMinMisfit, kWorstFit);
-  return fit.median_px > worst;
+  return fit.median_px > kTimesUsed * std::min(std::max(used.median_px, pixel_sigma), kWorstUsed);
 }
 
 /// Returns true if contradicted() holds for any camera.
 bool misfits(const TrackLog& log, std::uint64_t newest, const RigCalibration& solved,
-             const RigCalibration& rig) noexcept {
+             const RigCalibration& rig, double pixel_sigma) noexcept {
   for (int k = 1; k < solved.cameras; ++k)
-    if (contradicted(log, rig, solved, newest, k)) return true;
+    if (contradicted(log, rig, solved, newest, k, pixel_sigma)) return true;
   return false;
 }
 
@@ -230,10 +226,10 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
   }
   a.worse = fits_better(log, after, current, measured);
   // In a full window a misfit to the epipolar lines cannot be due to the position of the structure.
-  const bool lines =
-      misfits(log, after, measured, current) || (sharper && measured.frames >= o.max_frames);
-  a.better =
-      (a.nearer && !a.worse) || (lines && fits_better(log, after, measured, current, kRareChance));
+  const bool lines = misfits(log, after, measured, current, pixel_sigma) ||
+                     (sharper && measured.frames >= o.max_frames);
+  a.better = (a.nearer && !a.worse) ||
+             (lines && fits_better(log, after, measured, current, kCertainSigmas));
   return a;
 }
 
@@ -313,7 +309,7 @@ Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noe
   const RigSolution& s = *q.solution;
   if (const Gate gate = check_solution(q, o); gate != Gate::open) return gate;
   if (q.log == nullptr) return Gate::open;
-  if (misfits(*q.log, s.newest, s.rig, s.rig)) return Gate::does_not_fit;
+  if (misfits(*q.log, s.newest, s.rig, s.rig, q.pixel_sigma)) return Gate::does_not_fit;
   if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))
     return Gate::no_better;
   return Gate::open;

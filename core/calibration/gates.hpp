@@ -27,8 +27,6 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 /// too few frames can be compared. The gains of several cameras are added, so that a knocked one
 /// outweighs one that is determined slightly less well. Pure.
 inline constexpr double kChance = 2.0;
-/// Value of `chance` for a test that is repeated with every solve.
-inline constexpr double kRareChance = 3.0;
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;

@@ -13,12 +13,6 @@ namespace {
 
 using Kind = MonitorResult::Kind;
 
-// Number of consecutive frames above the threshold that raise a knock at standstill.
-constexpr int kStandingFrames = 3;
-// Factor of the threshold at standstill: the errors of a single frame are less Gaussian than the
-// sum over many frames.
-constexpr double kStandingFactor = 1.5;
-
 void check(bool good, const char* name, const char* range) {
   if (!good)
     throw std::invalid_argument(std::string("monitor.") + name + " is out of range: allowed is " +
@@ -47,14 +41,14 @@ struct Monitor::Parts {
   Mat5 covariance = Mat5::Zero();
   detail::MonitorResiduals looks{};
   detail::ChangeDetector windows{};
-  detail::Decision latest{};
+  MonitorResult latest{};
   int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
 
   void clear() noexcept {
     looks.reset();
     windows.reset(options, covariance);
-    latest = detail::Decision{};
+    latest = MonitorResult{};
     collapsed = standing_over = 0;
   }
   void watch_collapse(const MonitorFrame& frame) noexcept;
@@ -120,49 +114,41 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
     return;
   }
   standing_over = 0;
-  detail::FrameEvidence e;
-  e.frame = frame.frame;
-  e.evidence = stereo.evidence;
-  e.spread_now = stereo.spread_now;
-  e.spread_life = stereo.spread_life;
-  windows.push(e);
+  windows.push(stereo);
   latest = windows.decide();
 }
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame,
                                     const detail::StereoResiduals& residuals) noexcept {
   // Keep what moving frames have detected.
-  if (latest.kind != Kind::quiet && standing_over < kStandingFrames) return;
-  latest.statistic = windows.single(residuals.evidence, residuals.spread_now) / kStandingFactor;
-  latest.shift_px = detail::shift_px(residuals.evidence);
+  if (latest.kind != Kind::quiet && standing_over < options.collapse_frames) return;
+  latest.statistic = windows.single(residuals.evidence, residuals.spread_now);
+  latest.evidence = {0.5 * latest.statistic, detail::shift_px(residuals.evidence), 0};
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;
   } else {
     standing_over = 0;
   }
-  latest.kind = standing_over >= kStandingFrames ? Kind::knock : Kind::quiet;
-  latest.undecided = standing_over > 0 && standing_over < kStandingFrames;
-  latest.onset = standing_over > 0 ? standing_from : frame.frame;
-  latest.frames = standing_over;
+  latest.kind = standing_over >= options.collapse_frames ? Kind::knock : Kind::quiet;
+  latest.undecided = standing_over > 0 && standing_over < options.collapse_frames;
+  latest.onset_frame = standing_from;
+  latest.frames_since_onset = standing_over;
 }
 
 MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
   Parts& p = *parts_;
-  MonitorResult v;
-  v.threshold = p.options.threshold;
-  v.onset_frame = frame.frame;
-  if (!p.valid) return v;
-  p.watch_collapse(frame);
-  p.watch_matches(frame);
-  const detail::Decision& d = p.latest;
-  v.kind = d.kind;
-  v.statistic = d.statistic;
-  v.undecided = d.undecided;
-  v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
-  v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
-  if (d.kind != Kind::quiet) {
-    v.evidence = {0.5 * d.statistic, d.shift_px, 1e3 * d.shift_px / p.reference.right.fx};
+  if (p.valid) {
+    p.watch_collapse(frame);
+    p.watch_matches(frame);
   }
+  MonitorResult v = p.latest;
+  v.threshold = p.options.threshold;
+  if (v.kind == Kind::quiet) {
+    v.evidence = {};
+    v.onset_frame = frame.frame;
+    v.frames_since_onset = 0;
+  }
+  v.evidence.rotation_mrad = 1e3 * v.evidence.shift_px / p.reference.right.fx;
   if (p.collapsed >= p.options.collapse_frames) {
     v.evidence = {};
     v.kind = Kind::collapse;

@@ -29,7 +29,8 @@ struct MonitorOptions {
   int short_window = 3;
   /// Moving frames of the longest window, which detects drift, 60 … 1800.
   int long_window = 300;
-  /// Consecutive frames without the expected matches that raise `collapse`, 2 … 60.
+  /// Consecutive frames without the expected matches that raise `collapse`, or over the threshold
+  /// that raise a knock at standstill, 2 … 60.
   int collapse_frames = 5;
   /// Share of the expected matches below which a frame counts towards a collapse, 0.01 … 0.9.
   double collapse_share = 0.2;
@@ -104,8 +105,8 @@ struct MonitorResult {
 ///
 /// A second test finds small knocks: it compares the window with the two minutes before it, whose
 /// covariance is smaller than the reference's. Windows have a few to several hundred moving frames;
-/// the largest statistic counts. Frames of a standing rig are tested one by one against a higher
-/// threshold, because their errors repeat.
+/// the largest statistic counts. Frames of a standing rig are tested one by one, because their
+/// errors repeat, and several in a row must exceed the threshold.
 ///
 ///     Arena arena(Monitor::memory_needed(options));
 ///     Monitor monitor(options, arena);

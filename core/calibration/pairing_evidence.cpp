@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/calibration/disparity_jump.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kMinPoints = 25;
 // Noise of the distance in px, from two positions known to 0.15 px.
 constexpr double kNoise = 0.2;
 // Number of independent points that a frame counts for, because its errors share causes (rolling
@@ -69,7 +69,7 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
   std::copy(points.begin(), points.end(), before_.begin());
   count_ = points.size();
   distance_px_ = n > 0 ? static_cast<double>(median(now_.first(n))) : 0;
-  if (both < kMinPoints) return;
+  if (both < kMinCommonTracks) return;
   const double now = std::max(distance_px_, kNoise);
   if (usual_px_ == 0) usual_px_ = now;
   const auto add = [&](double usual, double other, double* sum) noexcept {

@@ -6,12 +6,11 @@
 namespace vergence::calibration {
 namespace {
 
-// Sigma of an unknown rotation, in rad.
-constexpr double kAnyRotation = 0.2;
-// Sigma of an unknown translation, in baselines.
-constexpr double kAnyDirection = 0.2;
-// Random walk of the intrinsics relative to that of the extrinsics; temperature causes both.
-constexpr double kFocalOfDrift = 0.3, kCentreOfDrift = 0.3, kDistortionOfDrift = 1.0;
+// Sigma of an unknown transform: rotation in rad, translation in baselines.
+constexpr double kUnknown = 0.2;
+// Random walk of a pinhole's parameters, in focal lengths, relative to the rotation's; temperature
+// causes both. Distortion coefficients walk as the rotation does.
+constexpr double kPinholeOfDrift = 0.3;
 
 void widen(RigCovariance* C, int row, double sigma) noexcept {
   if (C->known(row)) C->set(row, row, (*C)(row, row) + sigma * sigma);
@@ -31,10 +30,8 @@ void let_drift(double hours, const CalibrationOptions& options, RigCalibration* 
     }
     const int first = intrinsic_row(k);
     const double fx = rig->intrinsics[c].fx;
-    for (int i = 0; i < 2; ++i) widen(&rig->covariance, first + i, kFocalOfDrift * angle * fx);
-    for (int i = 2; i < 4; ++i) widen(&rig->covariance, first + i, kCentreOfDrift * angle * fx);
-    for (int i = 4; i < kIntrinsicsSize; ++i)
-      widen(&rig->covariance, first + i, kDistortionOfDrift * angle);
+    for (int i = 0; i < kIntrinsicsSize; ++i)
+      widen(&rig->covariance, first + i, i < 4 ? kPinholeOfDrift * angle * fx : angle);
   }
 }
 
@@ -44,7 +41,7 @@ void clear_transforms(RigCalibration* rig) noexcept {
     for (int i = 0; i < 6; ++i) {
       const int row = extrinsic_row(k) + i;
       for (int other = 0; other < kRigSize; ++other) rig->covariance.set(row, other, 0);
-      const double sigma = i < 3 ? kAnyRotation : kAnyDirection * length;
+      const double sigma = i < 3 ? kUnknown : kUnknown * length;
       rig->covariance.set(row, row, sigma * sigma);
     }
   }

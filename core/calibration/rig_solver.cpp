@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace vergence::calibration {
 namespace {
@@ -14,17 +15,16 @@ constexpr std::size_t kFramesATrack = 3;
 // Minimum average number of used lanes of a block's eight, which determines the capacity for
 // blocks; recorded sequences use 4.9 to 7.0.
 constexpr std::size_t kLanesABlock = 2;
-constexpr int kMinTracks = 60;
-// Minimum number of stereo matches of the frame whose transform initialises the solve.
-constexpr int kMinCandidateMatches = 40;
-// Loss thresholds, in residual scales.
-constexpr double kHuber = 2.0, kCauchy = 2.5;
+// Minimum number of points of a solve, and of stereo matches of the frame whose transform
+// initialises it.
+constexpr int kMinTracks = 40;
+// Threshold of both losses, in residual scales.
+constexpr double kLossThreshold = 2.5;
 // Limits above which an observation is left out, in residual scales.
 constexpr double kFirstCut = 6.0, kLastCut = 4.0;
-// Maximum numbers of steps of the last adjustment.
-constexpr int kMaxSteps = 60, kMaxFocalSteps = 200;
-// Median length of a vector of two standard normal numbers.
-constexpr double kMedianOfTwo = 1.1774;
+// Maximum number of steps of the last adjustment; a focal length with an error of a quarter takes
+// more than a hundred.
+constexpr int kMaxSteps = 200;
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -99,7 +99,7 @@ bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
   const LoggedFrame* best = nullptr;
   for (std::size_t i = 0; i < log_.size(); ++i) {
     const LoggedFrame& f = log_.frame(i);
-    if (!f.unlinked || f.stereo < kMinCandidateMatches || !all_placed(f, count_)) continue;
+    if (!f.unlinked || f.stereo < kMinTracks || !all_placed(f, count_)) continue;
     if (best == nullptr || f.reprojection_px < best->reprojection_px) best = &f;
   }
   if (best == nullptr) return false;
@@ -152,7 +152,9 @@ BundleResult RigSolver::adjust(const BundleOptions& how) noexcept {
 double RigSolver::residual_scale() noexcept {
   const std::size_t n = observations_.size();
   std::copy_n(residuals_.begin(), n, sorted_.begin());
-  return std::max(0.2, std::sqrt(static_cast<double>(median(sorted_.first(n)))) / kMedianOfTwo);
+  // The median of χ² with two degrees of freedom is 2 ln 2.
+  return std::max(
+      0.2, std::sqrt(0.5 * static_cast<double>(median(sorted_.first(n))) / std::numbers::ln2));
 }
 
 void RigSolver::drop_outliers(double limit) noexcept {
@@ -176,9 +178,9 @@ void RigSolver::drop_outliers(double limit) noexcept {
 
 /// Solves with Huber's loss, then twice with Cauchy's after removing outliers; the last solve
 /// computes covariances.
-BundleResult RigSolver::adjust_robustly(BundleOptions how, int max_steps, RigSolution* s) noexcept {
+BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexcept {
   how.loss = BundleLoss::huber;
-  how.loss_threshold = kHuber;
+  how.loss_threshold = kLossThreshold;
   how.max_steps = 12;
   how.cost_tolerance = 1e-3;
   BundleResult r = adjust(how);
@@ -188,9 +190,9 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, int max_steps, RigSol
     const double scale = residual_scale();
     drop_outliers(cut * scale);
     how.loss = BundleLoss::cauchy;
-    how.loss_threshold = kCauchy * scale;
+    how.loss_threshold = kLossThreshold * scale;
     const bool last = cut == kLastCut;
-    how.max_steps = last ? max_steps : 8;
+    how.max_steps = last ? kMaxSteps : 8;
     how.cost_tolerance = last ? 3e-6 : 1e-4;
     how.covariance = how.pose_covariance = last;
     r = adjust(how);
@@ -218,9 +220,7 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   if (points_.size() < static_cast<std::size_t>(kMinTracks)) return s;
   hold_pieces();
   s.status = RigSolveStatus::not_converged;
-  // A focal length with an error of a quarter takes more than a hundred steps.
-  const int max_steps = request.measure_focal_lengths ? kMaxFocalSteps : kMaxSteps;
-  const BundleResult r = adjust_robustly(options_of(request), max_steps, &s);
+  const BundleResult r = adjust_robustly(options_of(request), &s);
   if (!r.converged()) {
     // Report the focal length reached so far.
     if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();

@@ -112,8 +112,7 @@ class RigSolver {
   void hold_pieces() noexcept;
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
   [[nodiscard]] BundleOptions options_of(const RigSolveRequest& request) const noexcept;
-  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, int max_steps,
-                                             RigSolution* s) noexcept;
+  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] double residual_scale() noexcept;
   void drop_outliers(double limit) noexcept;

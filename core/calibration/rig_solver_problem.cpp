@@ -21,8 +21,6 @@ constexpr int kMinTies = 10;
 // transforms, on recorded and rendered sequences, to that by clusters (docs/calibration.md).
 constexpr int kCells = 6;
 constexpr double kSharedErrors = 3.5;
-// Inflation of a calibration that does not state its own.
-constexpr double kUsualInflation = 6;
 
 }  // namespace
 
@@ -183,9 +181,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
       if (request.known->covariance.known(intrinsic_row(k) + static_cast<int>(i)))
         out.prior_sigma[i] = 0;
   }
-  if (request.known != nullptr)
-    how.shared_prior = {request.known,
-                        request.known->inflation > 0 ? request.known->inflation : kUsualInflation};
+  if (request.known != nullptr) how.shared_prior = {request.known, request.known->inflation};
   return how;
 }
 

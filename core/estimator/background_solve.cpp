@@ -45,7 +45,7 @@ void BackgroundSolve::start(const calibration::TrackLog& log, const Start& start
 void BackgroundSolve::run() noexcept {
   calibration::RigSolveRequest request;
   request.rig = start_.rig;
-  request.from_rig = start_.from_rig;
+  request.from_rig = !start_.for_new_rig;
   // The prior of the intrinsics is the initial calibration, not earlier results of these frames, so
   // that no measurement counts twice.
   request.given = &given_;

@@ -22,9 +22,7 @@ class BackgroundSolve {
   /// Initial values, mode and prior of a solve.
   struct Start {
     RigCalibration rig{};
-    /// True: start from the transforms of `rig`.
-    bool from_rig = false;
-    /// True: estimate a new calibration. False: refine the one in use.
+    /// True: estimate a new calibration. False: refine the one in use, from its transforms.
     bool for_new_rig = false;
     /// Posterior of earlier frames, copied by start(); null if there is none.
     const RigCalibration* prior = nullptr;

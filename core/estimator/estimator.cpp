@@ -157,8 +157,7 @@ void Estimator::finish() noexcept {
   if (!p.options.online) return;
   // At most: the solve that is running, one with the frames logged since, and a refinement with all
   // frames.
-  constexpr int kLastSolves = 3;
-  for (int attempt = 0; attempt < kLastSolves; ++attempt) {
+  while (!p.decisions.full()) {
     if (!p.calibrator.solve().running()) {
       if (!p.calibrator.start_last_solve()) return;
       if (p.calibrator.estimating()) p.transition(Trigger::frames_enough, p.last);

@@ -8,16 +8,14 @@
 namespace vergence {
 namespace {
 
-// Number of newest frames of a drifting rig that are used as frames of one rig.
-constexpr std::uint64_t kDriftFrames = 60;
-
-/// Number of the first frame whose tracks describe the present rig.
-std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now) noexcept {
+/// Number of the first frame whose tracks describe the present rig. `fewest`: frames of a solve.
+std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now, int fewest) noexcept {
   using K = calibration::MonitorResult::Kind;
   // Until now there were only wrong matches.
   if (v.kind == K::collapse) return now;
   // Only the newest frames describe a drifting rig.
-  if (v.kind == K::drift) return std::max(v.onset_frame, now - std::min(now, kDriftFrames));
+  if (v.kind == K::drift)
+    return std::max(v.onset_frame, now - std::min(now, static_cast<std::uint64_t>(fewest)));
   return v.onset_frame;
 }
 
@@ -129,7 +127,9 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
   } else if (v.kind != K::quiet) {
-    suspect_rig(cause_of(v.kind), first_frame_of_use(v, frame.number), frame, v.evidence);
+    suspect_rig(cause_of(v.kind),
+                first_frame_of_use(v, frame.number, options.calibration.min_frames), frame,
+                v.evidence);
   }
 }
 

@@ -9,18 +9,12 @@ namespace {
 
 // Number of consecutive frames without a pose after which the state is `lost`.
 constexpr int kLostAfter = 3;
-// Number of consecutive good images without a map after which the calibration in use is given up.
-constexpr int kUnmatchedAfter = 15;
-// Number of moving frames after a repeated image until the camera counts as in sync, if the rig is
-// not monitored.
-constexpr int kLagShownAfter = 12;
-// Number of frames marked after the map was rebuilt.
-constexpr int kRestartedFrames = 10;
-// Number of frames for which a dynamic scene is reported, because a passing vehicle looks static in
-// single frames.
-constexpr int kMovingFrames = 10;
-// Number of frames in a window at speed, where each is a keyframe; the default of
-// odometry.window_keyframes.
+// Number of frames in a window at speed, where each is a keyframe (the default of
+// odometry.window_keyframes). Whatever disturbs a frame is in the window for that long. A rebuilt
+// map and a dynamic scene are marked for as many frames, because a passing vehicle looks static in
+// single ones; a calibration with which so many good images in a row do not match is given up; and
+// a camera that repeated an image counts as in sync after as many moving frames, if the rig is not
+// monitored.
 constexpr int kWindowFrames = 10;
 
 Covariance6 upper_triangle(const Mat6& C) noexcept {
@@ -46,13 +40,13 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
       !degradations.stands(Degradation::late_image) && out.reason == Reason::no_stereo_matches &&
       odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
-  if (options.online && unmatched_frames == kUnmatchedAfter) {
+  if (options.online && unmatched_frames == kWindowFrames) {
     unmatched_frames = 0;
-    give_up_calibration(frame, kUnmatchedAfter);
+    give_up_calibration(frame, kWindowFrames);
   }
   if (out.uneven) {
     degradations.enter(Degradation::late_image, Reason::image_repeated, frame.number,
-                       kLagShownAfter);
+                       kWindowFrames);
     calibrator.monitor().question_pairing();
     // A solve must not mix frames from before with frames that may be out of sync.
     if (calibrator.estimating()) restart_estimation(std::nullopt, frame.number, frame);
@@ -140,7 +134,7 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
   degradations.hold(Degradation::pairing, pairing == Pairing::contradicted,
                     Reason::pairing_ambiguous, last_number);
   if (out.restarted)
-    degradations.enter(Degradation::scene, Reason::map_reset, last_number, kRestartedFrames + 1);
+    degradations.enter(Degradation::scene, Reason::map_reset, last_number, kWindowFrames + 1);
   degradations.hold(Degradation::frame, out.status != PoseStatus::ok,
                     out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason,
                     last_number);
@@ -148,7 +142,7 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
     degradations.enter(Degradation::rig, Reason::recalibrating, last_number);
   if (out.moving && !degradations.any_up_to(Degradation::rig))
     degradations.enter(Degradation::dynamic_scene, Reason::dynamic_scene, last_number,
-                       kMovingFrames);
+                       kWindowFrames);
   // Errors of degraded frames stay in the window's keyframes and points, and correcting them
   // disturbs later motions. So poses stay degraded for as many frames as were degraded, at most for
   // a window's length.

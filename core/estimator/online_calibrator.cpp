@@ -13,11 +13,6 @@ namespace {
 using calibration::Gate;
 using calibration::RigSolution;
 
-// Maximum number of doublings of the frames between two solves.
-constexpr int kMaxDoublings = 4;
-// Minimum growth factor of the frames between two solves.
-constexpr double kGrow = 1.3;
-
 std::size_t max_tracks(const EstimatorOptions& o) noexcept {
   return static_cast<std::size_t>(o.odometry.features);
 }
@@ -129,7 +124,6 @@ void OnlineCalibrator::start_solve() noexcept {
   frames_.solve_begun();
   BackgroundSolve::Start start;
   start.rig = rig_;
-  start.from_rig = !estimating();
   start.for_new_rig = estimating();
   RigCalibration prior;
   if (refined_) {
@@ -219,22 +213,19 @@ void OnlineCalibrator::plan_search() noexcept {
   if (gate_ == Gate::depth_unknown || gate_ == Gate::needs_motion ||
       gate_ == Gate::needs_near_structure) {
     // More frames help: sigmas fall with the root of their number.
-    const double excess = gate_ == Gate::depth_unknown
-                              ? calibration::depth_excess(found.rig, options_.calibration,
-                                                          options_.odometry.pixel_sigma)
-                              : 1.0;
-    const double grow = std::clamp(excess * excess, kGrow, 4.0);
-    frames_.want(static_cast<std::size_t>(std::ceil(grow * found.frames)));
+    const double excess =
+        calibration::depth_excess(found.rig, options_.calibration, options_.odometry.pixel_sigma);
+    frames_.want(static_cast<std::size_t>(std::ceil(excess * excess * found.frames)));
   } else if (gate_ == Gate::rig_changed) {
     search_.onset = found.changed_at;
     search_.change_believed = true;
     frames_.begin_segment(found.changed_at);
   } else {
     // Solving the same frames again gives the same result, so drop them. Each rejection doubles the
-    // frames until the next solve, up to 16 times.
+    // frames until the next solve, up to a full log.
     frames_.drop_before(found.newest + 1);
-    frames_.want_new(frames_.least() << std::min(search_.rejections, kMaxDoublings));
-    ++search_.rejections;
+    search_.wait = std::min(std::max(frames_.least(), 2 * search_.wait), frames_.most());
+    frames_.want_new(search_.wait);
   }
 }
 

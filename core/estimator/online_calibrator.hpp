@@ -96,8 +96,8 @@ class OnlineCalibrator {
     std::uint64_t onset = 0, since = 0;
     /// Frames before a change were dropped once; the remaining ones count as frames of one rig.
     bool change_believed = false;
-    /// Number of rejections for other reasons than too few frames.
-    int rejections = 0;
+    /// Number of new frames that the last rejection made the next solve wait for.
+    std::size_t wait = 0;
   };
 
   /// `misfit_px`: median distance of matches from the epipolar lines beyond their noise.

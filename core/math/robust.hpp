@@ -10,6 +10,11 @@ namespace vergence {
 inline constexpr double kMedianOfNormal = 0.6745;
 // Threshold of Tukey's biweight in scales; 95 % efficient for normal errors.
 inline constexpr double kTukey = 4.685;
+/// Number of reweighting rounds; two reduce the scale from that of a shifted set to that of the
+/// noise.
+inline constexpr int kReweightings = 3;
+/// Number of standard errors that a decision needs which is repeated with every frame or solve.
+inline constexpr double kCertainSigmas = 3.0;
 /// χ² of two coordinates at 99 %.
 inline constexpr double kChi2OfPixel = 9.21;
 

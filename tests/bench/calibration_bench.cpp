@@ -134,7 +134,8 @@ void print_stretches(const std::string& name,
                      const std::vector<calibration::RigSolution>& stretches) {
   fmt::print("{}: {} stretches of some {} frames\n", name, stretches.size(),
              stretches.empty() ? 0 : stretches.front().frames);
-  calibration::Agreement mean;
+  double transform = 0;
+  std::array<double, calibration::kHealthDepths.size()> depth{}, percent{};
   std::size_t n = 0;
   for (std::size_t i = 0; i < stretches.size(); ++i) {
     const calibration::RigSolution& s = stretches[i];
@@ -149,20 +150,26 @@ void print_stretches(const std::string& name,
                s.rig.intrinsics[1].cx, s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy,
                s.rig.intrinsics[1].sigma[3], s.solve_ms, s.rig.inflation);
     if (i == 0) continue;
-    const calibration::Agreement a = calibration::agreement(stretches[i - 1].rig, s.rig, 1);
+    RigCalibration a = stretches[i - 1].rig, b = s.rig;
+    transform += calibration::agreement(a, b, 1);
     ++n;
-    mean.transform += a.transform;
-    mean.intrinsics += a.intrinsics;
-    for (std::size_t k = 0; k < a.depth.size(); ++k)
-      mean.depth[k] += a.depth[k], mean.depth_percent[k] += a.depth_percent[k];
+    a.covariance = calibration::noise_only(a.covariance);
+    b.covariance = calibration::noise_only(b.covariance);
+    for (std::size_t k = 0; k < depth.size(); ++k) {
+      const double z = calibration::kHealthDepths[k];
+      const double off = calibration::depth_error_percent(a, b, 1, z),
+                   own = std::hypot(calibration::depth_error_percent(a, 1, z),
+                                    calibration::depth_error_percent(b, 1, z));
+      percent[k] += off;
+      if (own > 0) depth[k] += off * off / (own * own);
+    }
   }
   if (n == 0) return;
   const auto by = static_cast<double>(n);
-  fmt::print("  NEES a dimension: transform {:.2f}, intrinsics {:.2f}, depth", mean.transform / by,
-             mean.intrinsics / by);
-  for (std::size_t k = 0; k < mean.depth.size(); ++k)
-    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::kDepthM[k], mean.depth[k] / by,
-               mean.depth_percent[k] / by);
+  fmt::print("  NEES a dimension: transform {:.2f}, depth", transform / by);
+  for (std::size_t k = 0; k < depth.size(); ++k)
+    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::kHealthDepths[k], depth[k] / by,
+               percent[k] / by);
   fmt::print("\n");
   std::fflush(stdout);
 }

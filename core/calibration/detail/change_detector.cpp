@@ -11,29 +11,18 @@ namespace {
 // Initial inflation by errors correlated along tracks, as a multiple of the first frame's spread,
 // and the number of frames by which it is weighted.
 constexpr double kFirstLife = 6.5, kGuessFrames = 30;
-// Rates of the running means, per frame.
-constexpr double kSlowUpdate = 1.0 / 300, kFastUpdate = 1.0 / 10;
-// Limits of the inflation: below, stated sigmas are far too large; above, it is no longer a spread.
-constexpr double kMinInflation = 0.3, kMaxInflation = 200;
+// Rate of the fast running mean, per frame; the slow one averages over the longest window.
+constexpr double kFastUpdate = 1.0 / 10;
+// Minimum of the inflation; below, stated sigmas are far too large.
+constexpr double kMinInflation = 0.3;
 // Limit of one frame's spread in units of the running mean; without it a single frame could
 // desensitise the monitor.
 constexpr double kSpreadOutlier = 5;
-// Lengths of windows that are also tested against the frames before them. Only this test shows a
-// knock smaller than the reference's own error.
-constexpr std::size_t kMinReferenceWindow = 10, kMaxReferenceWindow = 150;
-// Number of blocks that a block is compared with; the rig may have drifted since older ones.
-constexpr std::size_t kScatterBlocks = 10;
-// Beyond kFineBlocks only every kCoarse-th block is tried as the onset, which keeps the search
-// cheap in every frame of an alarm.
-constexpr std::size_t kFineBlocks = 24, kCoarse = 4;
 // Share of the threshold below which an alarm ends.
 constexpr double kRelease = 0.5;
-// Relative gain by which a drift must exceed a knock; the best step explains 8/9 of a ramp.
-constexpr double kRampShare = 0.05;
-// Absolute gain by which a drift must exceed a knock.
-constexpr double kRampMargin = 10;
-// Minimum length of a ramp, in frames.
-constexpr int kRampFrames = 150;
+// Ratio of gains by which a drift must exceed a knock. The best step explains 8/9 of a ramp; this
+// is the middle between that and a ramp that explains nothing more, on a logarithmic scale.
+constexpr double kRampGain = 1.06;
 }  // namespace
 
 void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
@@ -69,13 +58,16 @@ void ChangeDetector::measure_scatter() noexcept {
   // A possible change of the rig must not be counted as scatter.
   if (history_.closed() == 0 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
-  for (std::size_t i = 0; i < std::min(history_.blocks(), kScatterBlocks); ++i)
+  // The rig may have drifted since older blocks.
+  const std::size_t recent =
+      static_cast<std::size_t>(options_.long_window) / EvidenceHistory::kBlock;
+  for (std::size_t i = 0; i < std::min(history_.blocks(), recent); ++i)
     past.add(history_.block(i).evidence);
   scatter_.add(history_.open().evidence, past, lambda_);
   renew_floor();
 }
 
-void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
+void ChangeDetector::follow_spread(const StereoResiduals& e) noexcept {
   const auto follow = [](double* mean, double value, double rate) {
     const double most = kSpreadOutlier * *mean;
     // The comparison also rejects NaN.
@@ -87,16 +79,17 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
   } else {
     const double n = static_cast<double>(history_.frames());
     follow(&now_fast_, e.spread_now, kFastUpdate);
-    follow(&now_slow_, e.spread_now, std::max(kSlowUpdate, 1.0 / (n + 1)));
-    follow(&life_slow_, e.spread_life, std::max(kSlowUpdate, 1.0 / (n + kGuessFrames)));
+    const double slow = 1.0 / options_.long_window;
+    follow(&now_slow_, e.spread_now, std::max(slow, 1.0 / (n + 1)));
+    follow(&life_slow_, e.spread_life, std::max(slow, 1.0 / (n + kGuessFrames)));
   }
   // Noise that has just grown (rain, dusk) counts immediately, because it will affect the tracks to
   // come.
   const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
-  lambda_ = std::clamp(std::max(life_slow_, now_slow_) * grown, kMinInflation, kMaxInflation);
+  lambda_ = std::max(std::max(life_slow_, now_slow_) * grown, kMinInflation);
 }
 
-bool ChangeDetector::stands_out(const FrameEvidence& e) const noexcept {
+bool ChangeDetector::stands_out(const StereoResiduals& e) const noexcept {
   if (history_.frames() == 0) return false;
   Vec5 mean;
   Mat5 covariance;
@@ -104,7 +97,7 @@ bool ChangeDetector::stands_out(const FrameEvidence& e) const noexcept {
   return statistic(effective(e.evidence), mean, covariance) > options_.threshold;
 }
 
-void ChangeDetector::push(const FrameEvidence& e) noexcept {
+void ChangeDetector::push(const StereoResiduals& e) noexcept {
   const bool out = stands_out(e);
   if (pending_ && out) {
     take(*pending_);
@@ -117,7 +110,7 @@ void ChangeDetector::push(const FrameEvidence& e) noexcept {
   take(e);
 }
 
-void ChangeDetector::take(const FrameEvidence& e) noexcept {
+void ChangeDetector::take(const StereoResiduals& e) noexcept {
   follow_spread(e);
   if (!history_.push({e.frame, e.evidence})) return;
   measure_scatter();
@@ -155,11 +148,12 @@ double ChangeDetector::single(const Evidence& frame, double spread) const noexce
   return statistic(e, Vec5::Zero(), covariance_);
 }
 
-Decision ChangeDetector::decide() noexcept {
-  Decision d;
+MonitorResult ChangeDetector::decide() noexcept {
+  MonitorResult d;
+  d.threshold = options_.threshold;
   const std::size_t count = history_.frames();
   if (count == 0) return d;
-  d.onset = history_.recent(0).frame;
+  d.onset_frame = history_.recent(0).frame;
   // Length of the window with the largest statistic.
   std::size_t window = 0;
   Evidence sum;
@@ -172,8 +166,8 @@ Decision ChangeDetector::decide() noexcept {
     }
     const Evidence inflated = effective(sum);
     double most = statistic(inflated, Vec5::Zero(), covariance_);
-    if (detector_[w] >= kMinReferenceWindow && detector_[w] <= kMaxReferenceWindow &&
-        count >= 2 * detector_[w]) {
+    // Only this comparison shows a change smaller than the reference's own error.
+    if (count >= 2 * detector_[w]) {
       Vec5 reference;
       Mat5 covariance;
       estimate_reference(sum, &reference, &covariance);
@@ -192,17 +186,16 @@ Decision ChangeDetector::decide() noexcept {
 void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   // Sums Σ e, Σ age e and Σ age² e from the newest entry back, from which a ramp's sums follow.
   Evidence zeroth, first, second;
-  const auto take = [&](const Entry& entry, double age, int frames, bool ask) {
+  const auto take = [&](const Entry& entry, double age, int frames) {
     zeroth.add(entry.evidence);
     first.add(entry.evidence, age);
     second.add(entry.evidence, age * age);
-    if (!ask) return;
     const auto keep = [&](Onset* best, const Evidence& sum) {
       if (const double g = gain(sum.A, sum.g - sum.A * mean) / lambda_; g > best->gain)
         *best = Onset{g, entry.frame, frames, sum};
     };
     keep(&found->step, zeroth);
-    if (frames < kRampFrames) return;
+    if (2 * frames < options_.long_window) return;
     // The weight of an entry is 1 − age/frames.
     Evidence ramp = zeroth;
     ramp.g -= first.g / frames;
@@ -215,34 +208,32 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   const std::size_t whole = std::min((EvidenceHistory::kRecent - open) / kBlock, history_.closed());
   const std::size_t singles = open + whole * kBlock;
   for (std::size_t age = 0; age < singles; ++age)
-    take(history_.recent(age), static_cast<double>(age), static_cast<int>(age) + 1, true);
+    take(history_.recent(age), static_cast<double>(age), static_cast<int>(age) + 1);
   for (std::size_t b = whole; b < history_.blocks(); ++b) {
     const std::size_t oldest = open + (b + 1) * kBlock - 1;
     take(history_.block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1),
-         static_cast<int>(oldest) + 1, b < kFineBlocks || b % kCoarse == 0);
+         static_cast<int>(oldest) + 1);
   }
 }
 
-void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
+void ChangeDetector::attribute(std::size_t window, MonitorResult* d) const noexcept {
   // Subtract the offset before the window if it is known: a slightly wrong reference is not an
   // onset.
   Vec5 mean = Vec5::Zero();
-  const std::size_t recent_frames = std::clamp(window, kMinReferenceWindow, kMaxReferenceWindow);
-  if (history_.frames() >= 2 * recent_frames) {
+  if (history_.frames() >= 2 * window) {
     Evidence sum;
     Mat5 covariance;
-    history_.sum_of(recent_frames, &sum);
+    history_.sum_of(window, &sum);
     estimate_reference(sum, &mean, &covariance);
   }
   Search found;
   search(mean, &found);
-  const bool ramp =
-      found.ramp.gain > found.step.gain + std::max(kRampMargin, kRampShare * found.step.gain);
+  const bool ramp = found.ramp.gain > kRampGain * found.step.gain;
   d->kind = ramp ? MonitorResult::Kind::drift : MonitorResult::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;
-  d->onset = onset.frame;
-  d->frames = onset.frames;
-  d->shift_px = shift_px(onset.since);
+  d->onset_frame = onset.frame;
+  d->frames_since_onset = onset.frames;
+  d->evidence = {0.5 * d->statistic, shift_px(onset.since), 0};
 }
 
 }  // namespace vergence::calibration::detail

@@ -5,31 +5,10 @@
 
 #include "core/calibration/detail/evidence_history.hpp"
 #include "core/calibration/detail/monitor_evidence.hpp"
+#include "core/calibration/detail/monitor_residuals.hpp"
 #include "core/calibration/detail/monitor_scatter.hpp"
-#include "core/calibration/monitor.hpp"
-#include "core/geometry/epipolar.hpp"
 
 namespace vergence::calibration::detail {
-
-struct FrameEvidence {
-  std::uint64_t frame = 0;
-  Evidence evidence;
-  /// See StereoResiduals.
-  double spread_now = 0, spread_life = 0;
-};
-
-/// Combined result of all windows.
-struct Decision {
-  MonitorResult::Kind kind = MonitorResult::Kind::quiet;
-  double statistic = 0;
-  /// True if the newest frame is a single outlier so far; the next frame decides.
-  bool undecided = false;
-  /// Displacement of the matches by the change since the onset, rms; 0 with `quiet`.
-  double shift_px = 0;
-  std::uint64_t onset = 0;
-  /// Number of frames measured since the onset.
-  int frames = 0;
-};
 
 /// Change tests on the evidence of past moving frames in sliding windows. Independent of images and
 /// tracks.
@@ -42,8 +21,9 @@ class ChangeDetector {
   void expect_scatter(double bias_px) noexcept;
   /// A frame that exceeds the threshold on its own counts only if the next one does as well: a
   /// knock lasts, whereas a distorted image (skewed exposure, a shaken rolling shutter) does not.
-  void push(const FrameEvidence& e) noexcept;
-  [[nodiscard]] Decision decide() noexcept;
+  void push(const StereoResiduals& e) noexcept;
+  /// Combined result of all windows, without `rotation_mrad`.
+  [[nodiscard]] MonitorResult decide() noexcept;
   /// Statistic of a single frame, for a standing rig; `spread` is its own inflation λ.
   [[nodiscard]] double single(const Evidence& frame, double spread) const noexcept;
 
@@ -62,9 +42,9 @@ class ChangeDetector {
     Onset step, ramp;
   };
 
-  void follow_spread(const FrameEvidence& e) noexcept;
-  void take(const FrameEvidence& e) noexcept;
-  [[nodiscard]] bool stands_out(const FrameEvidence& e) const noexcept;
+  void follow_spread(const StereoResiduals& e) noexcept;
+  void take(const StereoResiduals& e) noexcept;
+  [[nodiscard]] bool stands_out(const StereoResiduals& e) const noexcept;
   void measure_scatter() noexcept;
   void renew_floor() noexcept;
   [[nodiscard]] Evidence effective(const Evidence& sum) const noexcept;
@@ -72,7 +52,7 @@ class ChangeDetector {
                                         const Mat5& covariance) noexcept;
   void estimate_reference(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept;
   void search(const Vec5& mean, Search* found) const noexcept;
-  void attribute(std::size_t window, Decision* d) const noexcept;
+  void attribute(std::size_t window, MonitorResult* d) const noexcept;
 
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();
@@ -83,7 +63,7 @@ class ChangeDetector {
   std::size_t window_count_ = 0;
   EvidenceHistory history_;
   // Frame above the threshold that waits for the next one.
-  std::optional<FrameEvidence> pending_;
+  std::optional<StereoResiduals> pending_;
   double lambda_ = 0;
   // Running means of the spreads.
   double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;

@@ -9,8 +9,6 @@
 namespace vergence::calibration::detail {
 namespace {
 
-// Number of reweighting rounds; two reduce the scale from that of a knock to that of the noise.
-constexpr int kStereoRounds = 3;
 // Minimum scale, in sigmas of the observations.
 constexpr double kMinScale = 0.1;
 // Correction because an M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')²
@@ -52,10 +50,11 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) ++rows_;
   }
   StereoResiduals look;
+  look.frame = frame.frame;
   if (rows_ < static_cast<std::size_t>(min_matches)) return look;
 
   Vec5 fit = Vec5::Zero();
-  for (int round = 0; round < kStereoRounds; ++round) {
+  for (int round = 0; round < kReweightings; ++round) {
     const auto rest = [&](const StereoRow& row) { return row.r + row.J.dot(fit); };
     for (std::size_t i = 0; i < rows_; ++i)
       sizes_[i] = std::abs(rest(stereo_[i])) * std::sqrt(stereo_[i].inverse_sigma2);

@@ -19,6 +19,7 @@ struct Reference {
 
 /// Evidence from one frame's stereo matches.
 struct StereoResiduals {
+  std::uint64_t frame = 0;
   /// True if there are enough matches.
   bool usable = false;
   Evidence evidence;

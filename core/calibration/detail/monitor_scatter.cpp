@@ -1,12 +1,12 @@
 #include "core/calibration/detail/monitor_scatter.hpp"
 
+#include <cmath>
+
 #include "core/math/linear_solve.hpp"
 
 namespace vergence::calibration::detail {
 namespace {
 
-// Ratio to the expected scatter above which a block's offset is a change of the rig.
-constexpr double kMaxOfExpected = 20;
 // Length of the running mean, in blocks: half a minute at 30 Hz.
 constexpr double kMaxBlocks = 60;
 
@@ -19,9 +19,7 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const Vec5 d = of_block.solve(block.g) - of_past.solve(past.g);
   const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
   const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
-  const double most = kMaxOfExpected * std::max(variance(), lambda / block.n);
-  // The comparison also rejects NaN.
-  if (!(scatter < most)) return;
+  if (!std::isfinite(scatter)) return;
   if (static_cast<double>(blocks_) >= kMaxBlocks) {
     sum_ *= (kMaxBlocks - 1) / kMaxBlocks;
     --blocks_;

@@ -32,7 +32,7 @@ class CovarianceBaseline {
     recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
     times_ = kept_ >= kMin ? sigma_m / median() : 0;
     const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
-    unusual_ = unusual_ ? std::sqrt(squares / kRecent) > kRelease * median() : times_ > kTimes;
+    unusual_ = times_ > kTimes || (unusual_ && std::sqrt(squares / kRecent) > kTimes * median());
     if (unusual_) return true;
     sigma_[next_] = sigma_m;
     next_ = (next_ + 1) % kKept;
@@ -46,7 +46,7 @@ class CovarianceBaseline {
  private:
   // Numbers of motions in the baseline, before it is used, and in the test for the end.
   static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 3;
-  static constexpr double kTimes = 3, kRelease = 2;
+  static constexpr double kTimes = 3;
 
   [[nodiscard]] double median() const noexcept {
     std::array<double, kKept> sorted = sigma_;

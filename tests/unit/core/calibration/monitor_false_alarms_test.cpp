@@ -12,7 +12,7 @@ namespace vergence::test {
 namespace {
 
 using calibration::MonitorResult;
-using namespace calibration::detail;
+using calibration::detail::ChangeDetector;
 
 // An hour has this many frames at 30 Hz.
 constexpr int kHour = 108000;
@@ -104,14 +104,14 @@ TEST(MonitorFalseAlarms, hundredHoursHaveAtMostFourAlarms) {
       if (f.moving) {
         standing_over = 0;
         windows->push(f.evidence);
-        const Decision d = windows->decide();
+        const MonitorResult d = windows->decide();
         most = std::max(most, d.statistic);
         alarm = d.kind != MonitorResult::Kind::quiet;
       } else {
-        const double s = windows->single(f.evidence.evidence, f.spread_now) / 1.5;
+        const double s = windows->single(f.evidence.evidence, f.spread_now);
         worst_standing = std::max(worst_standing, s);
         standing_over = s > options.threshold ? standing_over + 1 : 0;
-        alarm = standing_over == 3;
+        alarm = standing_over == options.collapse_frames;
       }
       if (!alarm) continue;
       ++alarms;

@@ -19,7 +19,7 @@ namespace vergence::test {
 class ModeDrive {
  public:
   struct Frame {
-    calibration::detail::FrameEvidence evidence;
+    calibration::detail::StereoResiduals evidence;
     bool moving = false;
     double spread_now = 0;
   };
@@ -96,9 +96,7 @@ class ModeDrive {
       Frame f;
       f.moving = frame.moving;
       f.spread_now = stereo.spread_now;
-      f.evidence.evidence = stereo.evidence;
-      f.evidence.spread_now = stereo.spread_now;
-      f.evidence.spread_life = stereo.spread_life;
+      f.evidence = stereo;
       frames_.push_back(f);
       if (!frame.moving || frame.frame < 100) return;
       ++moving, spread_now_ += stereo.spread_now, spread_life_ += stereo.spread_life;

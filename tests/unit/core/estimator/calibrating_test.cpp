@@ -22,6 +22,14 @@ struct Drive : test::CorridorDrive {
   void drive(int first, int last) { drive(first, last, corridor.rig().T_camera_left); }
   void drive(int first, int last, const std::array<Transform, kMaxCameras>& rig) {
     for (int i = first; i < last; ++i) give(corridor.frame(i, rig));
+    keep_requested();
+  }
+  void finish() {
+    estimator->finish();
+    note();
+    keep_requested();
+  }
+  void keep_requested() {
     std::erase_if(decisions, [](const CalibrationDecision& d) { return d.is_refinement; });
   }
   /// State by state, as the events have it.
@@ -176,8 +184,7 @@ TEST(Calibrating, finishDecidesAPendingCalibrationOnce) {
   d.begin();
   d.drive(0, 29);
   EXPECT_TRUE(d.decisions.empty()) << d.story;
-  d.estimator->finish();
-  d.note();
+  d.finish();
   ASSERT_EQ(d.decisions.size(), 1U) << d.story;
   EXPECT_TRUE(d.decisions[0].accepted) << d.decisions[0].reason;
   d.estimator->finish();

@@ -23,7 +23,7 @@ TEST(CovarianceBaseline, threeTimesTheUsualSigmaIsUnusual) {
 
 TEST(CovarianceBaseline, oneCertainMotionDoesNotEndIt) {
   CovarianceBaseline usual = driven(100);
-  for (int i = 0; i < 5; ++i) (void)usual.unusual(0.045);
+  for (int i = 0; i < 5; ++i) (void)usual.unusual(0.06);
   EXPECT_TRUE(usual.unusual(0.014));
   for (int i = 0; i < 3; ++i) (void)usual.unusual(0.014);
   EXPECT_FALSE(usual.unusual(0.014));
