@@ -12,6 +12,11 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
+std::array<double*, 9> parameters(Intrinsics* k) {
+  auto& d = k->distortion;
+  return {&k->fx, &k->fy, &k->cx, &k->cy, &d[0], &d[1], &d[2], &d[3], &d[4]};
+}
+
 /// The parameters of one problem and how a vector moves them, written down independently of the
 /// adjuster.
 struct Dense {
@@ -59,15 +64,7 @@ struct Dense {
         }
       }
       Intrinsics in = out.cameras[k].intrinsics();
-      double* all[] = {&in.fx,
-                       &in.fy,
-                       &in.cx,
-                       &in.cy,
-                       &in.distortion[0],
-                       &in.distortion[1],
-                       &in.distortion[2],
-                       &in.distortion[3],
-                       &in.distortion[4]};
+      const auto all = parameters(&in);
       for (unsigned i = 0; i < 9; ++i)
         if (((options.intrinsics[k].free >> i) & 1U) != 0) *all[i] += v[at++];
       out.cameras[k] = Camera(in);
@@ -93,20 +90,12 @@ struct Dense {
         if (k > 0 && options.length[k].kind == BundleLength::measured)
           e.push_back((at.T_camera_left[k].t.norm() - options.length[k].metres) /
                       options.length[k].sigma);
-        const Intrinsics& in = at.cameras[k].intrinsics();
-        const double all[] = {in.fx,
-                              in.fy,
-                              in.cx,
-                              in.cy,
-                              in.distortion[0],
-                              in.distortion[1],
-                              in.distortion[2],
-                              in.distortion[3],
-                              in.distortion[4]};
+        Intrinsics in = at.cameras[k].intrinsics();
+        const auto all = parameters(&in);
         for (unsigned i = 0; i < 9; ++i)
           if (((options.intrinsics[k].free >> i) & 1U) != 0 &&
               options.intrinsics[k].prior_sigma[i] > 0)
-            e.push_back((all[i] - options.intrinsics[k].prior_mean[i]) /
+            e.push_back((*all[i] - options.intrinsics[k].prior_mean[i]) /
                         options.intrinsics[k].prior_sigma[i]);
       }
     return Eigen::Map<const Vector>(e.data(), static_cast<Eigen::Index>(e.size()));

@@ -20,8 +20,7 @@ using FreeVector = Eigen::Matrix<double, kFree, 1>;
 constexpr int row_of(int i) { return i < 6 ? extrinsic_row(1) + i : intrinsic_row(1) + i - 6; }
 
 RigCalibration rig() {
-  RigCalibration r = test::parallel_rig(
-      {.width = 1024, .height = 768, .fx = 1247, .fy = 1247, .cx = 511.5, .cy = 383.5}, 0.75);
+  RigCalibration r = test::parallel_rig(test::pinhole(1024, 768, 1247), 0.75);
   r.T_camera_left[1].R = exp_so3({5e-3, -8e-3, 3e-3});
   return r;
 }

@@ -14,13 +14,7 @@ namespace {
 constexpr double kBaseline = 0.75, kFocal = 1247;
 
 RigCalibration rig_with(double baseline, double focal, int width, int height) {
-  return test::parallel_rig({.width = width,
-                             .height = height,
-                             .fx = focal,
-                             .fy = focal,
-                             .cx = 0.5 * (width - 1),
-                             .cy = 0.5 * (height - 1)},
-                            baseline);
+  return test::parallel_rig(test::pinhole(width, height, focal), baseline);
 }
 
 RigCalibration wide_rig() { return rig_with(kBaseline, kFocal, 1024, 768); }

@@ -9,10 +9,7 @@ namespace vergence::calibration {
 namespace {
 
 /// Two cameras side by side that see little more than what is straight ahead: x/z within ±0.05.
-RigCalibration narrow_rig() {
-  return test::parallel_rig(
-      {.width = 700, .height = 500, .fx = 7000, .fy = 7000, .cx = 349.5, .cy = 249.5}, 0.1);
-}
+RigCalibration narrow_rig() { return test::parallel_rig(test::pinhole(700, 500, 7000), 0.1); }
 
 void know(RigCalibration* rig, std::size_t k, int what, double sigma) {
   rig->sigma_total[k][static_cast<std::size_t>(what)] = sigma;

@@ -23,15 +23,7 @@ struct Model {
 
 Intrinsics intrinsics(CameraModelKind kind, int width, int height, const std::array<double, 4>& k,
                       const std::array<double, 5>& d) {
-  Intrinsics i{.kind = kind,
-               .width = width,
-               .height = height,
-               .fx = k[0],
-               .fy = k[1],
-               .cx = k[2],
-               .cy = k[3],
-               .distortion = d};
-  return i;
+  return {kind, width, height, k[0], k[1], k[2], k[3], d};
 }
 
 /// Real lenses of both kinds and one without distortion.

@@ -1,5 +1,4 @@
 #include "core/memory/arena.hpp"
-#include "tests/support/mentions.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +7,8 @@
 #include <cstring>
 #include <limits>
 #include <string>
+
+#include "tests/support/mentions.hpp"
 
 namespace vergence {
 namespace {

@@ -8,6 +8,7 @@
 #include "core/odometry/odometry.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/rig_frame.hpp"
+#include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::odometry::test {
@@ -19,11 +20,7 @@ class Corridor {
  public:
   explicit Corridor(int cameras = 2)
       : images_(static_cast<std::size_t>(cameras), features::test::Image(kWidth, kHeight)) {
-    rig_.cameras = cameras;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
-      Intrinsics& c = rig_.intrinsics[k];
-      c.width = kWidth, c.height = kHeight, c.fx = c.fy = 280, c.cx = 159.5, c.cy = 119.5;
-    }
+    rig_ = vergence::test::parallel_rig(vergence::test::pinhole(kWidth, kHeight, 280), 0, cameras);
     rig_.T_camera_left[1] = {exp_so3({0.004, -0.01, 0.006}), {-0.5, 0.01, -0.008}};
     if (cameras > 2) rig_.T_camera_left[2] = {exp_so3({-0.006, 0.004, 0.002}), {-0.2, -0.05, 0.01}};
     rig_.baseline = rig_.T_camera_left[1].t.norm();

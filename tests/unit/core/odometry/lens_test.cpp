@@ -11,13 +11,7 @@ namespace vergence::odometry {
 namespace {
 
 Intrinsics wide_lens(CameraModelKind kind) {
-  Intrinsics k{.kind = kind,
-               .width = 752,
-               .height = 480,
-               .fx = 458.6,
-               .fy = 457.3,
-               .cx = 367.2,
-               .cy = 248.4};
+  Intrinsics k{kind, 752, 480, 458.6, 457.3, 367.2, 248.4};
   if (kind == CameraModelKind::pinhole_radtan)
     k.distortion = {-0.28, 0.074, 0.0002, 0.00002, 0};
   else

@@ -56,12 +56,8 @@ TEST(GigeCamera, refusalNamesWhatTheCameraOffers) {
   refused([](auto* c) { c->width = 316; }, "steps of 8");
   refused([](auto* c) { c->pixel_format = "RGB8"; }, "Mono8, Mono12, BayerGB8");
   refused([](auto* c) { c->gain_db = 48; }, "0 to 24 dB");
-  refused(
-      [](auto* c) {
-        c->rate_hz = 450;
-        c->exposure = Duration::microseconds(100);
-      },
-      "0.5 to 400 Hz");
+  refused([](auto* c) { c->rate_hz = 450, c->exposure = Duration::microseconds(100); },
+          "0.5 to 400 Hz");
   refused([](auto* c) { c->exposure = Duration::microseconds(2); }, "10 to 900000 us");
   refused(
       [](auto* c) {

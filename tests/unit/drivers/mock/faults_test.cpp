@@ -1,5 +1,4 @@
 #include "drivers/mock/faults.hpp"
-#include "tests/support/mentions.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+
+#include "tests/support/mentions.hpp"
 
 namespace vergence::mock {
 namespace {
