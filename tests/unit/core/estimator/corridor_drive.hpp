@@ -49,13 +49,13 @@ struct CorridorDrive {
       events.push_back(e);
       frames.push_back(samples.back().frame);
       story += std::to_string(static_cast<int>(e.kind)) + ' ' + std::string(to_string(e.from)) +
-               " → " + std::string(to_string(e.to)) + ": " + e.why + ' ' +
-               std::to_string(e.value) + '\n';
+               " → " + std::string(to_string(e.to)) + ": " + e.why + ' ' + std::to_string(e.value) +
+               '\n';
     }
     for (const CalibrationDecision& d : estimator->calibrations()) {
       decisions.push_back(d);
-      story += std::string(d.accepted ? "accepted " : "rejected ") + d.reason +
-               ", depth off by " + std::to_string(d.depth_error_percent) + " %, sigma " +
+      story += std::string(d.accepted ? "accepted " : "rejected ") + d.reason + ", depth off by " +
+               std::to_string(d.depth_error_percent) + " %, sigma " +
                std::to_string(d.depth_sigma_percent) + " %\n";
     }
   }
