@@ -648,7 +648,8 @@ Group monitor() {
       .integer("long_window", &M::long_window, 60, 1800, "frames",
                "Longest window of moving frames that is tested: for drift.")
       .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
-               "Consecutive frames without the expected stereo matches that are a `collapse`.")
+               "Consecutive frames without the expected stereo matches that are a `collapse`, or "
+               "over the threshold that are a knock at standstill.")
       .number("collapse_share", &M::collapse_share, 0.01, 0.9, "",
               "Share of the expected matches below which a frame counts towards a collapse.")
       .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",

@@ -1,6 +1,7 @@
 #include "core/calibration/agreement.hpp"
 
 #include <array>
+#include <limits>
 
 #include "core/geometry/epipolar.hpp"
 #include "core/math/linear_solve.hpp"
@@ -9,12 +10,12 @@
 namespace vergence::calibration {
 
 RigCovariance noise_only(const RigCovariance& wide) noexcept {
-  // Share of a variance below which earlier parameters determine this one.
-  constexpr double kNothingLeft = 1e-12;
   RigCovariance noise = wide;
   for (int held = intrinsic_row(0); held < intrinsic_row(0) + 4; ++held) {
     const double variance = noise(held, held);
-    if (!wide.known(held) || !(variance > kNothingLeft * wide(held, held))) continue;
+    // Earlier parameters determine this one if only rounding is left of its variance.
+    constexpr double rounding = kRigSize * std::numeric_limits<double>::epsilon();
+    if (!wide.known(held) || !(variance > rounding * wide(held, held))) continue;
     std::array<double, kRigSize> with_held;
     for (int r = 0; r < kRigSize; ++r) with_held[static_cast<std::size_t>(r)] = noise(r, held);
     for (int r = 0; r < kRigSize; ++r)

@@ -8,8 +8,6 @@
 namespace vergence::calibration {
 namespace {
 
-// Minimum residual scale, in pixels; corners are not localised better.
-constexpr double kMinScale = 0.05;
 // Usual rms shift of undisturbed frames at least, in pixels (build/bench/margin_bench).
 constexpr double kUsualShift = 0.12;
 // Minimum jump, as a multiple of the usual shift and of the frame's own sigma.

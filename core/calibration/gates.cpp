@@ -14,8 +14,6 @@
 namespace vergence::calibration {
 namespace {
 
-// Minimum number of held-out frames of a test.
-constexpr int kMinHeldOut = 3;
 // Ratio of the median distance from epipolar lines on held-out frames to that on the frames used
 // above which they contradict a solution. The latter counts as at least a corner's noise and at
 // most kWorstUsed px; on recorded sequences both are 0.08 to 0.25 px.

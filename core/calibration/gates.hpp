@@ -15,6 +15,9 @@ struct HeldOut {
   double median_px = 0;
 };
 
+/// Minimum number of held-out frames of a test.
+inline constexpr int kMinHeldOut = 6;
+
 /// Measures the fit on frames newer than frame number `after`: at most the newest kHeldOutFrames,
 /// and at most kHeldOutMatches of each. With several additional cameras the worst one counts, in
 /// its own pixels. Pure.

@@ -6,8 +6,6 @@
 namespace vergence::calibration {
 namespace {
 
-// Sigma of an unknown transform: rotation in rad, translation in baselines.
-constexpr double kUnknown = 0.2;
 // Random walk of a pinhole's parameters, in focal lengths, relative to the rotation's; temperature
 // causes both. Distortion coefficients walk as the rotation does.
 constexpr double kPinholeOfDrift = 0.3;
@@ -41,7 +39,7 @@ void clear_transforms(RigCalibration* rig) noexcept {
     for (int i = 0; i < 6; ++i) {
       const int row = extrinsic_row(k) + i;
       for (int other = 0; other < kRigSize; ++other) rig->covariance.set(row, other, 0);
-      const double sigma = i < 3 ? kUnknown : kUnknown * length;
+      const double sigma = i < 3 ? kUnknownTransform : kUnknownTransform * length;
       rig->covariance.set(row, row, sigma * sigma);
     }
   }

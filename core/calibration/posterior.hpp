@@ -4,6 +4,10 @@
 
 namespace vergence::calibration {
 
+/// Sigma of an unknown transform, rotation in rad and translation in baselines: wider than the
+/// error of any rig whose images still match.
+inline constexpr double kUnknownTransform = 0.2;
+
 /// Widens the joint covariance of a calibration by the random walk of `hours`. Pure.
 void let_drift(double hours, const CalibrationOptions& options, RigCalibration* rig) noexcept;
 

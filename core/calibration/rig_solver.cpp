@@ -20,8 +20,8 @@ constexpr std::size_t kLanesABlock = 2;
 constexpr int kMinTracks = 40;
 // Threshold of both losses, in residual scales.
 constexpr double kLossThreshold = 2.5;
-// Limits above which an observation is left out, in residual scales.
-constexpr double kFirstCut = 6.0, kLastCut = 4.0;
+// Limit above which an observation is left out, in residual scales.
+constexpr double kCut = 5.0;
 // Maximum number of steps of the last adjustment; a focal length with an error of a quarter takes
 // more than a hundred.
 constexpr int kMaxSteps = 200;
@@ -185,13 +185,12 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexc
   how.cost_tolerance = 1e-3;
   BundleResult r = adjust(how);
   s->steps = r.steps;
-  for (const double cut : {kFirstCut, kLastCut}) {
+  for (const bool last : {false, true}) {
     if (!r.usable()) return r;
     const double scale = residual_scale();
-    drop_outliers(cut * scale);
+    drop_outliers(kCut * scale);
     how.loss = BundleLoss::cauchy;
     how.loss_threshold = kLossThreshold * scale;
-    const bool last = cut == kLastCut;
     how.max_steps = last ? kMaxSteps : 8;
     how.cost_tolerance = last ? 3e-6 : 1e-4;
     how.covariance = how.pose_covariance = last;

@@ -8,9 +8,6 @@
 namespace vergence::calibration {
 namespace {
 
-// Factor of the monitor's threshold, because the reference was estimated from the same frames.
-constexpr double kCertainChange = 2;
-
 /// Replaces the sigmas of the intrinsics that were estimated.
 Intrinsics with_sigmas(Intrinsics lens, const std::array<double, kIntrinsicsSize>& sigma) noexcept {
   for (std::size_t i = 0; i < sigma.size(); ++i)
@@ -127,8 +124,7 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
     const DisparityJump jump = jumps_.next(f.number, stereo_.span(), step);
     if (jump.confirmed) seen.changed_at = jump.onset_frame;
-    if (v.kind == MonitorResult::Kind::knock && v.statistic > kCertainChange * v.threshold)
-      seen.changed_at = v.onset_frame;
+    if (v.kind == MonitorResult::Kind::knock) seen.changed_at = v.onset_frame;
   }
   return seen;
 }

@@ -3,13 +3,9 @@
 #include <algorithm>
 #include <chrono>
 
+#include "core/calibration/gates.hpp"
+
 namespace vergence {
-namespace {
-
-// Minimum number of frames after a snapshot, on which the gates test the solution.
-constexpr int kMinHeldOut = 6;
-
-}  // namespace
 
 BackgroundSolve::BackgroundSolve(const EstimatorOptions& options, const RigCalibration& given,
                                  std::size_t tracks, Arena& arena, BackgroundRunner& runner)
@@ -38,7 +34,7 @@ void BackgroundSolve::start(const calibration::TrackLog& log, const Start& start
   running_ = true;
   discarded_ = false;
   frames_since_start_ = 0;
-  next_turn_ = std::min(kMinHeldOut, options_.calibration.adopt_after);
+  next_turn_ = std::min(calibration::kMinHeldOut, options_.calibration.adopt_after);
   runner_.start(TaskRef(task_));
 }
 
@@ -70,7 +66,7 @@ bool BackgroundSolve::last_turn() const noexcept {
 }
 
 void BackgroundSolve::postpone() noexcept {
-  next_turn_ = std::min(next_turn_ + kMinHeldOut, options_.calibration.adopt_after);
+  next_turn_ = std::min(next_turn_ + calibration::kMinHeldOut, options_.calibration.adopt_after);
 }
 
 void BackgroundSolve::finish() noexcept {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/calibration/gates.hpp"
+
 namespace vergence {
 namespace {
 
@@ -11,10 +13,6 @@ using odometry::MapPoint;
 // Minimum mean displacement of the tracks between two logged frames, in pixels; closer frames
 // repeat the same errors.
 constexpr double kMovedPixels = 1.0;
-// Number of frames without a logged one after which the rig counts as standing still.
-constexpr int kStillFrames = 15;
-// Minimum number of new frames between two solves.
-constexpr std::size_t kNewFrames = 5;
 
 double pixels_moved(const odometry::Map& map) noexcept {
   double sum = 0;
@@ -24,8 +22,7 @@ double pixels_moved(const odometry::Map& map) noexcept {
     sum += static_cast<double>((p.raw[0] - p.logged_at).norm());
     ++n;
   }
-  constexpr int kEnough = 10;
-  return n < kEnough ? std::numeric_limits<double>::infinity() : sum / n;
+  return n == 0 ? std::numeric_limits<double>::infinity() : sum / n;
 }
 
 }  // namespace
@@ -71,7 +68,7 @@ void CalibrationFrames::take(odometry::Odometry& odometry, const odometry::Frame
   frames_still_ = 0;
 }
 
-bool CalibrationFrames::standing() const noexcept { return frames_still_ > kStillFrames; }
+bool CalibrationFrames::standing() const noexcept { return frames_still_ > options_.min_frames; }
 
 void CalibrationFrames::begin_segment(std::uint64_t number) noexcept {
   log_.drop_before(number);
@@ -94,11 +91,11 @@ bool CalibrationFrames::enough() const noexcept { return logged_ >= wanted_ && e
 bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= min_to_solve(); }
 
 bool CalibrationFrames::new_since_solve() const noexcept {
-  return log_.size() >= solved_frames_ + kNewFrames;
+  return log_.size() >= solved_frames_ + calibration::kMinHeldOut;
 }
 
 void CalibrationFrames::want(std::size_t frames) noexcept {
-  wanted_ = std::max(std::min(most(), frames), logged_ + kNewFrames);
+  wanted_ = std::max(std::min(most(), frames), logged_ + calibration::kMinHeldOut);
 }
 
 std::size_t CalibrationFrames::most() const noexcept {
@@ -106,9 +103,8 @@ std::size_t CalibrationFrames::most() const noexcept {
 }
 
 std::size_t CalibrationFrames::min_to_solve() const noexcept {
-  // With six held-out frames, a supplied calibration is evaluated in frame 25.
-  constexpr std::size_t kFewest = 20;
-  return std::min(kFewest, least());
+  // With the held-out frames, a supplied calibration is evaluated as soon as a new one is solved.
+  return least() - std::min<std::size_t>(least(), calibration::kMinHeldOut);
 }
 
 std::size_t CalibrationFrames::least() const noexcept {

@@ -45,8 +45,8 @@ class CalibrationFrames {
   /// Number of the segment's frames in the newest solve.
   [[nodiscard]] std::size_t solved_frames() const noexcept { return solved_frames_; }
 
-  /// Makes the next solve wait for this many frames of the segment, and for at least kNewFrames new
-  /// ones.
+  /// Makes the next solve wait for this many frames of the segment, and for at least kMinHeldOut
+  /// new ones.
   void want(std::size_t frames) noexcept;
   /// Makes the next solve wait until the log holds `frames` frames.
   void want_new(std::size_t frames) noexcept { wanted_ = logged_ - log_.size() + frames; }

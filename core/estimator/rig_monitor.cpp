@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/calibration/posterior.hpp"
 #include "core/geometry/epipolar.hpp"
 
 namespace vergence {
@@ -11,11 +12,6 @@ namespace {
 using calibration::MonitorResult;
 using odometry::MapPoint;
 
-// Margin of the image in which a track need not be found, in pixels.
-constexpr double kImageMargin = 12.0;
-// Sigmas of an unverified or supplied reference: rotation in rad, translation in baselines. They
-// are wide, so that only a change against earlier frames counts as a knock.
-constexpr std::array kReference = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 // Sigmas of a verified calibration solved from images: the residual lens error in one stretch. The
 // solve's own sigmas do not apply, because it determines rotations and principal points only
 // together.
@@ -34,9 +30,11 @@ constexpr double kSpoilt = 2;
 // Minimum speed of a moving rig, in m/s; below it, consecutive images are nearly the same.
 constexpr double kMovingSpeed = 0.5;
 
-/// Covariance from sigmas; the last three are in units of `length`, in metres.
-Mat6 squares(const std::array<double, 6>& sigma, double length) noexcept {
-  Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
+/// Covariance of a reference with a baseline of `length` metres. Unless it was solved from images
+/// and verified it is wide, so that only a change against earlier frames counts as a knock.
+Mat6 covariance_of(bool solved_and_verified, double length) noexcept {
+  Vec6 spread = Vec6::Constant(calibration::kUnknownTransform);
+  if (solved_and_verified) spread = Eigen::Map<const Vec6>(kFound.data());
   spread.tail<3>() *= length;
   return spread.cwiseAbs2().asDiagonal();
 }
@@ -94,7 +92,7 @@ void RigMonitor::watch(const RigCalibration& rig, bool solved_and_verified) noex
     Watched& w = camera(k);
     w.pairing.reset();
     const Transform& T = transform(rig_, k);
-    set_monitor_reference(k, T, squares(solved_and_verified ? kFound : kReference, T.t.norm()));
+    set_monitor_reference(k, T, covariance_of(solved_and_verified, T.t.norm()));
   }
 }
 
@@ -157,8 +155,7 @@ int RigMonitor::expected_stereo(const odometry::Odometry& odometry, int k,
   for (const MapPoint& p : odometry.map().points()) {
     Vec2 at;
     if (p.stage == odometry::PointStage::active && p.now.by(0) &&
-        camera.project(T * p.p_world, &at, nullptr) == ProjectStatus::ok &&
-        camera.inside(at, kImageMargin))
+        camera.project(T * p.p_world, &at, nullptr) == ProjectStatus::ok && camera.inside(at, 0.0))
       ++n;
   }
   return n;

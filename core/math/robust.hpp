@@ -10,6 +10,9 @@ namespace vergence {
 inline constexpr double kMedianOfNormal = 0.6745;
 // Threshold of Tukey's biweight in scales; 95 % efficient for normal errors.
 inline constexpr double kTukey = 4.685;
+/// Minimum scale of residuals, in px or in sigmas of about as much; corners are not localised
+/// better.
+inline constexpr double kMinScale = 0.05;
 /// Number of reweighting rounds; two reduce the scale from that of a shifted set to that of the
 /// noise.
 inline constexpr int kReweightings = 3;

@@ -5,12 +5,14 @@
 //
 // NEES is the normalised squared error of the motion over a number of frames, position and rotation
 // apart, each 3 where the covariance is right: above, it promises too much, below, too little.
-// "within" is the share of positions inside the ellipsoid of 95 %. The recorded drives' truth has
-// errors of its own, which are added to the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger,
-// Lenz, Urtasun, CVPR 2012), of EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where
-// nothing is stated, an assumed 0.05°. The last line of a drive is the largest share of a
-// motion that the window corrected by more than the motion's sigma.
+// "within" is the share of positions
+// inside the ellipsoid of 95 %. The recorded drives' truth has errors of its own, which are added
+// to the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger, Lenz, Urtasun, CVPR 2012), of
+// EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where nothing is stated, an assumed
+// 0.05°. The last line of a drive is the largest share of a motion that the window corrected by
+// more than the motion's sigma.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <span>
@@ -39,6 +41,17 @@ struct TruthSigma {
   double position_m = 0, rotation_rad = 0;
 };
 constexpr TruthSigma kKitti{0.02, 0.1 / 57.29578}, kEuroc{0.001, 0.05 / 57.29578}, kExact{};
+
+/// Frames of kitti00_151 whose truth is no measurement: up to 14 the truth moves 0.859 m a frame
+/// and turns by 0.0024 rad, each time, while the car accelerates from 0.68 to 0.86 m; at 39 its
+/// speed jumps by 8 cm a frame, which decays until 50. Motions that include them are counted apart.
+constexpr std::array<std::array<std::size_t, 2>, 2> kNoTruth = {{{0, 14}, {38, 50}}};
+
+bool without_truth(const std::string& drive, std::size_t first, std::size_t last) {
+  return drive == "kitti00_151" && std::ranges::any_of(kNoTruth, [&](const auto& span) {
+           return first < span[1] && last > span[0];
+         });
+}
 
 struct Posed {
   PoseSample sample{};
@@ -164,11 +177,12 @@ double largest_correction(std::span<const Posed> poses) {
 void print(const std::string& name, const TruthSigma& sigma, std::span<const Posed> poses) {
   if (poses.empty()) return;
   for (const std::size_t frames : {1U, 5U, 10U, 20U, 50U, 100U}) {
-    Means means;
+    Means means, spoilt;
     for (std::size_t i = 0; i + frames < poses.size(); ++i)
       add_motion(poses[i], poses[i + frames], sigma, propagated(poses.subspan(i, frames + 1)),
-                 &means);
+                 without_truth(name, i, i + frames) ? &spoilt : &means);
     if (means.count > 0) means.print(name, std::to_string(frames));
+    if (spoilt.count > 0) spoilt.print(name + " *", std::to_string(frames));
   }
   Means all;
   for (std::size_t i = 10; i < poses.size(); ++i)

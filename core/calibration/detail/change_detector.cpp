@@ -203,15 +203,15 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
     keep(&found->ramp, ramp);
   };
   // Single frames back to the edge of a block, then blocks.
-  constexpr std::size_t kBlock = EvidenceHistory::kBlock;
+  constexpr std::size_t block = EvidenceHistory::kBlock;
   const std::size_t open = history_.open_frames();
-  const std::size_t whole = std::min((EvidenceHistory::kRecent - open) / kBlock, history_.closed());
-  const std::size_t singles = open + whole * kBlock;
+  const std::size_t whole = std::min((EvidenceHistory::kRecent - open) / block, history_.closed());
+  const std::size_t singles = open + whole * block;
   for (std::size_t age = 0; age < singles; ++age)
     take(history_.recent(age), static_cast<double>(age), static_cast<int>(age) + 1);
   for (std::size_t b = whole; b < history_.blocks(); ++b) {
-    const std::size_t oldest = open + (b + 1) * kBlock - 1;
-    take(history_.block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1),
+    const std::size_t oldest = open + (b + 1) * block - 1;
+    take(history_.block(b), static_cast<double>(oldest) - 0.5 * (block - 1),
          static_cast<int>(oldest) + 1);
   }
 }

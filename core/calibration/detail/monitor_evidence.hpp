@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/calibration/posterior.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/linear_solve.hpp"
 #include "core/math/types.hpp"
@@ -26,11 +27,9 @@ struct Evidence {
   }
 };
 
-/// Factorises A with a prior of 0.2 rad, which is wider than the error of any rig that still
-/// matches. It keeps unobserved directions at zero.
+/// Factorises A with the prior of an unknown transform, which keeps unobserved directions at zero.
 [[nodiscard]] inline Cholesky<5> with_prior(const Mat5& A) noexcept {
-  constexpr double kPriorSigma = 0.2;
-  return Cholesky<5>(A + Mat5::Identity() / (kPriorSigma * kPriorSigma));
+  return Cholesky<5>(A + Mat5::Identity() / (kUnknownTransform * kUnknownTransform));
 }
 
 /// Displacement of matches by θ = A⁻¹ g, px rms over the image.

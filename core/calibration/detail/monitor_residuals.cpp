@@ -9,13 +9,9 @@
 namespace vergence::calibration::detail {
 namespace {
 
-// Minimum scale, in sigmas of the observations.
-constexpr double kMinScale = 0.1;
 // Correction because an M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')²
 // for Gaussian errors at kTukey.
 constexpr double kTukeySpread = 1.46;
-// Number of frames after which a track number denotes another track.
-constexpr std::uint64_t kTrackGap = 30;
 
 Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
   return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
@@ -29,7 +25,7 @@ double tukey(double squared, double limit) noexcept {
 }  // namespace
 
 void MonitorResiduals::reset() noexcept {
-  for (Memory& m : memories_) m.frame = 0;
+  for (Memory& m : memories_) m.used = false;
 }
 
 StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame& frame,
@@ -75,12 +71,12 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
   }
   look.usable = std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
                               [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
-  spread_of(look.evidence, fit, frame.frame, follow && look.usable, &look);
+  spread_of(look.evidence, fit, follow && look.usable, &look);
   return look;
 }
 
-void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame,
-                                 bool follow, StereoResiduals* look) noexcept {
+void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, bool follow,
+                                 StereoResiduals* look) noexcept {
   // With x a track's contribution to the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹
   // x|². The variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), with s the
   // sum of the track's earlier contributions.
@@ -93,11 +89,9 @@ void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, std:
     now += white.squaredNorm();
     if (!follow) continue;
     Memory& m = memories_[row.track % memories_.size()];
-    if (m.frame == 0 || m.track != row.track || frame + 1 - m.frame > kTrackGap)
-      m = Memory{row.track, 0, Vec5::Zero()};
+    if (!m.used || m.track != row.track) m = Memory{true, row.track, Vec5::Zero()};
     before += 2 * white.dot(whiten * m.sum);
     m.sum += x;
-    m.frame = frame + 1;
   }
   look->spread_now = kTukeySpread * now / kTheta;
   look->spread_life = kTukeySpread * (now + before) / kTheta;

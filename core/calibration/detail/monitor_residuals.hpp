@@ -54,12 +54,11 @@ class MonitorResiduals {
     std::uint32_t track;
   };
   struct Memory {
+    bool used = false;
     std::uint32_t track = 0;
-    // Number of the last observation's frame plus one; 0 if empty.
-    std::uint64_t frame = 0;
     Vec5 sum = Vec5::Zero();
   };
-  void spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
+  void spread_of(const Evidence& evidence, const Vec5& fit, bool follow,
                  StereoResiduals* look) noexcept;
 
   std::size_t rows_ = 0;

@@ -2,15 +2,10 @@
 
 #include <cmath>
 
+#include "core/calibration/detail/evidence_history.hpp"
 #include "core/math/linear_solve.hpp"
 
 namespace vergence::calibration::detail {
-namespace {
-
-// Length of the running mean, in blocks: half a minute at 30 Hz.
-constexpr double kMaxBlocks = 60;
-
-}  // namespace
 
 void BlockScatter::add(const Evidence& block, const Evidence& past, double lambda) noexcept {
   if (!(block.n > 0) || !(past.n > 0)) return;
@@ -20,8 +15,10 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
   const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
   if (!std::isfinite(scatter)) return;
-  if (static_cast<double>(blocks_) >= kMaxBlocks) {
-    sum_ *= (kMaxBlocks - 1) / kMaxBlocks;
+  // The mean is over as many blocks as the history holds.
+  constexpr auto most = static_cast<double>(EvidenceHistory::kBlocks);
+  if (blocks_ >= EvidenceHistory::kBlocks) {
+    sum_ *= (most - 1) / most;
     --blocks_;
   }
   sum_ += scatter;

@@ -127,11 +127,11 @@ TEST(Gates, heldOutFramesRejectAWrongSolution) {
   const HeldOut h = held_out(c.log, c.solution.newest, c.solution.rig);
   EXPECT_NEAR(h.median_px, 1247 * 0.2 * kDegree, 0.3);
   // Without frames to tell, nothing contradicts it.
-  c.solution.newest = 47;
-  EXPECT_EQ(held_out(c.log, c.solution.newest, c.solution.rig).frames, 2);
+  c.solution.newest = 50 - kMinHeldOut;
+  EXPECT_EQ(held_out(c.log, c.solution.newest, c.solution.rig).frames, kMinHeldOut - 1);
   EXPECT_EQ(c.ask(), Gate::open);
-  EXPECT_FALSE(held_out_enough(c.log, 47)) << "so no solve is decided then";
-  EXPECT_TRUE(held_out_enough(c.log, 46));
+  EXPECT_FALSE(held_out_enough(c.log, c.solution.newest)) << "so no solve is decided then";
+  EXPECT_TRUE(held_out_enough(c.log, c.solution.newest - 1));
 }
 
 TEST(Gates, heldOutFramesAreTheNewestTwelve) {
