@@ -19,17 +19,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A camera's topics have its namespace in common; that of packed images ends with another word.
-std::string camera_of(std::string_view topic) {
+/// Namespace that the topics of a camera share. Topics of compressed images end with another word.
+std::string camera_namespace(std::string_view topic) {
   if (topic.ends_with("/compressed")) topic.remove_suffix(std::string_view("/compressed").size());
   const std::size_t slash = topic.rfind('/');
   return std::string(topic.substr(0, slash == std::string_view::npos ? 0 : slash));
 }
 
-/// The CameraInfo of an image's topic: beside it, or below where the topic is the camera's name.
-std::string topic_summary(const BagIndex& bag, const std::string& topic) {
+/// Topic of the CameraInfo: next to the image topic, or below it if that topic is the camera's
+/// name.
+std::string camera_info_topic(const BagIndex& bag, const std::string& topic) {
   const std::string below = topic + "/camera_info";
-  return bag.infos.contains(below) ? below : camera_of(topic) + "/camera_info";
+  return bag.infos.contains(below) ? below : camera_namespace(topic) + "/camera_info";
 }
 
 bool is_rectified(std::string_view topic) {
@@ -70,9 +71,8 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
   const auto found = bag.images.find(requested);
   if (found == bag.images.end() || found->second.images.empty())
     refuse(path, 0,
-           fmt::format("has no image on {} that can be read; choose with --{}-topic; topics of "
-                       "images: {}",
-                       requested, side, list_of_image_topics(bag)));
+           "has no image on {} that can be read; choose with --{}-topic; topics of images: {}",
+           requested, side, list_of_image_topics(bag));
 }
 
 /// Ranks a pair of topics: a CameraInfo for both (or a supplied calibration) counts most, then
@@ -80,14 +80,14 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
 int merit(const BagIndex& bag, const Topics& topics, bool given) {
   int sum = 0;
   for (const std::string& topic : topics) {
-    if (given || bag.infos.contains(topic_summary(bag, topic))) sum += 4;
+    if (given || bag.infos.contains(camera_info_topic(bag, topic))) sum += 4;
     if (!is_rectified(topic)) sum += 2;
     if (!topic.ends_with("/compressed")) sum += 1;
   }
   return sum;
 }
 
-/// Topics that do not differ by their side alone, where one says left and one says right.
+/// Topics that differ by more than their side, if exactly one is named left and one right.
 std::optional<Topics> only_named(const std::vector<std::string>& names,
                                  const BagTopics& requested) {
   Topics found{requested.left, requested.right};
@@ -102,7 +102,7 @@ std::optional<Topics> only_named(const std::vector<std::string>& names,
   return found;
 }
 
-/// The pair that the user names, or the best of those with the usual names.
+/// The pair that the user names, or the best one with the usual names.
 Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& requested, bool given) {
   require_topic(path, bag, requested.left, "left");
   require_topic(path, bag, requested.right, "right");
@@ -128,10 +128,10 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
   if (best.empty())
     if (const auto only = only_named(names, requested)) return *only;
   refuse(path, 0,
-         fmt::format("has {} pairs of topics of images with the names of a left and a right camera "
-                     "(left/right, infra1/infra2, cam0/cam1, image_0/image_1 …); choose with "
-                     "--left-topic and --right-topic; topics of images: {}",
-                     best.size(), list_of_image_topics(bag)));
+         "has {} pairs of topics of images with the names of a left and a right camera "
+         "(left/right, infra1/infra2, cam0/cam1, image_0/image_1 …); choose with --left-topic and "
+         "--right-topic; topics of images: {}",
+         best.size(), list_of_image_topics(bag));
 }
 
 std::vector<Stamp> collect_stamps(const std::vector<BagImage>& images) {
@@ -141,7 +141,7 @@ std::vector<Stamp> collect_stamps(const std::vector<BagImage>& images) {
   return stamps;
 }
 
-/// The times at which they were recorded; empty: the bag does not say all of them.
+/// Recording times of the images; empty if the bag lacks some of them.
 std::vector<Stamp> recorded(const std::vector<BagImage>& images) {
   constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
   std::vector<Stamp> log;
@@ -160,22 +160,23 @@ Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
   return log[0].empty() || log[1].empty() ? Duration{} : pair_offset(log[0], log[1], pairs).median;
 }
 
-/// Pairs by the nearest times of recording; nothing where there are none, or they do not decide.
+/// Pairs by the nearest recording times; empty if these do not decide.
 std::vector<std::array<std::size_t, 2>> pair_by_recording(
     const std::array<std::vector<BagImage>, 2>& images, Duration interval) {
-  constexpr double kNear = 0.25;  // of the interval: far from both neighbours
+  // The share of the interval keeps clear of both neighbours.
+  constexpr double kNear = 0.25;
   auto pairs = pair_nearest(recorded(images[0]), recorded(images[1]),
                             Duration::seconds(kNear * interval.to_seconds()));
   if (2 * pairs.size() < std::min(images[0].size(), images[1].size())) pairs.clear();
   return pairs;
 }
 
-/// Pairs of the nearest stamps, and what is to be said of how far these are apart. Where stamps do
-/// not tell which images belong together, the times at which they were recorded do.
+/// Pairs images by the nearest stamps and adds remarks about their distance. If the stamps do not
+/// determine the pairs, the recording times do.
 std::vector<std::array<std::size_t, 2>> pair_images(
     const fs::path& path, const Topics& topics, const std::array<std::vector<BagImage>, 2>& images,
     StereoSequence* sequence) {
-  constexpr double kHalf = 0.5;  // of the interval
+  constexpr double kHalf = 0.5;
   const std::array stamps{collect_stamps(images[0]), collect_stamps(images[1])};
   const Duration interval = usual_interval(stamps[0]);
   const Duration most = Duration::seconds(kMaxApart * interval.to_seconds());
@@ -187,17 +188,16 @@ std::vector<std::array<std::size_t, 2>> pair_images(
       ambiguous ? pair_by_recording(images, interval) : pair_nearest(stamps[0], stamps[1], most);
   if (pairs.empty() && !near.empty())
     refuse(path, 0,
-           fmt::format("{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the "
-                       "association of images is ambiguous; correct the stamps of one topic",
-                       topics[1], 1e3 * std::abs(offset.median.to_seconds()),
-                       offset.median > Duration{} ? "later" : "earlier", topics[0],
-                       1e3 * interval.to_seconds()));
+           "{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the association of "
+           "images is ambiguous; correct the stamps of one topic",
+           topics[1], 1e3 * std::abs(offset.median.to_seconds()),
+           offset.median > Duration{} ? "later" : "earlier", topics[0],
+           1e3 * interval.to_seconds());
   if (pairs.empty())
     refuse(path, 0,
-           fmt::format("has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no "
-                       "two are within {:.0f} % of the interval of each other",
-                       topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(),
-                       100 * kMaxApart));
+           "has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no two are within "
+           "{:.0f} % of the interval of each other",
+           topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(), 100 * kMaxApart);
   const PairOffset kept = pair_offset(stamps[0], stamps[1], pairs);
   sequence->assumptions.push_back(fmt::format(
       "images are paired by the nearest {}, right ones are later by {}",
@@ -218,24 +218,22 @@ void remark_left_out(const std::string& name, const LeftOut& out,
   if (out.first.empty()) return;
   remarks->push_back(
       fmt::format("{}: left out were {} images that cannot be read, {} of another size than the "
-                  "first and {} whose stamps do not go "
-                  "forward; the first in {}",
+                  "first and {} whose stamps do not go forward; the first in {}",
                   name, out.unreadable, out.other_size, out.backwards, out.first));
 }
 
 RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::string& topic,
                       StereoSequence* sequence) {
-  const std::string name = topic_summary(bag, topic);
+  const std::string name = camera_info_topic(bag, topic);
   const auto found = bag.infos.find(name);
   if (found == bag.infos.end())
     refuse(path, 0,
-           fmt::format("has no CameraInfo on {}, where that of {} is expected; give a calibration "
-                       "with --calibration",
-                       name, topic));
+           "has no CameraInfo on {}, where that of {} is expected; give a calibration with "
+           "--calibration",
+           name, topic);
   const RosCameraInfo& info = found->second;
   const std::string& fault = is_rectified(topic) ? info.fault_rectified : info.fault;
-  if (!fault.empty())
-    refuse(path, 0, fmt::format("{}: {}; give a calibration with --calibration", name, fault));
+  if (!fault.empty()) refuse(path, 0, "{}: {}; give a calibration with --calibration", name, fault);
   RosCamera camera = info.camera;
   const ImageSize size = bag.images.at(topic).images.front().image.size;
   if (const std::string taken = apply_crop(info.crop, size, &camera); !taken.empty())
@@ -243,7 +241,7 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
   return is_rectified(topic) ? rectified(camera) : camera;
 }
 
-/// Two cameras' mosaics in JPEG: what the packing smears, no demosaicing brings back.
+/// Adds remarks about mosaics: JPEG mixes their colours, which no demosaicing restores.
 void remark_mosaics(const BagIndex& bag, const std::string& topic, StereoSequence* sequence) {
   const ImageTopic& of_topic = bag.images.at(topic);
   const BagImage& image = of_topic.images.front();
@@ -292,21 +290,20 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
     if (bag.images.size() > 2 || chosen[0].find("left") == std::string::npos)
       sequence.assumptions.push_back(chosen[0] + " is left and " + chosen[1] + " is right");
   for (const std::string& name : chosen) remark_mosaics(bag, name, &sequence);
-  if (!given && topic_summary(bag, chosen[0]) == topic_summary(bag, chosen[1]))
+  if (!given && camera_info_topic(bag, chosen[0]) == camera_info_topic(bag, chosen[1]))
     refuse(path, 0,
-           fmt::format("has no CameraInfo of its own for each of {} and {}, only {}; give a "
-                       "calibration with --calibration",
-                       chosen[0], chosen[1], topic_summary(bag, chosen[0])));
+           "has no CameraInfo of its own for each of {} and {}, only {}; give a calibration with "
+           "--calibration",
+           chosen[0], chosen[1], camera_info_topic(bag, chosen[0]));
   if (!given) {
     const std::array cameras{camera_info(path, bag, chosen[0], &sequence),
                              camera_info(path, bag, chosen[1], &sequence)};
     if (const std::string fault = set_ros_rig(cameras[0], cameras[1], &sequence.calibration);
         !fault.empty())
-      refuse(path, 0,
-             fmt::format("{}/camera_info: P {}; give a calibration with --calibration",
-                         camera_of(chosen[1]), fault));
+      refuse(path, 0, "{}/camera_info: P {}; give a calibration with --calibration",
+             camera_namespace(chosen[1]), fault);
     sequence.calibration_source =
-        "CameraInfo of " + camera_of(chosen[0]) + " and " + camera_of(chosen[1]);
+        "CameraInfo of " + camera_namespace(chosen[0]) + " and " + camera_namespace(chosen[1]);
   }
   std::array images{std::move(bag.images[chosen[0]].images),
                     std::move(bag.images[chosen[1]].images)};
@@ -314,8 +311,8 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
     if (images[k].back().image.stamp.ns() == 0)
       refuse(path, 0,
              chosen[k] +
-                 " has neither stamps (header.stamp is 0) nor times of recording that "
-                 "could stand instead");
+                 " has neither stamps (header.stamp is 0) nor times of recording that could stand "
+                 "instead");
   const auto pairs = pair_images(path, chosen, images, &sequence);
   const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
   if (alone > 0)

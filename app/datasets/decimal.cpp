@@ -1,5 +1,6 @@
 #include "app/datasets/decimal.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <iterator>
 #include <limits>
@@ -9,54 +10,17 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kDecimals = 9;  // of a second in nanoseconds
-constexpr int kMaxExponent =
-    100;  // of a number as written; beyond, it is 0 or no time of this universe
-constexpr std::size_t kMaxText = 64;  // longer text is not a number
+// A second has this many decimals in nanoseconds.
+constexpr int kDecimals = 9;
+// A larger exponent means 0 or a time far outside of 64 bits.
+constexpr int kMaxExponent = 100;
+// Longer text is not a number.
+constexpr std::size_t kMaxText = 64;
 
-bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
-
-/// Appends a decimal digit; false when it does not fit.
-bool append(std::uint64_t* value, int digit) noexcept {
-  constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  const auto d = static_cast<std::uint64_t>(digit);
-  if (*value > (kMax - d) / 10) return false;
-  *value = *value * 10 + d;
-  return true;
-}
-
-/// Digits of a number with the place of its decimal point: 0.d1d2d3… × 10^point.
-struct Digits {
-  char digit[kMaxText];
-  int count = 0;
-  int point = 0;
-};
-
-std::optional<Digits> read_digits(std::string_view text) noexcept {
-  Digits d{};
-  bool any = false, after_point = false;
-  std::size_t i = 0;
-  for (; i < text.size() && (is_digit(text[i]) || (text[i] == '.' && !after_point)); ++i) {
-    if (text[i] == '.') {
-      after_point = true;
-      continue;
-    }
-    any = true;
-    d.digit[d.count++] = text[i];
-    if (!after_point) ++d.point;
-  }
-  if (!any) return std::nullopt;
-  if (i == text.size()) return d;
-  if (text[i] != 'e' && text[i] != 'E') return std::nullopt;
-  ++i;
-  if (i + 1 < text.size() && text[i] == '+' && is_digit(text[i + 1])) ++i;
-  int exponent = 0;
-  const auto [end, error] = std::from_chars(text.data() + i, text.data() + text.size(), exponent);
-  if (error != std::errc{} || end != text.data() + text.size() || exponent > kMaxExponent ||
-      exponent < -kMaxExponent)
-    return std::nullopt;
-  d.point += exponent;
-  return d;
+template <class Integer>
+bool parse_whole(std::string_view text, Integer* value) noexcept {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc{} && end == text.data() + text.size() && !text.empty();
 }
 
 }  // namespace
@@ -65,18 +29,27 @@ std::optional<std::int64_t> parse_decimal(std::string_view text, int decimals) n
   if (text.empty() || text.size() >= kMaxText) return std::nullopt;
   const bool negative = text.front() == '-';
   if (negative || text.front() == '+') text.remove_prefix(1);
-  const std::optional<Digits> d = read_digits(text);
-  if (!d) return std::nullopt;
-  std::uint64_t ns = 0;
-  const int requested = d->point + decimals;  // digits before the point of the result
-  for (int i = 0; i < requested; ++i) {
-    if (i >= d->count && ns == 0) break;  // only zeros follow zeros
-    if (!append(&ns, i < d->count ? d->digit[i] - '0' : 0)) return std::nullopt;
+  const std::size_t e = std::min(text.find_first_of("eE"), text.size());
+  int exponent = 0;
+  if (e < text.size()) {
+    std::string_view power = text.substr(e + 1);
+    if (power.starts_with('+') && !power.starts_with("+-")) power.remove_prefix(1);
+    if (!parse_whole(power, &exponent) || exponent > kMaxExponent || exponent < -kMaxExponent)
+      return std::nullopt;
   }
-  if (requested >= 0 && requested < d->count && d->digit[requested] >= '5' &&
-      ns < static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
-    ++ns;
-  const auto value = static_cast<std::int64_t>(ns);
+  std::string digits(text.substr(0, e));
+  const std::size_t point = std::min(digits.find('.'), digits.size());
+  digits.erase(point, 1);
+  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string::npos)
+    return std::nullopt;
+  // Number of digits before the point of the result.
+  const int whole = static_cast<int>(point) + exponent + decimals;
+  const auto kept = static_cast<std::size_t>(std::max(whole, 0));
+  const bool up = whole >= 0 && kept < digits.size() && digits[kept] >= '5';
+  digits.resize(kept, '0');
+  std::int64_t value = 0;
+  if (kept > 0 && !parse_whole(std::string_view(digits), &value)) return std::nullopt;
+  if (up && value < std::numeric_limits<std::int64_t>::max()) ++value;
   return negative ? -value : value;
 }
 
@@ -86,9 +59,7 @@ std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
 
 std::optional<std::int64_t> parse_integer(std::string_view text) noexcept {
   std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || text.empty()) return std::nullopt;
-  return value;
+  return parse_whole(text, &value) ? std::optional(value) : std::nullopt;
 }
 
 std::string format_seconds(std::int64_t ns) {
@@ -99,7 +70,7 @@ std::string format_seconds(std::int64_t ns) {
 
 void append_seconds(std::string* line, std::int64_t ns) {
   constexpr std::uint64_t kSecond = 1'000'000'000;
-  // The magnitude in unsigned arithmetic: that of the least integer does not fit a signed one.
+  // The magnitude is unsigned, because that of the minimum does not fit a signed integer.
   const std::uint64_t magnitude =
       ns < 0 ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
   fmt::format_to(std::back_inserter(*line), "{}{}.{:09}", ns < 0 ? "-" : "", magnitude / kSecond,

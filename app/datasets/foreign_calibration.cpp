@@ -29,7 +29,7 @@ double number_of(const Fact& fact) { return fact.file->number(fact.node, fact.ke
   fact.file->fail(fact.node, fact.key + what);
 }
 
-/// All numbers of a value: one, a list, a list of lists, or `{rows, cols, data}`.
+/// All numbers of a value: a scalar, a list, a list of lists, or `{rows, cols, data}`.
 std::vector<double> read_numbers(const Fact& fact) {
   constexpr std::size_t kMax = 64;
   const YAML::Node data = fact.node.IsMap() ? fact.node["data"] : fact.node;
@@ -57,7 +57,7 @@ std::vector<double> read_numbers(const Fact& fact, std::size_t count, const char
   return values;
 }
 
-/// A matrix of 3 x 3, or a rotation vector.
+/// Converts a matrix of 3 x 3 numbers, or a rotation vector.
 Mat3 to_rotation(const Fact& fact) {
   const auto v = read_numbers(fact);
   if (v.size() == 3) return exp_so3(Vec3(v[0], v[1], v[2]));
@@ -65,7 +65,7 @@ Mat3 to_rotation(const Fact& fact) {
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
 }
 
-/// 4x4, or 3x4 without its last row.
+/// Converts a matrix of 4 x 4 numbers, or of 3 x 4 without the last row.
 Transform to_transform(const Fact& fact) {
   const auto v = read_numbers(fact);
   if (v.size() != 12 && v.size() != 16) fail(fact, " is not a matrix of 4 x 4 numbers");
@@ -74,7 +74,8 @@ Transform to_transform(const Fact& fact) {
   Transform T;
   T.R << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
   T.t << v[3], v[7], v[11];
-  if (accept_rotation(T.R)) T.R = normalised(T.R);  // else find_implausible() judges it
+  // find_implausible() refuses other matrices.
+  if (accept_rotation(T.R)) T.R = normalised(T.R);
   return T;
 }
 
@@ -84,8 +85,8 @@ bool is_lens(const Fact& fact) {
   return fact.part == "matrix" || fact.part == "fx" || fact.part == "focal";
 }
 
-/// Facts that name no camera are of the camera whose file or document they stand in, where two of
-/// these have lenses without a name.
+/// Assigns facts without a camera to the camera of their file or document, if at least two of these
+/// have intrinsics without a camera.
 std::vector<Fact> with_cameras(const std::vector<YamlFile>& files) {
   const auto nameless = [](const std::vector<Fact>& facts) {
     return std::any_of(facts.begin(), facts.end(),
@@ -123,13 +124,13 @@ std::string join_names(const std::vector<YamlFile>& files) {
     if (const std::string program = find_program(file, &never); !program.empty())
       throw InputError(
           fmt::format("{}: {} is missing; the file {}", join_names(files), what, program));
-  throw InputError(fmt::format(
-      "{}: {} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS camera_info, "
-      "OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
-      join_names(files), what));
+  throw InputError(
+      fmt::format("{}: {} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS "
+                  "camera_info, OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
+                  join_names(files), what));
 }
 
-/// Reads the lenses and transforms of one calibration.
+/// Reads intrinsics and transforms of one calibration.
 class RigReader {
  public:
   RigReader(const std::vector<YamlFile>& files, const std::optional<ImageSize>& size,
@@ -140,7 +141,7 @@ class RigReader {
     int cameras = 0;
     for (const Fact& fact : facts_)
       if (is_lens(fact) && fact.camera) cameras = std::max(cameras, *fact.camera + 1);
-    // A rectified pair has one lens and a baseline.
+    // A rectified pair has one set of intrinsics and a baseline.
     const bool one_for_both = cameras < 2 && find("fx", 0) != nullptr &&
                               (own("focal_baseline", std::nullopt) != nullptr ||
                                own("baseline", std::nullopt) != nullptr);
@@ -150,7 +151,8 @@ class RigReader {
       for (Fact& fact : facts_)
         if (fact.camera == 0) fact.camera.reset();
     }
-    // A model that is not read says more than the lens that is not found.
+    // The message about an unsupported model is more specific than the one about missing
+    // intrinsics, so it comes first.
     for (int k = 0; k < 2; ++k) (void)model(k);
     if (cameras < 2) fail_missing(files_, "the lens of a second camera");
     if (cameras > kMaxCameras)
@@ -178,7 +180,7 @@ class RigReader {
       if (fact.part == part && fact.camera == camera) return &fact;
     return nullptr;
   }
-  /// Value of this camera, else one without a camera.
+  /// Value of this camera, or else one without a camera.
   [[nodiscard]] const Fact* find(std::string_view part, int camera) const {
     const Fact* fact = own(part, camera);
     return fact != nullptr ? fact : own(part, std::nullopt);
@@ -217,8 +219,8 @@ class RigReader {
     read_size(k);
   }
 
-  /// The lens model that the file says; nothing: it says none. *none: it says that there is no
-  /// distortion.
+  /// Camera model according to the file; empty if it states none. *none is set if the file states
+  /// that there is no distortion.
   std::optional<CameraModelKind> model(int k, bool* none = nullptr) const {
     std::optional<CameraModelKind> found;
     // The distortion model counts; `pinhole` is listed next to it.
@@ -230,14 +232,14 @@ class RigReader {
         word = fact->file->integer(fact->node, fact->key, 0, 1) == 1 ? "fisheye" : "radtan";
       const auto kind = lens_model(word);
       const bool of_rays = part != "camera_model";
-      // A `type` may be that of anything.
+      // A `type` may be that of something else.
       const bool stated = of_rays || fact->key.find("odel") != std::string::npos ||
                           fact->key.find("amera.type") != std::string::npos;
       if (!kind && stated)
-        fail(*fact, fmt::format(" is \"{}\"; lenses that are read are pinhole with radtan "
-                                "(plumb_bob) or equidistant (fisheye, Kannala-Brandt) "
-                                "distortion, or none",
-                                word.substr(0, 60)));
+        fail(*fact,
+             fmt::format(" is \"{}\"; lenses that are read are pinhole with radtan (plumb_bob) or "
+                         "equidistant (fisheye, Kannala-Brandt) distortion, or none",
+                         word.substr(0, 60)));
       if (none != nullptr)
         *none = *none || word == "none" || word == "Rectified" || (word.empty() && of_rays);
       if (kind && !(found && word.empty())) found = kind;
@@ -256,8 +258,8 @@ class RigReader {
     if (list != nullptr) {
       values = read_numbers(*list);
     } else {
-      // In radtan's order; an equidistant lens has k1 … k4, or k2 … k5 of those who count the angle
-      // itself as the first.
+      // The order is that of radtan. Equidistant models have k1 to k4, or k2 to k5 if the angle
+      // itself counts as the first.
       using Names = std::vector<std::string_view>;
       const Names names = !equidistant ? Names{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}
                           : find("k1", k) != nullptr ? Names{"k1", "k2", "k3", "k4"}
@@ -285,16 +287,17 @@ class RigReader {
   }
 
   void read_size(int k) {
-    constexpr double kLargest = 1 << 16;  // px
+    // In px.
+    constexpr double kLargest = 1 << 16;
     const Fact *width = find("width", k), *height = find("height", k), *size = find("size", k);
     if (width == nullptr || height == nullptr) width = size;
     std::vector<double> sides;
     if (width == nullptr && size_)
       sides = {static_cast<double>(size_->width), static_cast<double>(size_->height)};
     else if (width == nullptr)
-      throw InputError(join_names(files_) +
-                       ": holds no image size, as OpenCV's sample writes none; add --size "
-                       "WIDTHxHEIGHT");
+      throw InputError(
+          join_names(files_) +
+          ": holds no image size, as OpenCV's sample writes none; add --size WIDTHxHEIGHT");
     else
       sides = width == size ? read_numbers(*size, 2, "[width, height]")
                             : std::vector{number_of(*width), number_of(*height)};
@@ -322,7 +325,7 @@ class RigReader {
     return true;
   }
 
-  /// OpenCV's R, T.
+  /// Uses R and T of OpenCV.
   bool from_rotation() {
     const Fact *R = own("rotation", std::nullopt), *T = own("translation", std::nullopt);
     if (R == nullptr || T == nullptr) {
@@ -346,7 +349,8 @@ class RigReader {
     return false;
   }
 
-  /// ROS's R and P of both, and ORB-SLAM's; R1, R2, P1, P2 beside R and T are not needed.
+  /// Uses R and P of both cameras (ROS, ORB-SLAM). If R and T exist, R1, R2, P1 and P2 are not
+  /// needed.
   bool from_rectification() {
     std::array<RosCamera, 2> cameras;
     for (int k = 0; k < 2; ++k) {
@@ -387,7 +391,7 @@ class RigReader {
       remarks_->push_back(join_names(files_) + ": " + taken);
   }
 
-  /// From where both cameras sit in a body.
+  /// Uses the transforms of both cameras in a body.
   bool from_body(int k) {
     const auto T_body_camera = [this](int camera) -> std::optional<Transform> {
       if (const Fact* fact = own("from_body", camera)) return to_transform(*fact).inverse();
@@ -401,13 +405,13 @@ class RigReader {
     return true;
   }
 
-  /// A rectified pair has only a baseline length.
+  /// Uses a baseline length, which is all that a rectified pair has.
   bool from_baseline() {
     const Fact *length = own("baseline", std::nullopt),
                *focal = own("focal_baseline", std::nullopt);
     if (length == nullptr && focal == nullptr) return false;
-    // Where lenses of the raw images stand beside it, the focal length is that of the rectified
-    // one.
+    // If the file also has intrinsics of the raw images, the focal length is that of the rectified
+    // ones.
     const Fact* rectified = own("fx", std::nullopt);
     const double fx = rectified != nullptr ? number_of(*rectified) : lens(0).fx;
     const double b = length != nullptr ? number_of(*length) : number_of(*focal) / fx;
@@ -429,7 +433,7 @@ class RigReader {
 
 // ---- files
 
-/// KITTI's text, whose lines are `P0: numbers`; nothing: it is none.
+/// Reads a KITTI text, whose lines are `P0: numbers`; empty if it is another text.
 std::optional<RigCalibration> read_kitti_text(const std::string& name, const std::string& text,
                                               const std::optional<ImageSize>& size) {
   Lines lines(text);
@@ -441,7 +445,7 @@ std::optional<RigCalibration> read_kitti_text(const std::string& name, const std
   return read_kitti_projections(name, {colour ? 2 : 0, colour ? 3 : 1}, size);
 }
 
-/// The files that a configuration names, which lie beside it.
+/// Adds the files that a configuration names, which are next to it.
 void add_named_files(std::vector<YamlFile>* files) {
   std::vector<YamlFile> named;
   for (const YamlFile& file : *files)
@@ -455,10 +459,11 @@ void add_named_files(std::vector<YamlFile>* files) {
   for (YamlFile& tree : named) files->push_back(std::move(tree));
 }
 
-/// A lens in the middle of a half or a quarter of its image is one of binned images, whose file has
-/// the size of the sensor.
+/// Throws InputError if the principal point is in the middle of a half or a quarter of the image:
+/// the intrinsics are then those of binned images, but the size is that of the sensor.
 void check_binning(const std::string& name, const Intrinsics& lens) {
-  constexpr double kNear = 0.12;  // of the image
+  // Share of the image.
+  constexpr double kNear = 0.12;
   const auto off = [&](double parts) {
     return std::max(std::abs(parts * lens.cx / lens.width - 0.5),
                     std::abs(parts * lens.cy / lens.height - 0.5));
@@ -494,7 +499,8 @@ namespace detail {
 std::vector<std::filesystem::path> split_files(const std::string& text, bool folder) {
   if (folder) return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
   std::error_code ignored;
-  if (fs::exists(text, ignored)) return {text};  // a name may have a comma, too
+  // A name may contain a comma.
+  if (fs::exists(text, ignored)) return {text};
   std::vector<fs::path> files;
   std::istringstream parts(text);
   for (std::string part; std::getline(parts, part, ',');) files.emplace_back(part);

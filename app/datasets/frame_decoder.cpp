@@ -6,6 +6,7 @@
 #include <cassert>
 #include <chrono>
 #include <new>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -66,7 +67,7 @@ bool FrameDecoder::next(DecodedPair* pair) noexcept {
   for (;;) {
     const WakeEvent::Ticket seen = filled_.ticket();
     if (stop_.load(std::memory_order_acquire)) return false;
-    // `finished_` is looked at before the ring: what was pushed before it was set is still found.
+    // `finished_` is read before the ring, so that pairs pushed before it was set are still found.
     const bool finished = finished_.load(std::memory_order_acquire);
     if (ring_.pop(pair)) {
       freed_.signal();
@@ -92,11 +93,14 @@ void FrameDecoder::stop() noexcept {
 void FrameDecoder::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-decode");
   for (; next_index_ < end_; ++next_index_) {
-    while (own_count_ < own_.size()) {
-      if (!wait_for_slot(&own_[own_count_])) return;
-      ++own_count_;
+    for (; own_count_ < own_.size(); ++own_count_) {
+      std::optional<FrameSlot> free;
+      if (!wait_until([&] { return (free = pool_.acquire()).has_value(); })) return;
+      own_[own_count_] = *free;
     }
-    if (!hand_over(decode(next_index_))) return;
+    const DecodedPair pair = decode(next_index_);
+    if (!wait_until([&] { return ring_.push(pair); })) return;
+    filled_.signal();
   }
   finished_.store(true, std::memory_order_release);
   filled_.signal();
@@ -157,7 +161,8 @@ ImageFileStatus FrameDecoder::read(const std::string& name, ImageSize size, std:
     if (const auto status = read_image_file(sequence_.root / name, &work->bytes);
         status != ImageFileStatus::ok)
       return status;
-  } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
+  } catch (const std::bad_alloc&) {
+    // The file does not fit this machine's memory.
     return ImageFileStatus::unreadable;
   }
   return decode_grey(work->bytes, size, out, stride, sequence_.deep_bits);
@@ -189,26 +194,12 @@ ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work
   return ImageFileStatus::ok;
 }
 
-bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {
+template <class Attempt>
+bool FrameDecoder::wait_until(const Attempt& attempt) noexcept {
   for (;;) {
     const WakeEvent::Ticket seen = freed_.ticket();
     if (stop_.load(std::memory_order_acquire)) return false;
-    if (const auto free = pool_.acquire()) {
-      *slot = *free;
-      return true;
-    }
-    freed_.wait(seen);
-  }
-}
-
-bool FrameDecoder::hand_over(const DecodedPair& pair) noexcept {
-  for (;;) {
-    const WakeEvent::Ticket seen = freed_.ticket();
-    if (stop_.load(std::memory_order_acquire)) return false;
-    if (ring_.push(pair)) {
-      filled_.signal();
-      return true;
-    }
+    if (attempt()) return true;
     freed_.wait(seen);
   }
 }

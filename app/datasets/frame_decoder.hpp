@@ -86,10 +86,10 @@ class FrameDecoder {
   [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot, Workspace* work);
   /// Loads a file with both images side by side into the two slots in hand.
   [[nodiscard]] ImageFileStatus load_both(const std::string& name, Workspace* work);
-  /// Waits for a slot. Returns false if stopped.
-  [[nodiscard]] bool wait_for_slot(FrameSlot* slot) noexcept;
-  /// Waits for room and passes the pair on. Returns false if stopped.
-  [[nodiscard]] bool hand_over(const DecodedPair& pair) noexcept;
+  /// Repeats the attempt whenever the consumer frees something, until it succeeds. Returns false if
+  /// stopped.
+  template <class Attempt>
+  [[nodiscard]] bool wait_until(const Attempt& attempt) noexcept;
 
   const StereoSequence& sequence_;
   std::size_t next_index_, end_;

@@ -9,6 +9,7 @@
 #include <cerrno>
 
 #include "app/datasets/detail/image_kinds.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/runtime/file_descriptor.hpp"
 
 namespace vergence::app {
@@ -16,10 +17,10 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr off_t kMaxFile = off_t{256}
-                           << 20;  // bytes; a 100-megapixel grey PNG that does not compress is less
+// In bytes. An incompressible grey PNG of 100 megapixels is smaller.
+constexpr off_t kMaxFile = off_t{256} << 20;
 
-/// Null: none that is read.
+/// Returns null for unsupported kinds.
 const detail::ImageKind* detect_kind(Bytes bytes) noexcept {
   for (const detail::ImageKind* kind :
        {&detail::kPng, &detail::kJpeg, &detail::kBmp, &detail::kNetpbm})
@@ -27,10 +28,10 @@ const detail::ImageKind* detect_kind(Bytes bytes) noexcept {
   return nullptr;
 }
 
-/// Up to `limit` bytes from the file's start.
+/// Reads up to `limit` bytes from the file's start.
 ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
                            std::vector<std::uint8_t>* bytes) {
-  // Opening does not wait, as that of a pipe would.
+  // O_NONBLOCK keeps open() from blocking on a pipe.
   const FileDescriptor in(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!in) {
     if (errno == EMFILE || errno == ENFILE) return ImageFileStatus::too_many_files;
@@ -46,7 +47,8 @@ ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
     const ssize_t n = ::read(in.get(), bytes->data() + got, bytes->size() - got);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return ImageFileStatus::unreadable;
-    if (n == 0) break;  // became shorter meanwhile: the checks of the content see it
+    // The file became shorter; the checks of the content detect it.
+    if (n == 0) break;
     got += static_cast<std::size_t>(n);
   }
   bytes->resize(got);
@@ -55,40 +57,27 @@ ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
 
 }  // namespace
 
-bool is_image_name(std::string_view file) noexcept {
+bool is_image_name(std::string_view file) {
   constexpr std::array<std::string_view, 7> kEndings{".png", ".jpg", ".jpeg", ".bmp",
                                                      ".pgm", ".ppm", ".pnm"};
-  const auto ends_so = [file](std::string_view ending) {
-    return file.size() > ending.size() &&
-           std::equal(ending.begin(), ending.end(),
-                      file.end() - static_cast<std::ptrdiff_t>(ending.size()),
-                      [](char a, char b) { return a == (b >= 'A' && b <= 'Z' ? b | 0x20 : b); });
-  };
-  return !file.starts_with('.') && std::any_of(kEndings.begin(), kEndings.end(), ends_so);
+  const std::string name = detail::lower(file);
+  return !name.starts_with('.') && std::ranges::any_of(kEndings, [&](std::string_view ending) {
+    return name.ends_with(ending);
+  });
 }
 
 const char* to_phrase(ImageFileStatus status) noexcept {
-  switch (status) {
-    case ImageFileStatus::ok:
-      return "is as it should be";
-    case ImageFileStatus::missing:
-      return "is missing";
-    case ImageFileStatus::unreadable:
-      return "cannot be read";
-    case ImageFileStatus::too_many_files:
-      return "cannot be opened: this program or the machine has as many files open as it may "
-             "(ulimit -n)";
-    case ImageFileStatus::not_an_image:
-      return "is no PNG, JPEG, BMP or PGM image";
-    case ImageFileStatus::truncated:
-      return "is torn: it ends before the image is complete, or its check sums fail";
-    case ImageFileStatus::undecodable:
-      return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours, "
-             "uncompressed BMP of 8, 24 or 32 bits can";
-    case ImageFileStatus::wrong_size:
-      return "has another size than the calibration";
-  }
-  return "";
+  constexpr std::array kPhrases{
+      "is as it should be",
+      "is missing",
+      "cannot be read",
+      "cannot be opened: this program or the machine has as many files open as it may (ulimit -n)",
+      "is no PNG, JPEG, BMP or PGM image",
+      "is torn: it ends before the image is complete, or its check sums fail",
+      "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours, uncompressed BMP "
+      "of 8, 24 or 32 bits can",
+      "has another size than the calibration"};
+  return kPhrases[static_cast<std::size_t>(status)];
 }
 
 ImageFileStatus read_image_file(const std::filesystem::path& file,
@@ -109,8 +98,8 @@ ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* si
 
 ImageFileStatus read_image_size(Bytes head, ImageSize* size) noexcept {
   if (const auto* kind = detect_kind(head)) return kind->size(head, size);
-  // A file of nothing, or of the first bytes of a signature, is a torn write; another content is
-  // another kind of file.
+  // An empty file, or one with only the first bytes of a signature, is a truncated one; other
+  // content is another kind of file.
   return detail::may_become_png(head) ? ImageFileStatus::truncated : ImageFileStatus::not_an_image;
 }
 

@@ -38,7 +38,7 @@ struct ImageSize {
 };
 
 /// True by the ending, except for hidden files, which systems create next to images.
-[[nodiscard]] bool is_image_name(std::string_view file) noexcept;
+[[nodiscard]] bool is_image_name(std::string_view file);
 
 /// Reads a whole file into *bytes, reusing its capacity. → ok, missing, unreadable
 [[nodiscard]] ImageFileStatus read_image_file(const std::filesystem::path& file,

@@ -20,11 +20,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The images of one camera, in order of their names, and where they lie.
+/// Images of one camera in the order of their names.
 struct Camera {
-  std::string below{};               // the folder, relative to the drive's
-  std::vector<std::string> names{};  // with their folder
-  std::string side{};                // what in a name tells the camera, in small letters
+  // Directory relative to the data set.
+  std::string below{};
+  // Names with their directory.
+  std::vector<std::string> names{};
+  // Word in lower case that identifies the camera in a name.
+  std::string side{};
   [[nodiscard]] std::string in_folder(const std::string& file) const {
     return below.empty() ? file : below + "/" + file;
   }
@@ -52,7 +55,8 @@ std::vector<std::string> list_entries(const fs::path& folder, bool folders) {
   return names;
 }
 
-/// Two folders with the usual names and images in them, or in a folder of one name below both.
+/// Two directories with the usual names that contain images, directly or in a subdirectory of the
+/// same name.
 std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& above) {
   for (const auto& [left, right] : stereo_names(list_entries(root / above, true))) {
     std::vector<std::string> inner = list_entries(root / above / left, true);
@@ -88,7 +92,7 @@ std::optional<Cameras> read_cameras(const fs::path& root, const std::string& abo
   return cameras ? cameras : in_one_folder(root, above);
 }
 
-/// In the folder, else in the one folder below it that has some.
+/// Searches the directory, or else the only subdirectory that contains both cameras.
 std::optional<Cameras> find_cameras(const fs::path& root) {
   std::optional<Cameras> found = read_cameras(root, "");
   if (found) return found;
@@ -100,13 +104,14 @@ std::optional<Cameras> find_cameras(const fs::path& root) {
   return found;
 }
 
-/// InputError: no such folder, no image in it that can be read.
+/// Throws InputError if the directory is missing or has no readable image.
 std::vector<std::string> list_images(const fs::path& root, const std::string& below) {
   const fs::path folder = root / below;
   require_folder(folder, "images");
   std::vector<std::string> names = list_entries(folder, false);
   if (names.empty()) {
-    std::string advice;  // by the ending of a file that is none
+    // Advice by the extension of a file that cannot be read.
+    std::string advice;
     std::error_code error;
     for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
       if (const fs::path& file = it->path(); file.has_extension() && file.stem() != "")
@@ -131,13 +136,13 @@ Cameras cameras_in(const fs::path& root, const std::array<std::string, 2>& below
 
 // ---- what names tell
 
-/// The name without its ending and without what tells the camera.
+/// Name without its extension and without the word that identifies the camera.
 std::string to_stem(const Camera& camera, const std::string& name) {
   const std::string stem = fs::path(name).stem().string();
   return camera.side.empty() ? stem : without_side(stem, camera.side).value_or(stem);
 }
 
-/// The last number in a name, digits and points: `left_0012` → `0012`; empty: it has none.
+/// Last number in a name, with digits and points: `left_0012` gives `0012`; empty if there is none.
 std::string_view last_number(std::string_view stem) {
   constexpr std::string_view kDigits = "0123456789";
   const std::size_t last = stem.find_last_of(kDigits);
@@ -148,7 +153,7 @@ std::string_view last_number(std::string_view stem) {
   return stem.substr(std::min(stem.find_first_of(kDigits), stem.size()));
 }
 
-/// The last number in a name without its leading zeros.
+/// Last number in a name without its leading zeros.
 std::string number_key(const Camera& camera, const std::string& name) {
   const std::string stem = to_stem(camera, name);
   const std::string_view number = last_number(stem);
@@ -163,8 +168,8 @@ std::optional<std::size_t> parse_index(const Camera& camera, const std::string& 
   return n && *n >= 0 ? std::optional(static_cast<std::size_t>(*n)) : std::nullopt;
 }
 
-/// The time that a name holds: the whole name as a date and time, seconds and the digits behind
-/// their point (`1403636584_763555584`), or its last number.
+/// Time in a name: the complete name as a date and time, seconds and the digits after their point
+/// (`1403636584_763555584`), or the last number.
 std::string time_in(const std::string& stem) {
   if (parse_iso_time(stem)) return stem;
   const std::string_view number = last_number(stem);
@@ -176,7 +181,7 @@ std::string time_in(const std::string& stem) {
   return (parts ? std::string(last_number(before)) + "." : "") + std::string(number);
 }
 
-/// The times that the names are; nothing: they are none.
+/// Times according to the names; empty if the names have none.
 std::optional<std::vector<Stamp>> stamps_in(const Camera& camera, std::string* unit) {
   std::vector<std::string> texts;
   for (const std::string& name : camera.names) texts.push_back(time_in(to_stem(camera, name)));
@@ -195,8 +200,8 @@ std::optional<std::vector<Stamp>> stamps_in(const Camera& camera, std::string* u
 
 // ---- pairs by names
 
-/// Both sorted lists by their keys; equal ones meet, the others stand alone. A side that has no
-/// image gets the name it should have had.
+/// Merges both sorted lists by their keys. If one side lacks an image, it gets the name that the
+/// image should have.
 template <class Key>
 std::vector<StereoPair> pair_by_key(const Cameras& cameras, const Key& key) {
   const auto &left = cameras[0].names, &right = cameras[1].names;
@@ -224,8 +229,8 @@ std::vector<StereoPair> pair_by_key(const Cameras& cameras, const Key& key) {
   return pairs;
 }
 
-/// By equal names, else by equal last numbers, whichever half of the images agree on; nothing:
-/// neither.
+/// Pairs by equal names, or else by equal last numbers, if at least half of the images match; empty
+/// otherwise.
 std::optional<std::vector<StereoPair>> pair_by_names(Cameras* cameras) {
   const std::size_t least = std::min((*cameras)[0].names.size(), (*cameras)[1].names.size());
   const auto met = [](const Cameras& c, const std::vector<StereoPair>& pairs) {
@@ -266,8 +271,8 @@ struct Stamped {
   std::vector<std::string> names{};
 };
 
-/// Pairs of the nearest stamps, within kMaxApart of the interval, in the order of the left ones;
-/// images without a partner stand where their stamp belongs. Nothing: there is no pair.
+/// Pairs of the nearest stamps, within kMaxApart of the interval, in the order of the left ones.
+/// Images without a partner are inserted by their stamp. Empty if there is no pair.
 std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 2>& cameras,
                                                       StereoSequence* sequence) {
   const auto &left = cameras[0].stamps, &right = cameras[1].stamps;
@@ -309,13 +314,18 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
 
 /// Layout of a data set's times.
 struct Lists {
-  std::optional<fs::path> shared{};              // of both cameras
-  std::array<std::optional<fs::path>, 2> own{};  // of each
-  std::optional<TimeUnit> unit{};  // of times that do not count from 1970, where it is fixed
-  bool by_number = false;          // line N is of image N, counted from 0
+  // List of both cameras.
+  std::optional<fs::path> shared{};
+  // List of each camera.
+  std::array<std::optional<fs::path>, 2> own{};
+  // Fixed unit of times that do not count from 1970.
+  std::optional<TimeUnit> unit{};
+  // True if line N is that of image N, counted from 0.
+  bool by_number = false;
 };
 
-/// `name_of_euroc`: what EuRoC calls the list in a camera's folder; elsewhere it may be anything.
+/// `name_of_euroc` is EuRoC's name of the list in a camera's directory; elsewhere it may be another
+/// file.
 std::optional<fs::path> list_in(const fs::path& folder, const char* name_of_euroc = "times.txt") {
   for (const char* name :
        {"times.txt", "timestamps.txt", "times.csv", "timestamps.csv", name_of_euroc})
@@ -323,7 +333,7 @@ std::optional<fs::path> list_in(const fs::path& folder, const char* name_of_euro
   return std::nullopt;
 }
 
-/// Beside the images' folders, in them, or between.
+/// Searches next to the image directories, in them, and in between.
 Lists find_lists(const fs::path& root, const Cameras& cameras) {
   Lists lists;
   lists.shared = list_in(root);
@@ -346,7 +356,7 @@ TimesFile read_list(const fs::path& file, const Lists& lists, StereoSequence* se
   return times;
 }
 
-/// The image that a line names, with or without its ending.
+/// Image that a line names with or without its extension.
 std::string named(const Camera& camera, const std::string& name) {
   const fs::path first(camera.names.empty() ? "" : camera.names.front());
   return camera.in_folder(is_image_name(name) ? name : name + first.extension().string());
@@ -356,7 +366,7 @@ bool holds(const Camera& camera, const std::string& name) {
   return std::binary_search(camera.names.begin(), camera.names.end(), name, in_name_order);
 }
 
-/// The images of a camera with the stamps of its own list.
+/// Images of a camera with the stamps of its own list.
 Stamped stamped(const fs::path& root, const Camera& camera, const fs::path& list,
                 const Lists& lists, StereoSequence* sequence) {
   const TimesFile times = read_list(list, lists, sequence);
@@ -394,7 +404,7 @@ Stamped stamped(const fs::path& root, const Camera& camera, const fs::path& list
   return out;
 }
 
-/// Images as the lines name them; some may be missing, but not all of a side.
+/// Images as named in the lines. Some may be missing, but not all of one side.
 std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<TimesLine>& times,
                                       const Cameras& cameras) {
   std::vector<StereoPair> pairs(times.size());
@@ -410,7 +420,7 @@ std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<Ti
   return pairs;
 }
 
-/// The numbers of pairs by their names; nothing: a name has none, or there are no pairs.
+/// Numbers of pairs according to their names; empty if a name has none, or without pairs.
 std::optional<std::vector<std::size_t>> parse_indices(const Cameras& cameras,
                                                       const std::vector<StereoPair>& pairs) {
   std::vector<std::size_t> numbers;
@@ -423,7 +433,7 @@ std::optional<std::vector<std::size_t>> parse_indices(const Cameras& cameras,
   return numbers.empty() ? std::nullopt : std::optional(numbers);
 }
 
-/// Image N belongs to line N, counted from 0 or from 1; empty: a number is beyond the lines.
+/// Assigns image N to line N, counted from 0 or 1; empty if a number exceeds the lines.
 std::vector<StereoPair> pair_by_number(const std::vector<std::size_t>& numbers,
                                        const std::vector<StereoPair>& pairs, std::size_t lines) {
   const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
@@ -434,9 +444,9 @@ std::vector<StereoPair> pair_by_number(const std::vector<std::size_t>& numbers,
   return all;
 }
 
-/// By names, where these give as many pairs as there are times: a name that only one side has is an
-/// image that the other lost. Where both lost one, by the numbers in the names: image N has line N.
-/// Else in order of name, where there is one of each a pair.
+/// Pairs by names if these give as many pairs as there are times; a name on one side only is then
+/// an image that the other side lost. If both sides lost one, image N gets line N. Otherwise pairs
+/// in the order of names, if both sides have one image per time.
 std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vector<TimesLine>& times,
                                         bool by_number, Cameras* cameras,
                                         std::vector<std::string>* assumptions) {
@@ -458,18 +468,18 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
           "there are fewer pairs than times: an image belongs to the line of its number");
   }
   if (pairs.size() != times.size())
-    refuse(
-        folder, 0,
-        fmt::format("has {} left images, {} right ones and {} lines in its list of times; one of "
-                    "each a pair is expected (a line may name its image: stamp,file)",
-                    left, right, times.size()));
+    refuse(folder, 0,
+           "has {} left images, {} right ones and {} lines in its list of times; one of each a "
+           "pair is expected (a line may name its image: stamp,file)",
+           left, right, times.size());
   for (std::size_t i = 0; i < times.size(); ++i) pairs[i].stamp = times[i].stamp;
   return pairs;
 }
 
 /// Interval assumed without a list of times. Motion is predicted by frames, so a wrong rate affects
 /// stamps and not poses.
-constexpr std::int64_t kAssumedStep = 100'000'000;  // ns
+// In ns.
+constexpr std::int64_t kAssumedStep = 100'000'000;
 
 std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* cameras,
                                            StereoSequence* sequence) {
@@ -486,10 +496,10 @@ std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* came
   const auto &of_left = (*cameras)[0].names, &of_right = (*cameras)[1].names;
   if (!named && of_left.size() != of_right.size())
     refuse(folder, 0,
-           fmt::format("has {} left images and {} right ones, whose names have no numbers in "
-                       "common; give the images of a pair one name, or write a times.txt whose "
-                       "lines name them: stamp,left file,right file",
-                       of_left.size(), of_right.size()));
+           "has {} left images and {} right ones, whose names have no numbers in common; give the "
+           "images of a pair one name, or write a times.txt whose lines name them: stamp,left "
+           "file,right file",
+           of_left.size(), of_right.size());
   std::vector<StereoPair> pairs = named ? std::move(*named) : pair_in_order(*cameras);
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kAssumedStep);
@@ -518,7 +528,7 @@ void pair_cameras(Cameras* cameras, const Lists& lists, StereoSequence* sequence
   }
   sequence->times = *lists.shared;
   TimesFile times = read_list(*lists.shared, lists, sequence);
-  // Two numbers may be the times of both images, and no names.
+  // Two numbers may be the times of both images instead of names.
   const std::string& name = times.lines.front().name[0];
   double ignored = 0;
   const bool named_there = !name.empty() && (!parse_number(name, &ignored) ||
@@ -530,7 +540,8 @@ void pair_cameras(Cameras* cameras, const Lists& lists, StereoSequence* sequence
 
 // ---- calibrations
 
-/// A file beside the images that may be a calibration of another program; empty: there is none.
+/// Name of a file in the directory that may be a calibration of another program; empty if there is
+/// none.
 std::string other_calibration(const fs::path& folder) {
   std::error_code ignored;
   for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
@@ -568,10 +579,11 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
              (other.empty() ? "" : "; is " + other + " one?"));
 }
 
-/// The kind of pixels that a PNG says in its head.
+/// True if the file is a PNG with colours.
 bool is_colour(const fs::path& file) {
   constexpr std::size_t kKindAt = 25;
-  constexpr std::uint8_t kColours = 2;  // bit of the kind
+  // Bit of the colour type.
+  constexpr std::uint8_t kColours = 2;
   std::vector<std::uint8_t> bytes;
   return read_image_file(file, &bytes) == ImageFileStatus::ok && bytes.size() > kKindAt &&
          bytes[0] == 0x89 && (bytes[kKindAt] & kColours) != 0;
@@ -590,10 +602,10 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   if (auto found = find_cameras(folder); found && !sequence.side_by_side)
     cameras = std::move(*found);
   else
-    for (std::size_t k = 0; k < 2; ++k)  // left and right are to be named as missing
+    // Left and right are reported as missing.
+    for (std::size_t k = 0; k < 2; ++k)
       cameras[k].below = sequence.side_by_side ? "both" : k == 0 ? "left" : "right";
-  // Images in DRIVE/left and DRIVE/right below the folder: the calibration and the times are
-  // theirs.
+  // If the images are in DRIVE/left and DRIVE/right, DRIVE also has their calibration and times.
   if (const fs::path parent = fs::path(cameras[0].below).parent_path();
       !parent.empty() && parent == fs::path(cameras[1].below).parent_path() &&
       !present(folder / "calibration.yaml") && !list_in(folder))
@@ -606,11 +618,11 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   sequence.times = folder / "times.txt";
   pair_cameras(&cameras, find_lists(folder, cameras), &sequence);
   if (const auto& left = cameras[0].names, &right = cameras[1].names; left.size() != right.size())
-    sequence.remarks.push_back(fmt::format(
-        "there are {} left images and {} right ones: where one camera lost an image without "
-        "leaving a gap in the names or in times.txt, all pairs after it are a frame off; check "
-        "that the names of a pair belong together",
-        left.size(), right.size()));
+    sequence.remarks.push_back(
+        fmt::format("there are {} left images and {} right ones: where one camera lost an image "
+                    "without leaving a gap in the names or in times.txt, all pairs after it are a "
+                    "frame off; check that the names of a pair belong together",
+                    left.size(), right.size()));
   if (!given) read_own_calibration(use, cameras, &sequence);
   return sequence;
 }
@@ -656,10 +668,9 @@ StereoSequence open_kitti(const fs::path& folder, bool given) {
 StereoSequence open_kitti_raw(const fs::path& folder, bool given,
                               const std::array<int, 2>& numbers) {
   if (numbers[0] == numbers[1])
-    refuse(
-        folder, 0,
-        fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
-                    numbers[0]));
+    refuse(folder, 0,
+           "kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
+           numbers[0]);
   const KittiRawFolders folders = find_kitti_raw(folder);
   StereoSequence sequence;
   sequence.root = folders.drive;

@@ -18,8 +18,8 @@ struct Failure {
 }
 void ignore(j_common_ptr /*info*/) {}
 
-/// Between setjmp and libjpeg's longjmp nothing may stand that has a destructor: all of it is the
-/// caller's.
+/// No object with a destructor may be created between setjmp and libjpeg's longjmp, so all of them
+/// are the caller's.
 bool compress(const ImageView& image, int quality, Failure* failure, jpeg_compress_struct* jpeg,
               unsigned char** out, unsigned long* size) noexcept {
   jpeg->err = jpeg_std_error(&failure->manager);
@@ -40,7 +40,7 @@ bool compress(const ImageView& image, int quality, Failure* failure, jpeg_compre
   jpeg->dct_method = JDCT_IFAST;
   jpeg_start_compress(jpeg, TRUE);
   while (jpeg->next_scanline < jpeg->image_height) {
-    // The library does not write to what it reads, whatever its type says.
+    // The library does not write to its source, although the type permits it.
     auto* row = const_cast<JSAMPROW>(image.row(static_cast<int>(jpeg->next_scanline)));
     (void)jpeg_write_scanlines(jpeg, &row, 1);
   }

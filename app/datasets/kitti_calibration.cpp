@@ -15,15 +15,16 @@
 namespace vergence::app {
 namespace {
 
-/// The lines of such a file by their keys.
+/// Lines of such a file by their keys.
 class Text {
  public:
-  /// `without`: what a message about a missing file goes on with.
+  /// `without` ends the message about a missing file.
   Text(const std::filesystem::path& file, const char* without) : file_(file) {
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored))
-      refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
-    constexpr std::size_t kLargest = std::size_t{1} << 20U;  // bytes
+      refuse(file, 0, "is missing: unpack the date's calibration there{}", without);
+    // In bytes.
+    constexpr std::size_t kLargest = std::size_t{1} << 20U;
     text_ = read_text(file, kLargest);
     Lines lines(text_);
     for (std::string_view line; lines.next(&line);) {
@@ -46,7 +47,7 @@ class Text {
   [[nodiscard]] std::array<double, N> numbers(const std::string& key) const {
     const auto found = found_.find(key);
     if (found == found_.end())
-      refuse(file_, 0, fmt::format("has no line `{}:`, {} numbers are expected there", key, N));
+      refuse(file_, 0, "has no line `{}:`, {} numbers are expected there", key, N);
     std::array<std::string_view, N> fields;
     const std::size_t count = split(found->second.rest, ' ', fields);
     if (count != N) fail(key, fmt::format("has {} numbers where {} are expected", count, N));
@@ -74,14 +75,15 @@ class Text {
 
   [[nodiscard]] ImageSize size(const std::string& key) const {
     const auto v = numbers<2>(key);
-    constexpr int kWidest = 1 << 15;  // px
+    // In px.
+    constexpr int kWidest = 1 << 15;
     if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest))
       fail(key, "is no size of an image");
     return {static_cast<int>(v[0]), static_cast<int>(v[1])};
   }
 
-  /// The camera that a rectified projection P = K [I | t] describes, without its image's size, and
-  /// where it sits: X_k = X_rectified + *t.
+  /// Camera of a rectified projection P = K [I | t], without its image size, and its position: X_k
+  /// = X_rectified + *t.
   [[nodiscard]] Intrinsics projection(const std::string& key, Vec3* t) const {
     const auto P = numbers<12>(key);
     if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1 || !(P[0] > 0 && P[5] > 0))
@@ -106,16 +108,17 @@ class Text {
 
 std::string key(const char* name, int camera) { return fmt::format("{}_{:02d}", name, camera); }
 
-/// Where a camera sits, from camera 00 before rectification, and how it sees.
+/// Intrinsics of a camera and its transform from camera 00 before rectification.
 Intrinsics read_camera(const Text& text, int number, bool rectified, Transform* T_camera_camera0) {
   Intrinsics lens;
   if (rectified) {
-    // All were turned into the axes of camera 00 as it became.
+    // All cameras were rotated into the axes of the rectified camera 00.
     T_camera_camera0->R = text.rotation(key("R_rect", 0));
     lens = text.projection(key("P_rect", number), &T_camera_camera0->t);
   } else {
     const auto K = text.numbers<9>(key("K", number));
-    lens.distortion = text.numbers<5>(key("D", number));  // k1 k2 p1 p2 k3
+    // The order is k1 k2 p1 p2 k3.
+    lens.distortion = text.numbers<5>(key("D", number));
     lens.fx = K[0], lens.fy = K[4], lens.cx = K[2], lens.cy = K[5];
     if (!(lens.fx > 0 && lens.fy > 0) || K[1] != 0 || K[3] != 0 || K[8] != 1)
       text.fail(key("K", number), "is not [fx 0 cx; 0 fy cy; 0 0 1] with positive focal lengths");
@@ -129,8 +132,8 @@ Intrinsics read_camera(const Text& text, int number, bool rectified, Transform* 
 }  // namespace
 
 bool accept_rotation(const Mat3& written) noexcept {
-  // Between seven digits (1.5e-7 in KITTI's poses) and a matrix that is no rotation (1e-3 would
-  // bend a kilometre by a metre).
+  // Lies between the rounding of seven digits (1.5e-7 in KITTI's poses) and a matrix that is no
+  // rotation (1e-3 bends a kilometre by a metre).
   constexpr double kOrthonormality = 1e-4;
   const double error = (written * written.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
   return error <= kOrthonormality && written.determinant() > 0;
@@ -180,7 +183,8 @@ KittiRawRig read_kitti_raw_rig(const KittiRawFolders& folders, const std::array<
   out.T_left_camera0 = T_camera_camera0[0];
   out.rig.T_camera_left[1] = T_camera_camera0[1] * T_camera_camera0[0].inverse();
   if (are_rectified)
-    out.rig.T_camera_left[1].R = Mat3::Identity();  // without the rounding of a product
+    // This avoids the rounding of the product.
+    out.rig.T_camera_left[1].R = Mat3::Identity();
   out.rig.baseline = out.rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&out.rig)) refuse(file, 0, bad->message);
   return out;

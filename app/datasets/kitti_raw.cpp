@@ -21,35 +21,44 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kFields = 30;
-constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;  // bytes
+// In bytes.
+constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;
 
-/// The columns of a packet that are read; order and units are those of the development kit (its
-/// dataformat.txt).
+/// Used columns of a packet; order and units are those of the development kit (dataformat.txt).
 enum Column : std::size_t {
-  latitude,                // deg
-  longitude,               // deg
-  altitude,                // m
-  roll,                    // rad, positive with the left side up
-  pitch,                   // rad, positive with the front down
-  yaw,                     // rad, 0 is east, counter-clockwise
-  to_north,                // m/s
-  to_east,                 // m/s
-  upward = 10,             // m/s, perpendicular to the earth's surface
-  position_accuracy = 23,  // m, north and east
-  velocity_accuracy = 24,  // m/s, north and east
+  // In degrees.
+  latitude,
+  longitude,
+  // In m.
+  altitude,
+  // In rad, positive with the left side up.
+  roll,
+  // In rad, positive with the front down.
+  pitch,
+  // In rad from east, counter-clockwise.
+  yaw,
+  // In m/s.
+  to_north,
+  to_east,
+  // In m/s, perpendicular to the ellipsoid.
+  upward = 10,
+  // In m, north and east.
+  position_accuracy = 23,
+  // In m/s, north and east.
+  velocity_accuracy = 24,
   navigation_status = 25,
   satellites = 26,
   position_mode = 27,
 };
 
-// Specified accuracy of the unit, an RT3003 with two antennas: its packets have accuracies of place
-// and velocity alone.
+// Specified accuracy of the unit, an RT3003 with two antennas, because packets have only the
+// accuracies of position and velocity.
 constexpr double kTiltSigma = 0.03 * kRadiansPerDegree, kHeadingSigma = 0.1 * kRadiansPerDegree;
-constexpr double kHeightOverPlace =
-    2;  // a receiver's height is about so much less accurate than its place
+// Heights of a receiver are less accurate than its horizontal position by about this factor.
+constexpr double kHeightOverPlace = 2;
 
-constexpr int kLocked =
-    4;  // navigation status of a unit whose figures are valid; below it is starting
+// Navigation status of a unit with valid data; lower values mean that it is starting.
+constexpr int kLocked = 4;
 
 /// Position modes of the unit's protocol (NCOM): 3 single point, 4 differential, 5 and 6 real-time
 /// kinematic, 7 to 9 and 13 to 18 further corrections. 0 none, 1 searching, 2 and 12 Doppler alone,
@@ -63,7 +72,7 @@ FixStatus to_fix_status(int status, int satellites_used, int mode) noexcept {
 
 int whole(double v) noexcept { return std::abs(v) < 1e6 ? static_cast<int>(std::lround(v)) : -1; }
 
-/// Nothing: fewer numbers than there are columns, or a place that is none.
+/// Returns nothing for missing numbers or an invalid position.
 std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   std::array<std::string_view, kFields> fields;
   Lines lines(text);
@@ -77,7 +86,8 @@ std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   s.position = {v[latitude], v[longitude], v[altitude]};
   const double largest = std::max({std::abs(v[roll]), std::abs(v[pitch]), std::abs(v[yaw])});
   if (!s.position.plausible() || largest > 3 * std::numbers::pi)
-    return std::nullopt;  // degrees, or other columns
+    // These are degrees, or other columns.
+    return std::nullopt;
   const int used = whole(v[satellites]), status = whole(v[navigation_status]),
             mode = whole(v[position_mode]);
   s.fix = to_fix_status(status, used, mode);
@@ -99,8 +109,7 @@ std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   return r;
 }
 
-/// The packets that lines of timestamps.txt are of, and how many of them, and of those that are
-/// left out.
+/// Packets of the lines of timestamps.txt, and the number of skipped ones.
 struct Packets {
   std::vector<InsRecord> readings{};
   std::vector<Stamp> stamps{};
@@ -120,7 +129,8 @@ Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) 
     std::optional<InsRecord> reading;
     try {
       reading = parse_packet(read_text(data / name, kLongestPacket));
-    } catch (const InputError&) {  // not readable, or longer than a packet: one more that is broken
+    } catch (const InputError&) {
+      // A file that is unreadable or longer than a packet counts as damaged.
     }
     if (!reading) {
       if (out.broken++ == 0) out.first_broken = name;
@@ -147,8 +157,7 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
   };
   add_remark(packets.missing, "packets are missing, the first is " + packets.first_missing);
   add_remark(packets.broken,
-             fmt::format("packets are not the {} numbers of one and are left out, the "
-                         "first is {}",
+             fmt::format("packets are not the {} numbers of one and are left out, the first is {}",
                          kFields, packets.first_broken));
   add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are left out");
   add_remark(disordered, "stamps go back or repeat one; their packets are left out");
@@ -159,7 +168,7 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
                          ins->readings.size()));
 }
 
-/// A folder with a camera's images and their list, or with the INS's packets.
+/// True for a directory with a camera's images and their list, or with the INS's packets.
 bool is_drive(const fs::path& folder) {
   std::error_code ignored;
   for (int camera = 0; camera < 4; ++camera)
@@ -168,10 +177,11 @@ bool is_drive(const fs::path& folder) {
   return fs::is_directory(folder / "oxts", ignored);
 }
 
-/// The folder itself, or what lies one or two folders below.
+/// Drives in the directory: itself, or one or two levels below.
 std::vector<fs::path> drives_in(const fs::path& folder) {
   if (is_drive(folder)) return {folder};
-  constexpr std::size_t kMaxFolders = 1000;  // that are looked into
+  // Maximum number of searched directories.
+  constexpr std::size_t kMaxFolders = 1000;
   std::vector<fs::path> found;
   std::size_t looked = 0;
   std::error_code error;
@@ -202,16 +212,15 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
     std::string names;
     for (std::size_t i = 0; i < std::min(kMaxNamed, found.size()); ++i)
       names += (i > 0 ? ", " : "") + found[i].filename().string();
-    refuse(folder, 0,
-           fmt::format("holds {} drives ({}{}): name one of them", found.size(), names,
-                       found.size() > kMaxNamed ? ", …" : ""));
+    refuse(folder, 0, "holds {} drives ({}{}): name one of them", found.size(), names,
+           found.size() > kMaxNamed ? ", …" : "");
   }
   std::error_code ignored;
-  // `.` and a name that ends in a slash have a folder above, too.
+  // `.` and a name that ends in a slash also have a parent directory.
   fs::path lexical = fs::absolute(found[0], ignored).lexically_normal();
   if (!lexical.has_filename()) lexical = lexical.parent_path();
   KittiRawFolders out{found[0], lexical.parent_path()};
-  // A drive may be a link to where it is kept, its calibration beside the one or the other.
+  // A drive may be a symbolic link, with its calibration next to the link or next to its target.
   for (const fs::path& other : {out.drive, fs::weakly_canonical(out.drive, ignored).parent_path()})
     if (!fs::exists(out.calibration / kKittiRawCalibration, ignored) &&
         fs::exists(other / kKittiRawCalibration, ignored))
@@ -233,8 +242,8 @@ RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
   const Packets packets = read_packets(data, read_times_file(oxts / "timestamps.txt").lines);
   if (packets.readings.empty())
     refuse(data / (packets.broken > 0 ? packets.first_broken : packets.first_missing), 0,
-           fmt::format("{}, and so is every other packet: {} numbers each are expected",
-                       packets.broken > 0 ? "is no packet of the INS" : "is missing", kFields));
+           "{}, and so is every other packet: {} numbers each are expected",
+           packets.broken > 0 ? "is no packet of the INS" : "is missing", kFields);
   const std::vector<std::size_t> kept = ascending(packets.stamps);
   for (const std::size_t i : kept) ins.readings.push_back(packets.readings[i]);
   add_remarks(packets, packets.readings.size() - kept.size(), &ins);

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
 #include "app/datasets/text_file.hpp"
@@ -19,12 +18,14 @@ namespace {
 namespace fs = std::filesystem;
 using detail::RosReader;
 
-constexpr std::size_t kMaxSmall = 65536;                       // bytes of a message that is none
-                                                               // of images
-constexpr std::size_t kMaxDescription = std::size_t{4} << 20;  // bytes
-constexpr std::size_t kMaxFrames = 4'000'000;                  // 37 hours at 30 Hz
+// Maximum size of a message without an image, in bytes.
+constexpr std::size_t kMaxSmall = 65536;
+// In bytes.
+constexpr std::size_t kMaxDescription = std::size_t{4} << 20;
+// 37 hours at 30 Hz.
+constexpr std::size_t kMaxFrames = 4'000'000;
 
-/// The check sum that ends a message is that of what stands before it.
+/// Verifies the checksum at the end of a message.
 bool check(std::span<const std::uint8_t> bytes, RosReader* in) {
   const std::size_t end = in->position();
   const auto crc = in->get<std::uint32_t>();
@@ -47,8 +48,10 @@ std::optional<FrameRecord> read_frame(std::span<const std::uint8_t> bytes) {
   for (std::uint32_t& crc : f.image_crc) crc = in.get<std::uint32_t>();
   f.recalibration_requested = in.get<std::uint8_t>() != 0;
   f.solver_done = in.get<std::uint8_t>() != 0;
-  for (int i = 0; i < 3; ++i) (void)in.get<std::uint8_t>();  // state, status, reason
-  (void)in.doubles<7>();                                     // the pose
+  // State, status and reason are skipped.
+  for (int i = 0; i < 3; ++i) (void)in.get<std::uint8_t>();
+  // The pose is skipped.
+  (void)in.doubles<7>();
   (void)in.get<std::int32_t>();
   (void)in.get<double>();
   (void)in.get<float>();
@@ -93,26 +96,24 @@ std::optional<InsRecord> read_reading(std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
-struct RecordedSession::Files {
-  std::vector<detail::BagFile> list;
-};
-
 /// Result of a scan.
 struct RecordedSession::Reader {
   RecordedSession* session;
   const fs::path& folder;
-  std::map<std::string, std::size_t> cameras{};  // topics of images
+  // Camera indices by image topic.
+  std::map<std::string, std::size_t> cameras{};
   bool described = false;
-  std::array<RecordedImage, kMaxCameras> newest{};  // not yet of a frame
+  // Newest images that do not belong to a frame yet.
+  std::array<RecordedImage, kMaxCameras> newest{};
   std::array<Stamp, kMaxCameras> newest_stamp{};
   std::size_t broken = 0, images_lost = 0;
 
   void read_message(const detail::BagMessage& m, std::uint32_t file) {
     const std::string& type = m.channel->type;
     if (m.channel->topic == SessionDescription::kTopic) return read_description(m);
-    if (type == "sensor_msgs/Image") return take_image(m, file);
-    if (type == "vergence_msgs/Frame") return read_recorded_frame(m);
-    if (type == "vergence_msgs/InsReading") return take_reading(m);
+    if (type == "sensor_msgs/Image") return add_image(m, file);
+    if (type == "vergence_msgs/Frame") return add_frame(m);
+    if (type == "vergence_msgs/InsReading") return add_reading(m);
   }
 
   void read_description(const detail::BagMessage& m) {
@@ -129,7 +130,7 @@ struct RecordedSession::Reader {
     described = true;
   }
 
-  void take_image(const detail::BagMessage& m, std::uint32_t file) {
+  void add_image(const detail::BagMessage& m, std::uint32_t file) {
     const auto camera = cameras.find(m.channel->topic);
     if (camera == cameras.end() || m.place.chunk != detail::BagPlace::kNoChunk) return;
     const auto image = detail::read_ros_image(detail::first_bytes(m, detail::kRosImageHead),
@@ -142,14 +143,14 @@ struct RecordedSession::Reader {
     newest_stamp[camera->second] = image->stamp;
   }
 
-  void read_recorded_frame(const detail::BagMessage& m) {
+  void add_frame(const detail::BagMessage& m) {
     const auto record = read_frame(detail::first_bytes(m, kMaxSmall));
     if (!record) {
       ++broken;
       return;
     }
     if (session->frames_.size() == kMaxFrames)
-      refuse(folder, 0, fmt::format("has a recording of more than {} frames", kMaxFrames));
+      refuse(folder, 0, "has a recording of more than {} frames", kMaxFrames);
     RecordedFrame frame{*record, {}, session->readings_.size()};
     for (std::size_t k = 0; k < static_cast<std::size_t>(record->cameras); ++k) {
       if ((record->images_present >> k & 1U) == 0) continue;
@@ -162,35 +163,31 @@ struct RecordedSession::Reader {
     session->frames_.push_back(frame);
   }
 
-  void take_reading(const detail::BagMessage& m) {
+  void add_reading(const detail::BagMessage& m) {
     const auto reading = read_reading(detail::first_bytes(m, kMaxSmall));
     if (!reading) {
       ++broken;
       return;
     }
     if (session->readings_.size() == kMaxReadings)
-      refuse(folder, 0, fmt::format("has a recording of more than {} readings", kMaxReadings));
+      refuse(folder, 0, "has a recording of more than {} readings", kMaxReadings);
     session->readings_.push_back(*reading);
   }
 };
 
-RecordedSession::RecordedSession() : files_(std::make_unique<Files>()) {}
-RecordedSession::RecordedSession(RecordedSession&&) noexcept = default;
-RecordedSession::~RecordedSession() = default;
-
 RecordedSession RecordedSession::open(const fs::path& folder) {
   RecordedSession session;
-  session.files_->list = detail::open_bag_files(detail::BagFormat::mcap, folder);
+  session.files_ = detail::open_bag_files(detail::BagFormat::mcap, folder);
   Reader reader{&session, folder};
-  for (std::size_t i = 0; i < session.files_->list.size(); ++i) {
-    const detail::BagFile& file = session.files_->list[i];
+  for (std::size_t i = 0; i < session.files_.size(); ++i) {
+    const detail::BagFile& file = session.files_[i];
     const auto scan =
         detail::scan_bag(detail::BagFormat::mcap, *file.bytes, [&](const detail::BagMessage& m) {
           reader.read_message(m, static_cast<std::uint32_t>(i));
         });
     if (!scan) {
       session.remarks_.push_back(file.name + " does not begin as a recording and was left out");
-      session.complete_ = session.complete_ && i + 1 == session.files_->list.size();
+      session.complete_ = session.complete_ && i + 1 == session.files_.size();
       continue;
     }
     scan->remark(file.name, &session.remarks_);
@@ -198,8 +195,8 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
   }
   if (!reader.described)
     refuse(folder, 0,
-           "holds no recording of a session: its .mcap files are another program's, which "
-           "--format mcap replays");
+           "holds no recording of a session: its .mcap files are another program's, which --format "
+           "mcap replays");
   if (session.frames_.empty())
     refuse(folder, 0,
            "has a recording without a complete frame; the run was too short, or the file is "
@@ -231,8 +228,9 @@ bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::
   if (image.offset == 0) return false;
   const auto width = static_cast<std::size_t>(image.width);
   const auto size = width * static_cast<std::size_t>(image.height);
-  const detail::ByteSource& file = *files_->list[image.file].bytes;
-  // In one piece, so that the check sum is one; then the rows move apart, the last one first.
+  const detail::ByteSource& file = *files_[image.file].bytes;
+  // The pixels are read in one piece for the checksum. Then the rows are moved apart, the last one
+  // first.
   if (!file.read(image.offset, {out, size})) return false;
   if (crc32_of({out, size}) != frame.given.image_crc[camera]) return false;
   if (stride != width)

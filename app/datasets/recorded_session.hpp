@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
+#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
@@ -44,8 +44,6 @@ class RecordedSession {
   /// Opens the recording in a session's directory, or a directory with only its files. Throws
   /// InputError without a recording or frames, or for another program or version.
   [[nodiscard]] static RecordedSession open(const std::filesystem::path& folder);
-  RecordedSession(RecordedSession&&) noexcept;
-  ~RecordedSession();
 
   [[nodiscard]] const SessionDescription& description() const noexcept { return description_; }
   [[nodiscard]] const std::vector<RecordedFrame>& frames() const noexcept { return frames_; }
@@ -65,15 +63,14 @@ class RecordedSession {
 
  private:
   struct Reader;
-  struct Files;
-  RecordedSession();
+  RecordedSession() = default;
 
   SessionDescription description_;
   std::vector<RecordedFrame> frames_;
   std::vector<InsRecord> readings_;
   std::vector<std::string> remarks_;
   bool complete_ = true;
-  std::unique_ptr<Files> files_;
+  std::vector<detail::BagFile> files_;
 };
 
 /// True if the directory has a recording, by the names of its files and of its poses.

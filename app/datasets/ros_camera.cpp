@@ -11,11 +11,12 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kSameRectification =
-    1e-6;  // relative: focal lengths of the two projection matrices
+// Relative difference of the focal lengths of the two projection matrices.
+constexpr double kSameRectification = 1e-6;
 
 struct Model {
-  std::string_view words;  // in small letters and digits
+  // Names in lower-case letters and digits.
+  std::string_view words;
   CameraModelKind kind;
 };
 constexpr std::array kModels{
@@ -32,7 +33,7 @@ double off_middle(double x, double y, const ImageSize& size) {
   return std::max(std::abs(x / size.width - 0.5), std::abs(y / size.height - 0.5));
 }
 
-/// Rows of pixels minus an offset, divided by a binning.
+/// Subtracts an offset from pixel coordinates and divides them by a binning.
 struct ToImage {
   double x = 0, y = 0, binning_x = 1, binning_y = 1;
   void apply(RosCamera* c) const {

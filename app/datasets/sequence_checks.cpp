@@ -13,11 +13,13 @@
 namespace vergence::app {
 namespace {
 
-// s: faster than any stereo camera; farther than motion can be predicted across
+// In s. No stereo camera is faster than the first, and motion cannot be predicted across the
+// second.
 constexpr double kShortestStep = 1e-3, kLongestStep = 10;
-constexpr std::size_t kSampledPairs = 5;  // pairs, spread over the drive: a tunnel is not all of it
+// The pairs are spread over the sequence, because a part of it may be dark.
+constexpr std::size_t kSampledPairs = 5;
 
-/// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
+/// Empty for other images; 0 for a missing, truncated or black image.
 std::optional<std::uint16_t> find_peak(const StereoSequence& s, const std::string& name,
                                        std::vector<std::uint8_t>* bytes) {
   if (name.empty()) return std::uint16_t{0};
@@ -31,17 +33,19 @@ std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_s
 }  // namespace
 
 void check_times(const StereoSequence& sequence) {
-  // Half of what 64 bits hold: no difference of two stamps is beyond them.
-  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;  // ns: 1823 to 2116
+  // Half of the 64-bit range in ns, 1823 to 2116, so that differences of two stamps do not
+  // overflow.
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
   const std::filesystem::path file = sequence.times.empty() ? sequence.root : sequence.times;
   for (const StereoPair& pair : sequence.pairs)
     if (pair.stamp.ns() > kFarthest || pair.stamp.ns() < -kFarthest)
       refuse(file, 0,
-             fmt::format("has the stamp {} ns, {} s from 1970; those of a drive are between the "
-                         "years 1824 and 2116: are these other units, or is the line broken?",
-                         pair.stamp.ns(), format_seconds(pair.stamp.ns())));
+             "has the stamp {} ns, {} s from 1970; those of a drive are between the years 1824 and "
+             "2116: are these other units, or is the line broken?",
+             pair.stamp.ns(), format_seconds(pair.stamp.ns()));
   if (sequence.pairs.size() < 3) return;
-  std::vector<double> steps;  // s, those forward
+  // Forward steps in s.
+  std::vector<double> steps;
   std::size_t backward = 0;
   for (std::size_t i = 1; i < sequence.pairs.size(); ++i) {
     const double step = (static_cast<double>(sequence.pairs[i].stamp.ns()) -
@@ -54,17 +58,16 @@ void check_times(const StereoSequence& sequence) {
   }
   const std::size_t all = sequence.pairs.size() - 1, still = all - backward - steps.size();
   if (2 * steps.size() < all && still > backward)
-    refuse(file, 0,
-           fmt::format("has times of which {} of {} repeat the one before: they were written with "
-                       "too few digits",
-                       still, all));
+    refuse(
+        file, 0,
+        "has times of which {} of {} repeat the one before: they were written with too few digits",
+        still, all);
   if (2 * steps.size() < all)
     refuse(file, 0,
-           fmt::format("has times that do not go forward: of {} steps from pair to pair {} go back "
-                       "and {} stand still; are the lines in the order "
-                       "of the images, the oldest first?",
-                       all, backward, still));
-  // The lower middle: a gap is no unit.
+           "has times that do not go forward: of {} steps from pair to pair {} go back and {} "
+           "stand still; are the lines in the order of the images, the oldest first?",
+           all, backward, still);
+  // The lower middle is used, because a gap does not indicate the unit.
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   if (*middle >= kShortestStep && *middle <= kLongestStep) return;
@@ -73,12 +76,13 @@ void check_times(const StereoSequence& sequence) {
            "has times that count the pairs (1, 2, 3 …), as numbers of frames do, and no times: "
            "leave the file out, and pairs are taken to be 0.1 s apart");
   refuse(file, 0,
-         fmt::format("has pairs that follow one another after {:.4g} s (median); those of a drive "
-                     "do after 1 ms to 10 s: are these times in other units?{}",
-                     *middle,
-                     file.extension() == ".txt"  // else the format has its one unit
-                         ? " Whole numbers are read as nanoseconds, numbers with a point as seconds"
-                         : ""));
+         "has pairs that follow one another after {:.4g} s (median); those of a drive do after 1 "
+         "ms to 10 s: are these times in other units?{}",
+         *middle,
+         // Other formats have a fixed unit.
+         file.extension() == ".txt"
+             ? " Whole numbers are read as nanoseconds, numbers with a point as seconds"
+             : "");
 }
 
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
@@ -102,7 +106,7 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
                 (sequence.side_by_side ? " (twice its width, side by side)" : "") +
                 "; use the calibration that belongs to these images";
     }
-  // Single images of another size cost their frames.
+  // Single images of another size are skipped as frames.
   if (bad > good) throw InputError(message);
 }
 

@@ -14,10 +14,9 @@ namespace vergence::app {
 SequenceFormat sequence_format(const std::string& word, const std::filesystem::path& folder) {
   constexpr const char* kLayouts =
       "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt "
-      "above), EuRoC (mav0), plain (left, "
-      "right or other usual names, times.txt, calibration.yaml), UQ St Lucia, bags of ROS 2 "
-      "(.mcap, .db3) and ROS 1 (.bag) "
-      "and sessions with a recording (drive.mcap) are what can be read";
+      "above), EuRoC (mav0), plain (left, right or other usual names, times.txt, "
+      "calibration.yaml), UQ St Lucia, bags of ROS 2 (.mcap, .db3) and ROS 1 (.bag) and sessions "
+      "with a recording (drive.mcap) are what can be read";
   const std::vector<std::string> words{"kitti", "kitti-raw", "euroc", "folder", "st-lucia",
                                        "mcap",  "rosbag",    "db3",   "session"};
   if (const auto at = std::find(words.begin(), words.end(), word); at != words.end())

@@ -32,22 +32,22 @@ std::string rows(const Transform& T) {
   return out;
 }
 
-/// The truth at the stamps of frames.
+/// Ground truth at the stamps of frames.
 ///
-/// A frame's stamp is measured by the devices' clocks, the mock's truth has the exact one: the
-/// first or last frame may lie some 0.1 ms outside the truth that was made for it. Up to 1 ms
-/// beyond an end, far less than the time between two frames, the motion of the interval there is
-/// carried on. That is off by a/2 · 1 ms · 201 ms = 1 mm in a vehicle that brakes with a = 10 m/s²;
-/// the end's own pose would be off by 40 mm at 40 m/s.
+/// A frame's stamp is measured by the devices' clocks, while the simulated ground truth has exact
+/// stamps. So the first or last frame may be some 0.1 ms outside of it. Up to 1 ms beyond an end,
+/// far less than the interval of frames, the motion there is extrapolated. The error is a/2 · 1 ms
+/// · 201 ms = 1 mm if a vehicle brakes with a = 10 m/s²; the last pose itself would be off by 40 mm
+/// at 40 m/s.
 class Truth {
  public:
   explicit Truth(const Trajectory& poses) : poses_(poses), track_(poses, kWidestHole) {}
 
   [[nodiscard]] std::optional<Transform> at(Stamp stamp) const {
     if (poses_.size() < 2) return track_.at(stamp);
-    if (stamp < poses_.front().stamp) return carried_on(poses_[1], poses_[0], stamp);
+    if (stamp < poses_.front().stamp) return extrapolate(poses_[1], poses_[0], stamp);
     if (stamp > poses_.back().stamp)
-      return carried_on(poses_[poses_.size() - 2], poses_.back(), stamp);
+      return extrapolate(poses_[poses_.size() - 2], poses_.back(), stamp);
     return track_.at(stamp);
   }
   [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
@@ -56,14 +56,13 @@ class Truth {
   static constexpr Duration kWidestHole = Duration::milliseconds(200);
   static constexpr Duration kBeyond = Duration::milliseconds(1);
 
-  /// From one pose to the end and on.
-  [[nodiscard]] static std::optional<Transform> carried_on(const StampedPose& from,
-                                                           const StampedPose& end, Stamp stamp) {
+  /// Extrapolates from one pose beyond the end.
+  [[nodiscard]] static std::optional<Transform> extrapolate(const StampedPose& from,
+                                                            const StampedPose& end, Stamp stamp) {
     const double beyond = std::abs((stamp - end.stamp).to_seconds()),
                  step = std::abs((end.stamp - from.stamp).to_seconds());
     if (beyond > kBeyond.to_seconds() || step > kWidestHole.to_seconds()) return std::nullopt;
-    // The arc from one rotation to the other has no end at the second one: a share above 1 is on
-    // it.
+    // A share above 1 continues the arc from one rotation to the other.
     return interpolate(from.T_world_body, end.T_world_body, 1 + beyond / step);
   }
 
@@ -97,7 +96,7 @@ std::string projections(const RigCalibration& rig) {
   return text;
 }
 
-/// KITTI has no place for distortion and turned cameras.
+/// KITTI cannot store distortion and rotated cameras.
 void check_rectified(const RigCalibration& rig) {
   const Transform& T = rig.T_camera_left[1];
   if (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
@@ -107,7 +106,7 @@ void check_rectified(const RigCalibration& rig) {
         "or folder");
 }
 
-/// Where images go, and what the text files of the layout hold.
+/// Writes the images and text files of a layout.
 class Writer {
  public:
   explicit Writer(const ExportRequest& request) : request_(request) {
@@ -121,7 +120,7 @@ class Writer {
   }
   void add(Stamp stamp) { stamps_.push_back(stamp); }
 
-  /// Text files, when all images are there.
+  /// Writes the text files after all images.
   void finish(const Truth& truth, ExportResult* result) const {
     const fs::path& out = request_.out;
     switch (request_.format) {
@@ -215,8 +214,8 @@ bool has_pair(const RecordedFrame& frame) {
   return frame.images[0].offset != 0 && frame.images[1].offset != 0;
 }
 
-/// The first frame of which both images were recorded.
-const RecordedFrame& init_features(const RecordedSession& session) {
+/// First frame with both images.
+const RecordedFrame& first_complete_frame(const RecordedSession& session) {
   const auto& frames = session.frames();
   const auto first = std::find_if(frames.begin(), frames.end(), has_pair);
   if (first == frames.end())
@@ -224,20 +223,20 @@ const RecordedFrame& init_features(const RecordedSession& session) {
   return *first;
 }
 
-/// A data set with a calibration for images of another size is one that no program takes.
+/// Throws InputError if the calibration is for images of another size.
 void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration) {
   for (std::size_t k = 0; k < 2; ++k) {
     const RecordedImage& image = frame.images[k];
     const Intrinsics& lens = calibration.rig.intrinsics[k];
     if (image.width != lens.width || image.height != lens.height)
       throw InputError(fmt::format(
-          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; "
-          "use the calibration that belongs to these images",
+          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; use the "
+          "calibration that belongs to these images",
           k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
   }
 }
 
-/// False: one of the pair is not there.
+/// Returns false if one image of the pair is missing.
 bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
                std::array<std::vector<std::uint8_t>, 2>* pixels) {
   for (std::size_t k = 0; k < 2; ++k) {
@@ -255,7 +254,7 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
                             const std::function<void(std::size_t)>& progress) {
   ExportResult result;
   result.remarks = session.remarks();
-  const RecordedFrame& first = init_features(session);
+  const RecordedFrame& first = first_complete_frame(session);
   check_sizes(first, request.calibration);
   if (first.given.cameras > 2)
     result.remarks.push_back(fmt::format(

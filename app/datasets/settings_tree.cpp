@@ -17,7 +17,7 @@ bool begins_number(std::string_view word) {
   return parse_number(word.substr(0, word.find_first_of(" \t")), &ignored);
 }
 
-/// The numbers of a text between blanks, commas and semicolons, as a YAML list.
+/// Converts numbers separated by blanks, commas or semicolons to a YAML list.
 std::string as_list(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
@@ -27,7 +27,7 @@ std::string as_list(std::string text) {
   return list + "]";
 }
 
-/// A value as it stands in another syntax: a number, a list of some, or words.
+/// Converts a value of another syntax: a number, a list of numbers, or text.
 std::string as_yaml(std::string_view value) {
   value = trimmed(value);
   if (value.starts_with('[') || value.starts_with('{')) return std::string(value);
@@ -64,7 +64,8 @@ std::string from_xml(std::string_view* rest, std::string_view end, int depth) {
   return map.empty() ? as_yaml(text) : "{" + map + "}";
 }
 
-/// Sections become groups; `key = value`, or a key alone and its numbers below.
+/// Converts an ini: sections become groups; an entry is `key = value`, or a key with its numbers in
+/// the next lines.
 std::string from_ini(std::string_view text) {
   std::string yaml, indent, key, numbers;
   const auto add = [&](std::string_view name, const std::string& value) {
@@ -103,9 +104,9 @@ bool is_ini(std::string_view text) {
          !begins_number(line.substr(1)) && line.find_first_of(",{\"") == std::string_view::npos;
 }
 
-/// OpenCV's head is no YAML 1.2 and tabs are none: blanks have their places, so that lines keep
-/// their numbers.
-void put_right(std::string* text) {
+/// OpenCV's header and tabs are not valid YAML 1.2. They are replaced by blanks, so that line
+/// numbers stay the same.
+void replace_invalid_yaml(std::string* text) {
   if (text->starts_with("\xEF\xBB\xBF")) text->erase(0, 3);
   if (text->starts_with("%YAML"))
     std::fill(text->begin(),
@@ -117,7 +118,7 @@ void put_right(std::string* text) {
 }  // namespace
 
 std::vector<YamlFile> settings_trees(std::string text, const std::string& name) {
-  put_right(&text);
+  replace_invalid_yaml(&text);
   std::string_view rest = text;
   rest.remove_prefix(std::min(rest.find_first_not_of(" \r\n"), rest.size()));
   if (rest.starts_with('<'))
@@ -126,7 +127,9 @@ std::vector<YamlFile> settings_trees(std::string text, const std::string& name) 
     text = from_ini(rest);
   if (text.starts_with("---")) text.replace(0, 3, 3, ' ');
   std::vector<YamlFile> trees;
-  std::string document;  // after as many ends of lines as stand before it
+  // The document follows as many line feeds as precede it in the file, so that line numbers are
+  // right.
+  std::string document;
   constexpr std::size_t kMaxDocuments = 16;
   rest = text;
   for (std::size_t documents = 1;; ++documents) {

@@ -33,8 +33,9 @@ std::optional<std::filesystem::path> find_log(const std::filesystem::path& folde
   return found[0];
 }
 
-std::optional<Stamp> stamp_of(std::string_view seconds, std::string_view microseconds) noexcept {
-  constexpr std::int64_t kLatest = 9'000'000'000;  // s: what 64 bits of nanoseconds hold
+std::optional<Stamp> parse_stamp(std::string_view seconds, std::string_view microseconds) noexcept {
+  // Maximum number of seconds that 64 bits of nanoseconds hold.
+  constexpr std::int64_t kLatest = 9'000'000'000;
   const auto s = parse_integer(seconds), us = parse_integer(microseconds);
   if (!s || !us || *s < 0 || *s > kLatest || *us < 0 || *us > 999'999) return std::nullopt;
   return Stamp(*s * 1'000'000'000 + *us * 1'000);
@@ -42,7 +43,7 @@ std::optional<Stamp> stamp_of(std::string_view seconds, std::string_view microse
 
 constexpr std::string_view kImageLog = "_MultiCamera0.log";
 
-/// The calibration published with the data set, metres: X_right = R X_left + t. Its lens has no
+/// Calibration published with the data set, in m: X_right = R X_left + t. Its cameras have no
 /// distortion.
 RigCalibration published_calibration() {
   RigCalibration rig;
@@ -57,15 +58,15 @@ RigCalibration published_calibration() {
   right.fx = 1244.805048771648, right.fy = 1245.815687282771, right.cx = 506.635543659909,
   right.cy = 390.704813552426;
   Transform& T = rig.T_camera_left[1];
-  T.R << 0.999985020769994, 0.001356661749366, -0.005302612991045,  //
-      -0.001329315763428, 0.999985817981778, 0.005157204176297,     //
-      0.005309534370930, -0.005150078078314, 0.999972642396056;
+  T.R << 0.999985020769994, 0.001356661749366, -0.005302612991045, -0.001329315763428,
+      0.999985817981778, 0.005157204176297, 0.005309534370930, -0.005150078078314,
+      0.999972642396056;
   T.t = {-0.7506666877284111, -0.003857678457065100, 0.0030959446910902};
   rig.baseline = T.t.norm();
   return rig;
 }
 
-/// A log names images with or without the folder in front; they lie in one folder.
+/// A log names images with or without their directory; all are in one.
 std::string image_name(const std::string& images, std::string_view path) {
   return images + "/" + std::string(path.substr(path.find_last_of('/') + 1));
 }
@@ -78,8 +79,8 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
     refuse(
         log, line_number,
         "is not `seconds microseconds width height format` of both cameras and their two images");
-  const auto stamp = stamp_of(f[0], f[1]);
-  if (!stamp || !stamp_of(f[5], f[6]))
+  const auto stamp = parse_stamp(f[0], f[1]);
+  if (!stamp || !parse_stamp(f[5], f[6]))
     refuse(log, line_number, "does not begin with seconds and microseconds below a million");
   return {*stamp, {image_name(images, f[10]), image_name(images, f[11])}};
 }
@@ -88,9 +89,9 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
 
 /// `PREFIX_Ins0.log` has twelve fields a line: seconds, microseconds (not padded), latitude and
 /// longitude in degrees, height above the ellipsoid and above the sea, velocity along three axes,
-/// roll, pitch and yaw in radians. The format does not define the axes, so they are decided from
-/// the drive: an axis that fits how the position moves is that axis. Along which axes a velocity
-/// is: rows make east, north, up of it.
+/// roll, pitch and yaw in radians. The format does not define the axes, so those are used that
+/// agree with the motion of the position. The rows of `to_enu` convert a velocity to east, north,
+/// up.
 struct Axes {
   const char* phrase;
   std::array<int, 9> to_enu;
@@ -98,10 +99,11 @@ struct Axes {
 constexpr std::array kAxes{Axes{"north, west, up", {0, -1, 0, 1, 0, 0, 0, 0, 1}},
                            Axes{"north, east, down", {0, 1, 0, 1, 0, 0, 0, 0, -1}},
                            Axes{"east, north, up", {1, 0, 0, 0, 1, 0, 0, 0, 1}}};
-/// Where a yaw of 0 points, and which way it grows.
+/// Direction and sign of the yaw.
 struct Yaw {
   const char* phrase;
-  double zero;  // rad from east
+  // Direction of a yaw of 0, in rad from east.
+  double zero;
   int sign;
   [[nodiscard]] double in_enu(double angle) const { return zero + sign * angle; }
 };
@@ -114,7 +116,8 @@ struct Conventions {
   Mat3 enu_of_velocity{};
   const char* axes = kAxes[0].phrase;
   Yaw yaw = kYaws[0];
-  bool pitch_first = false;  // fields 10 and 11 are pitch and roll
+  // True if fields 10 and 11 are pitch and roll.
+  bool pitch_first = false;
   bool nose_up_positive = false;
 };
 
@@ -123,30 +126,37 @@ Mat3 to_matrix(const Axes& axes) {
       .cast<double>();
 }
 
-constexpr double kFast = 5.0;            // m/s: above it the course is where the vehicle points
-constexpr double kApart = 1.0;           // s between the positions whose difference is the motion
-constexpr std::size_t kEnough = 100;     // samples: below, nothing is decided
-constexpr double kMinCorrelation = 0.3;  // correlation from which the slope decides about pitch
-constexpr std::size_t kMaxBroken = 100;  // one line in so many
+// In m/s. Above this speed the course is the heading.
+constexpr double kFast = 5.0;
+// Time in s between the positions whose difference gives the motion.
+constexpr double kApart = 1.0;
+// With fewer samples the axes are not determined.
+constexpr std::size_t kEnough = 100;
+// Minimum correlation at which the slope determines the pitch field.
+constexpr double kMinCorrelation = 0.3;
+// At most one line in this many may be damaged.
+constexpr std::size_t kMaxBroken = 100;
 
-/// One line as it stands.
+/// One line of the log.
 struct Line {
   Stamp stamp{};
   Geodetic place{};
-  Vec3 velocity, angles;  // fields 6 to 8, 9 to 11
+  // Fields 6 to 8 and 9 to 11.
+  Vec3 velocity, angles;
 };
 
-/// A sample with how its position moves, in the axes at the first place.
+/// A sample and the motion of its position, in ENU axes at the first position.
 struct Moving {
   const Line* line = nullptr;
-  Vec3 motion;  // m/s, east, north, up
+  // In m/s: east, north, up.
+  Vec3 motion;
 };
 
 bool parse_line(std::string_view text, Line* line) noexcept {
   constexpr std::size_t kFields = 12;
   std::array<std::string_view, kFields> f;
   if (split(text, ' ', f) != kFields) return false;
-  const auto stamp = stamp_of(f[0], f[1]);
+  const auto stamp = parse_stamp(f[0], f[1]);
   std::array<double, kFields> v{};
   for (std::size_t i = 2; i < kFields; ++i)
     if (!parse_number(f[i], &v[i])) return false;
@@ -173,8 +183,8 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   }
   if (out.empty() || broken > 1 + out.size() / kMaxBroken)
     refuse(log, first_broken,
-           fmt::format("and {} more lines are not twelve numbers; this is not the log of the INS",
-                       broken > 0 ? broken - 1 : 0));
+           "and {} more lines are not twelve numbers; this is not the log of the INS",
+           broken > 0 ? broken - 1 : 0);
   if (broken > 0)
     remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers were left out",
                                    log.filename().string(), broken));
@@ -192,8 +202,7 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   return out;
 }
 
-/// Latitude is the field that stays within 90; south and east of Brisbane both columns are places
-/// of their own only one way round.
+/// Swaps the columns if latitude exceeds 90 in all lines.
 void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
                   std::vector<std::string>* remarks) {
   const bool exchanged = std::all_of(lines->begin(), lines->end(), [](const Line& l) {
@@ -202,9 +211,8 @@ void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
   for (Line& line : *lines) {
     if (exchanged) std::swap(line.place.latitude_deg, line.place.longitude_deg);
     if (!line.place.plausible())
-      refuse(log, 0,
-             fmt::format("has a place that is none: {} {} {}", line.place.latitude_deg,
-                         line.place.longitude_deg, line.place.height_m));
+      refuse(log, 0, "has a place that is none: {} {} {}", line.place.latitude_deg,
+             line.place.longitude_deg, line.place.height_m);
   }
   if (exchanged) remarks->push_back("longitude stands before latitude in the log of the INS");
 }
@@ -228,8 +236,9 @@ std::vector<Moving> motions(const std::vector<Line>& lines) {
   return out;
 }
 
-/// The axes in which the velocities are nearest to how the position moves, and the yaw that points
-/// where the vehicle goes; it goes backwards now and then, so the mean of the cosines counts.
+/// Selects the velocity axes that agree best with the motion of the position, and the yaw that
+/// agrees best with the course. The mean cosine is used, because the vehicle may also drive
+/// backwards.
 void decide_axes(const std::vector<Moving>& moving, const std::vector<Moving>& fast,
                  Conventions* c) {
   double least = 1e300, most = -1e300;
@@ -260,7 +269,8 @@ double correlation(const std::vector<Moving>& fast, const std::vector<double>& s
   return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : 0;
 }
 
-/// The angle that follows the slope of the path is pitch. False: neither does.
+/// Selects as pitch the angle that correlates with the slope of the path. Returns false if neither
+/// does.
 bool decide_pitch(const std::vector<Moving>& fast, Conventions* c) {
   std::vector<double> slopes;
   for (const Moving& m : fast) {
@@ -332,7 +342,8 @@ StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
   const std::string text = read_text(log);
   Lines lines(text);
   for (std::string_view line; lines.next(&line);)
-    if (line.find(".bmp") != std::string_view::npos)  // not the header
+    // The header names no image.
+    if (line.find(".bmp") != std::string_view::npos)
       sequence.pairs.push_back(read_pair(log, lines.number(), line, images));
   if (sequence.pairs.empty()) refuse(log, 0, "names no images");
   if (given) return sequence;
@@ -357,7 +368,8 @@ RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
   for (const Line& line : lines) {
     InsRecord reading;
     reading.sample = to_sample(line, conventions, ins.readings.size());
-    reading.quality.filter_valid = true;  // the log tells nothing else
+    // The log has no other quality data.
+    reading.quality.filter_valid = true;
     ins.readings.push_back(reading);
   }
   return ins;

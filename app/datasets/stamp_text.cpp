@@ -1,6 +1,7 @@
 #include "app/datasets/stamp_text.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <vector>
@@ -12,9 +13,10 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;  // ns
+// In ns.
+constexpr std::int64_t kSecond = 1'000'000'000;
 
-/// Whole decimal number of just so many digits, at most `most`. −1: it is none.
+/// Decimal integer of at most `most` that consists of digits only; −1 otherwise.
 int digits(std::string_view text, int most) noexcept {
   int value = 0;
   for (const char c : text) {
@@ -24,7 +26,8 @@ int digits(std::string_view text, int most) noexcept {
   return value <= most ? value : -1;
 }
 
-/// Takes `Z`, `+02:00`, `+0200` or `+02` off the end of a time of day. → s east of UTC
+/// Removes `Z`, `+02:00`, `+0200` or `+02` from the end of a time of day. Returns the offset in s
+/// east of UTC.
 std::optional<int> parse_offset(std::string_view* text) noexcept {
   if (text->ends_with('Z') || text->ends_with('z')) {
     text->remove_suffix(1);
@@ -45,9 +48,10 @@ std::optional<int> parse_offset(std::string_view* text) noexcept {
   return west ? -seconds : seconds;
 }
 
-/// Seconds before the point and whole nanoseconds behind it.
+/// Parses seconds before the point and whole nanoseconds after it.
 std::optional<Stamp> read_parts(std::string_view text) noexcept {
-  constexpr std::int64_t kMaxSeconds = 9'000'000'000;  // what 64 bits of nanoseconds hold
+  // Maximum that 64 bits of nanoseconds hold.
+  constexpr std::int64_t kMaxSeconds = 9'000'000'000;
   const std::size_t point = text.find('.');
   const auto s = parse_integer(text.substr(0, point));
   const auto ns = point == std::string_view::npos ? std::optional<std::int64_t>(0)
@@ -66,13 +70,14 @@ bool ascend(std::span<const std::string_view> times, const TimeForm& form) {
   return true;
 }
 
-/// Unit of times since 1970, which share their leading digits; nullopt if they do not. A clock that
-/// began when the machine did may have as many digits in a smaller unit: then its steps are those
-/// of a drive in `relative` only.
+/// Unit of times since 1970, which share their leading digits; empty if they do not. Times since
+/// boot may have as many digits in a smaller unit. Then only `relative` gives plausible steps.
 std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> times,
                                           TimeUnit relative) {
-  constexpr double kSpread = 0.05, kYear1973 = 1e8, kYear2286 = 1e10;  // s
-  constexpr double kShortest = 1e-4, kLongest = 10;                    // s, from time to time
+  // Times are in s.
+  constexpr double kSpread = 0.05, kYear1973 = 1e8, kYear2286 = 1e10;
+  // Shortest and longest step of a sequence in s.
+  constexpr double kShortest = 1e-4, kLongest = 10;
   std::vector<double> values, steps;
   for (const std::string_view text : times) {
     double v = 0;
@@ -100,7 +105,7 @@ std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> time
   return std::nullopt;
 }
 
-/// Decimals of different numbers, none of more digits than nanoseconds have.
+/// True if the numbers of decimals differ and the maximum is that of nanoseconds.
 bool may_be_parts(std::span<const std::string_view> times) {
   std::size_t least = 9, most = 0;
   for (const std::string_view text : times) {
@@ -115,17 +120,8 @@ bool may_be_parts(std::span<const std::string_view> times) {
 }  // namespace
 
 const char* to_string(TimeUnit unit) noexcept {
-  switch (unit) {
-    case TimeUnit::nanoseconds:
-      return "nanoseconds";
-    case TimeUnit::microseconds:
-      return "microseconds";
-    case TimeUnit::milliseconds:
-      return "milliseconds";
-    case TimeUnit::seconds:
-      break;
-  }
-  return "seconds";
+  constexpr std::array kNames{"nanoseconds", "microseconds", "milliseconds", "seconds"};
+  return kNames[static_cast<std::size_t>(unit) / 3];
 }
 
 std::optional<TimeUnit> parse_time_unit(std::string_view word) noexcept {
@@ -138,10 +134,11 @@ std::optional<TimeUnit> parse_time_unit(std::string_view word) noexcept {
 
 std::optional<Stamp> parse_iso_time(std::string_view text) noexcept {
   constexpr std::string_view kForm = "0000-00-00 00:00:00";
-  constexpr std::size_t kBetween = 10;  // date and time
+  // Position between date and time.
+  constexpr std::size_t kBetween = 10;
   if (text.size() < kForm.size() || text.size() > 45) return std::nullopt;
   for (std::size_t i = 0; i < kForm.size(); ++i)
-    // Names of files have no colons.
+    // File names cannot contain colons.
     if (kForm[i] != '0' && text[i] != kForm[i] && !(kForm[i] == ':' && text[i] == '-') &&
         !(i == kBetween && (text[i] == 'T' || text[i] == 't' || text[i] == '_')))
       return std::nullopt;

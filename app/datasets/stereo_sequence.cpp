@@ -18,8 +18,8 @@ namespace {
 
 std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
 
-/// The recording of a session as a sequence of images, with the calibration that the session began
-/// with and its INS samples.
+/// Recording of a session as a sequence of images, with the session's initial calibration and its
+/// INS samples.
 StereoSequence open_session(const std::filesystem::path& folder, const SequenceOptions& o) {
   StereoSequence sequence = detail::open_bag(detail::BagFormat::mcap, folder, true, o.topics);
   const RecordedSession session = RecordedSession::open(folder);
@@ -60,7 +60,8 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
   refuse(folder, 0, "has no reader for its format");
 }
 
-/// One stamp that leaps ahead costs its frame, not all those after it.
+/// Marks the frames whose stamps do not fit, so that one stamp that leaps ahead costs only its own
+/// frame.
 void mark_out_of_order(std::vector<StereoPair>* pairs) {
   std::vector<Stamp> stamps;
   stamps.reserve(pairs->size());
@@ -71,7 +72,7 @@ void mark_out_of_order(std::vector<StereoPair>* pairs) {
   for (const std::size_t kept : detail::ascending(stamps)) (*pairs)[kept].in_order = true;
 }
 
-/// Checks common to all formats. `source`: the file that the calibration is from.
+/// Checks common to all formats. `source` is the file of the calibration.
 void check(const std::filesystem::path& source, const CalibrationUse& use, StereoSequence* opened) {
   StereoSequence& sequence = *opened;
   check_times(sequence);
@@ -91,7 +92,7 @@ void check(const std::filesystem::path& source, const CalibrationUse& use, Stere
                "; both have to be of one size");
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
   find_deep_bits(&sequence);
-  // Names and words of files stand in them.
+  // The messages contain names and text from files.
   for (auto* messages : {&sequence.remarks, &sequence.assumptions})
     for (std::string& message : *messages) message = harmless(message);
 }
@@ -116,7 +117,7 @@ std::optional<SequenceFormat> bag_format(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
   if (name.ends_with(".mcap")) return SequenceFormat::mcap;
   if (name.ends_with(".db3")) return SequenceFormat::db3;
-  // As rosbag calls one that it is recording, or that it was when the power went.
+  // rosbag uses the second ending while recording, and after a power failure.
   if (name.ends_with(".bag") || name.ends_with(".bag.active")) return SequenceFormat::rosbag;
   return std::nullopt;
 }
@@ -140,7 +141,7 @@ std::string unpack_advice(const std::filesystem::path& file) {
 
 namespace {
 
-/// A directory with bags of both kinds is read as ROS 2, in whatever order the disk lists them.
+/// A directory with bags of both kinds is read as ROS 2, regardless of the order of its entries.
 std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& folder) {
   std::optional<SequenceFormat> found;
   std::error_code ignored;
@@ -173,7 +174,8 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   if (const auto bag = bag_format_within(folder)) return bag;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   if (detail::holds_stereo_images(folder)) return SequenceFormat::folder;
-  if (has("mav0")) return SequenceFormat::euroc;  // which says what is missing
+  // The reader then reports what is missing.
+  if (has("mav0")) return SequenceFormat::euroc;
   return std::nullopt;
 }
 
@@ -181,7 +183,8 @@ RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path
                               const std::array<int, 2>& cameras, bool mount_wanted) {
   if (format == SequenceFormat::kitti_raw) return detail::read_oxts(folder, cameras, mount_wanted);
   if (format == SequenceFormat::st_lucia) return detail::read_st_lucia_ins(folder);
-  return {};  // bags have it in StereoSequence::ins
+  // The INS of a bag is in StereoSequence::ins.
+  return {};
 }
 
 ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

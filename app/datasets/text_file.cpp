@@ -17,8 +17,8 @@ namespace {
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::string_view kBlanks = " \t\r\v\f";
 
-/// UTF-16 as some editors write it: two bytes a character, least first or last. Others than
-/// those of ASCII become question marks; no number, key or name that is read here has them.
+/// Converts UTF-16, of which some editors write either byte order. Characters beyond ASCII become
+/// question marks, because no number, key or name that is read here contains them.
 std::string narrowed(const std::string& wide, bool min_first) {
   std::string text;
   text.reserve(wide.size() / 2);
@@ -44,7 +44,8 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   const auto status = std::filesystem::status(file, ignored);
   if (std::filesystem::is_directory(status))
     refuse(file, 0, "is a folder where a file is expected");
-  if (std::filesystem::is_other(status))  // reading a pipe would wait for ever
+  // Reading a pipe would block indefinitely.
+  if (std::filesystem::is_other(status))
     refuse(file, 0, "is a pipe or a device where a file is expected");
   std::ifstream in(file, std::ios::binary);
   if (!in) {
@@ -55,7 +56,7 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   }
   std::string text;
   std::array<char, 1U << 16U> block;
-  // At once: what doubles as it grows takes twice of what there is.
+  // Reserving avoids the doubling of a growing string.
   if (const auto size = std::filesystem::file_size(file, ignored); !ignored && size <= limit)
     text.reserve(size);
   while (in.read(block.data(), block.size()) || in.gcount() > 0) {
@@ -96,8 +97,8 @@ std::size_t split(std::string_view line, char separator,
     ++count;
   };
   if (separator == ' ') {
-    // One set of blanks for what is passed over and for what ends a field: else a field could be
-    // empty and nothing be left behind.
+    // The same set of blanks separates and ends fields; otherwise a field could be empty and the
+    // loop endless.
     for (std::size_t at = line.find_first_not_of(kBlanks); at != std::string_view::npos;
          at = line.find_first_not_of(kBlanks)) {
       line.remove_prefix(at);

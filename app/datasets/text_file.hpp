@@ -4,6 +4,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
 
 /// External text: lines and numbers, with errors as file:line.
 namespace vergence::app {
@@ -11,6 +14,12 @@ namespace vergence::app {
 /// Throws InputError "FILE:LINE: WHAT"; without the line if `line` is 0.
 [[noreturn]] void refuse(const std::filesystem::path& file, std::size_t line,
                          std::string_view what);
+/// Same with a formatted message.
+template <class First, class... Rest>
+[[noreturn]] void refuse(const std::filesystem::path& file, std::size_t line,
+                         fmt::format_string<First, Rest...> what, First&& first, Rest&&... rest) {
+  refuse(file, line, fmt::format(what, std::forward<First>(first), std::forward<Rest>(rest)...));
+}
 
 /// Reads all bytes of a file; UTF-16, detected by its byte order mark, is converted to ASCII.
 /// Throws InputError if it is missing, a directory, unreadable or longer than `limit` bytes.

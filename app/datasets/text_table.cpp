@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/stamp_text.hpp"
 
@@ -17,25 +18,23 @@ std::size_t comment_mark(std::string_view line) noexcept {
   return line.starts_with("//") ? 2 : 0;
 }
 
-/// A number, or what programs print where they have none.
-bool begins_row(std::string_view field) noexcept {
+/// True for a number, or for a placeholder such as NaN.
+bool begins_row(std::string_view field) {
   double ignored = 0;
-  constexpr std::string_view kNan = "nan";
   const std::string_view magnitude = field.substr(field.starts_with('-') ? 1 : 0);
-  bool nan = magnitude.size() == kNan.size();
-  for (std::size_t i = 0; nan && i < kNan.size(); ++i) nan = (magnitude[i] | 0x20) == kNan[i];
-  // A decimal comma counts where it stands: put_decimal_points() puts it right.
+  // Decimal commas are accepted here, because put_decimal_points() replaces them later.
   const std::string_view before = field.substr(0, field.find(','));
-  return nan || parse_number(before, &ignored) || parse_decimal(field, 0) ||
-         parse_iso_time(field) ||
-         (field.size() == 10 && field[4] == '-' && field[7] == '-') ||  // a date, its time follows
-         is_image_name(field);
+  return detail::lower(magnitude) == "nan" || parse_number(before, &ignored) ||
+         parse_decimal(field, 0) || parse_iso_time(field) ||
+         // This is a date that its time follows.
+         (field.size() == 10 && field[4] == '-' && field[7] == '-') || is_image_name(field);
 }
 
 }  // namespace
 
 TextTable::TextTable(std::string_view text) : rest_(text) {
-  constexpr std::size_t kMaxHeadings = 50;  // lines
+  // In lines.
+  constexpr std::size_t kMaxHeadings = 50;
   if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
   std::string_view headings;
   for (std::size_t others = 0;;) {
@@ -57,7 +56,8 @@ TextTable::TextTable(std::string_view text) : rest_(text) {
       break;
     }
     headings = line;
-    if (++others > kMaxHeadings) rest_ = {};  // this is no table
+    // The text is no table.
+    if (++others > kMaxHeadings) rest_ = {};
   }
   const char of_rows = separator_;
   if (headings.find(',') != std::string_view::npos) separator_ = ',';
@@ -89,24 +89,14 @@ bool TextTable::next() {
 }
 
 void TextTable::split_into(std::string_view line, std::vector<std::string_view>* fields) const {
-  constexpr std::string_view kBlanks = " \t\r\v\f";
-  fields->clear();
-  while (!line.empty()) {
-    std::size_t end = 0;
-    if (separator_ == ' ') {
-      line.remove_prefix(std::min(line.find_first_not_of(kBlanks), line.size()));
-      if (line.empty()) return;
-      end = line.find_first_of(kBlanks);
-    } else {
-      end = line.find(separator_);
-    }
-    std::string_view field = trimmed(line.substr(0, end));
+  // A separator at the end adds no field.
+  if (line.ends_with(separator_)) line.remove_suffix(1);
+  fields->resize(split(line, separator_, {}));
+  (void)split(line, separator_, *fields);
+  for (std::string_view& field : *fields)
     if (field.size() > 1 && field.front() == '"' && field.back() == '"')
       field = field.substr(1, field.size() - 2);
-    fields->push_back(field);
-    line.remove_prefix(end == std::string_view::npos ? line.size() : end + 1);
-  }
-  if (separator_ != ' ' && !fields->empty() && fields->back().empty()) fields->pop_back();
+  if (separator_ != ' ' && fields->back().empty()) fields->pop_back();
 }
 
 void put_decimal_points(std::string* text) {

@@ -16,12 +16,11 @@ bool is_number(std::string_view field) {
   return parse_number(field, &ignored) || parse_decimal(field, 0);
 }
 
-/// The name of an image in its folder: lists have it with or without the folder.
+/// Name of an image in its directory; lists have it with or without the directory.
 std::string name_in(const std::filesystem::path& file, std::size_t line, std::string_view field) {
   const std::string_view name = field.substr(field.rfind('/') + 1);
   if (name.empty() || field.find("..") != std::string_view::npos || name == ".")
-    refuse(file, line,
-           fmt::format("`{}` is no name of an image in its folder", field.substr(0, 40)));
+    refuse(file, line, "`{}` is no name of an image in its folder", field.substr(0, 40));
   return std::string(name);
 }
 
@@ -106,16 +105,16 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Fields& fields = rows[i];
     const auto stamp = read_time(fields, columns, form);
-    if (!stamp) refuse(file, lines[i], fmt::format("`{}` is not a time", times[i].substr(0, 40)));
-    // Names before the time or behind it; each may have a time of its own (`time left time right`).
+    if (!stamp) refuse(file, lines[i], "`{}` is not a time", times[i].substr(0, 40));
+    // Names may precede or follow the time; each may have its own time (`time left time right`).
     Fields names(fields.begin() + (columns.counted ? 1 : 0),
                  fields.begin() + static_cast<std::ptrdiff_t>(columns.time));
     for (std::size_t k = columns.last() + 1; k < fields.size(); ++k) names.push_back(fields[k]);
     if (names.size() == 3 && is_number(names[1])) names.erase(names.begin() + 1);
     if (names.size() > 2)
       refuse(file, lines[i],
-             fmt::format("has {} columns; a time, and one name of an image or two, are expected",
-                         fields.size()));
+             "has {} columns; a time, and one name of an image or two, are expected",
+             fields.size());
     TimesLine entry{*stamp, {}};
     for (std::size_t k = 0; k < 2 && !names.empty(); ++k)
       entry.name[k] = name_in(file, lines[i], names[std::min(k, names.size() - 1)]);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_table.hpp"
 #include "app/datasets/times_file.hpp"
@@ -18,35 +19,41 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Two decimals of a quaternion already keep its length within this; columns that are no quaternion
-// rarely do.
+// Two decimals of a quaternion keep its length within this tolerance, which other columns rarely
+// do.
 constexpr double kQuaternionLength = 0.02;
 // Tolerance of R Rᵀ − I: three decimals of a matrix stay within it.
 constexpr double kNearRotation = 5e-3;
-constexpr std::int64_t kRowStep = 100'000'000;  // ns: from row to row where a file has no times
+// In ns: step from row to row of a file without times.
+constexpr std::int64_t kRowStep = 100'000'000;
 constexpr std::int64_t kMaxPoses = 100'000'000;
-constexpr double kRounded = 1e-4;  // beyond, the numbers have lost digits, and it is said
+// A larger deviation means that digits were lost, and is reported.
+constexpr double kRounded = 1e-4;
 
 bool present(const fs::path& p) {
   std::error_code ignored;
   return fs::exists(p, ignored);
 }
 
-/// Meaning of a row's numbers.
-enum class Layout : std::uint8_t { pose, matrix3x4, matrix4x4 };
+/// Meaning of a row's numbers; the value is their count.
+enum class Layout : std::uint8_t { pose = 7, matrix3x4 = 12, matrix4x4 = 16 };
 
-/// Which column is what.
+/// Meaning of the columns.
 struct Columns {
   Layout layout = Layout::pose;
   std::optional<TimeColumns> time{};
-  bool counted = false;                    // what stands for a time is the number of the pose
-  std::array<std::size_t, 7> pose{};       // x y z, then the quaternion as it is written
-  std::size_t first = 0;                   // of a matrix
-  std::optional<QuaternionOrder> order{};  // from the headings
+  // True if the number of the pose stands in place of a time.
+  bool counted = false;
+  // Columns of x, y, z and of the quaternion as written.
+  std::array<std::size_t, 7> pose{};
+  // First column of a matrix.
+  std::size_t first = 0;
+  // Order by the headings.
+  std::optional<QuaternionOrder> order{};
+  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(layout); }
   [[nodiscard]] std::size_t needed() const {
-    std::size_t last = layout == Layout::pose        ? *std::max_element(pose.begin(), pose.end())
-                       : layout == Layout::matrix3x4 ? first + 11
-                                                     : first + 15;
+    std::size_t last =
+        layout == Layout::pose ? *std::max_element(pose.begin(), pose.end()) : first + count() - 1;
     if (time) last = std::max(last, time->last());
     return last + 1;
   }
@@ -55,10 +62,8 @@ struct Columns {
 /// Letters and digits of a heading in lower case, without its unit: `p_RS_R_x [m]` → `prsrx`.
 std::string plain(std::string_view heading) {
   std::string word;
-  for (const char c : heading.substr(0, heading.find_first_of("[("))) {
-    const char small = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c;
-    if ((small >= 'a' && small <= 'z') || (small >= '0' && small <= '9')) word.push_back(small);
-  }
+  for (const char c : detail::lower(heading.substr(0, heading.find_first_of("[("))))
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) word.push_back(c);
   return word;
 }
 
@@ -67,24 +72,25 @@ bool contains(const std::string& word, std::initializer_list<const char*> parts)
                      [&](const char* part) { return word.find(part) != std::string::npos; });
 }
 
-/// The column whose heading is the axis of a quaternion; its words are those of all programs that
-/// head their columns.
+/// True if the heading is an axis of a quaternion, in the words of common programs.
 bool is_quaternion(const std::string& word) {
   return word.size() == 2 ? word[0] == 'q'
                           : word.starts_with("q") || contains(word, {"quat", "orient", "rot"});
 }
 bool is_position(const std::string& word) {
-  if (word.size() == 1) return true;  // x, y, z
+  // These are x, y and z.
+  if (word.size() == 1) return true;
   if (contains(word, {"vel", "acc", "gyr", "bias", "cov", "std", "sigma", "twist", "ang", "lin"}))
     return false;
   return word[0] == 'p' || word[0] == 't' || contains(word, {"pos", "trans"});
 }
 
-/// By the headings, if these name all of a pose.
+/// Columns by the headings, if these name a complete pose.
 std::optional<Columns> columns_of_names(const std::vector<std::string_view>& names) {
   Columns c;
   std::array<std::optional<std::size_t>, 3> position;
-  std::array<std::optional<std::size_t>, 4> quaternion;  // x y z w
+  // Columns of x, y, z and w.
+  std::array<std::optional<std::size_t>, 4> quaternion;
   std::optional<std::size_t> exact, seconds, nanoseconds, stamp;
   const auto set_once = [](std::optional<std::size_t>* place, std::size_t i) {
     if (!*place) *place = i;
@@ -115,11 +121,13 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
   if (seconds == stamp) c.time->nanoseconds = nanoseconds;
   for (std::size_t k = 0; k < 3; ++k) c.pose[k] = *position[k];
   for (std::size_t k = 0; k < 4; ++k) c.pose[3 + k] = *quaternion[k];
-  c.order = QuaternionOrder::xyzw;  // as they stand in `pose`
+  // This is their order in `pose`.
+  c.order = QuaternionOrder::xyzw;
   return c;
 }
 
-/// The numbers of a row from `first` on. False: they are not all there and finite.
+/// Parses the numbers of a row from `first` on. Returns false unless all of them exist and are
+/// finite.
 bool finite_numbers(const std::vector<std::string_view>& fields, std::size_t first,
                     std::span<double> out) {
   if (first + out.size() > fields.size()) return false;
@@ -142,9 +150,9 @@ Mat3 to_rotation(const std::array<double, N>& v) {
 bool is_matrix(const std::vector<std::string_view>& fields, std::size_t first, Layout layout) {
   std::array<double, 16> v{};
   v[15] = 1;
-  constexpr double kRoughly = 0.1;  // the matrix is meant; rows that are off are refused one by one
-  return finite_numbers(fields, first,
-                        std::span(v).first(layout == Layout::matrix3x4 ? 12U : 16U)) &&
+  // The tolerance only detects a matrix; inaccurate rows are refused one by one.
+  constexpr double kRoughly = 0.1;
+  return finite_numbers(fields, first, std::span(v).first(static_cast<std::size_t>(layout))) &&
          off_rotation(to_rotation(v)) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
          v[15] == 1;
 }
@@ -156,18 +164,18 @@ bool is_unit(const std::vector<std::string_view>& fields, std::size_t first) {
              kQuaternionLength;
 }
 
-/// By the numbers of a row that has them all. Nothing: it has not. `time`: by all rows.
+/// Columns by the numbers of a complete row; empty for other rows. `time` was inferred from all
+/// rows.
 std::optional<Columns> columns_of_row(const std::vector<std::string_view>& fields,
                                       const TimeColumns& time) {
   Columns c;
   const std::size_t n = fields.size();
-  for (const auto& [layout, numbers] : {std::pair{Layout::matrix3x4, std::size_t{12}},
-                                        std::pair{Layout::matrix4x4, std::size_t{16}}}) {
-    const std::size_t first = n - std::min(n, numbers);
+  for (const Layout layout : {Layout::matrix3x4, Layout::matrix4x4}) {
+    const std::size_t first = n - std::min(n, static_cast<std::size_t>(layout));
     if (first > time.last() + 1 || !is_matrix(fields, first, layout)) continue;
     c.layout = layout;
     c.first = first;
-    // A small whole number before a matrix is that of its frame.
+    // A small integer before a matrix is the number of its frame.
     const auto number = parse_integer(fields[0]);
     c.counted = first == 1 && number && *number >= 0 && *number < kMaxPoses;
     if (c.counted)
@@ -179,7 +187,7 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
   const auto pose_from = [&c](std::size_t first) {
     for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = first + k;
   };
-  // A count of eight columns is a stamp of its own.
+  // In a row of eight columns a counter is the stamp.
   for (const TimeColumns& times : {time, TimeColumns{}, TimeColumns{.time = 1}})
     if (n >= times.last() + 8 && is_unit(fields, times.last() + 4)) {
       c.time = times;
@@ -191,7 +199,7 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
   return c;
 }
 
-/// The first rows of a file, from which it is told how all are written.
+/// First rows of a file, from which the format is inferred.
 struct Sample {
   std::vector<std::vector<std::string_view>> rows{};
   TimeColumns time{};
@@ -215,7 +223,7 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
   if (auto named = columns_of_names(sample.names)) return *named;
   for (const auto& row : sample.rows)
     if (auto found = columns_of_row(row, sample.time)) return *found;
-  // None is as it should be: the rows say for themselves what is wrong.
+  // If no row matches, reading the rows gives more specific messages.
   const std::size_t n = sample.rows.front().size();
   Columns c;
   if (n == 12 || n == 13) {
@@ -226,11 +234,10 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
     c.time = TimeColumns{};
     for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = 1 + k;
   } else {
-    refuse(
-        file, first_line,
-        fmt::format("has {} columns where a pose has 8, stamp tx ty tz qx qy qz qw, or the 12 of "
-                    "a 3x4 matrix row by row",
-                    n));
+    refuse(file, first_line,
+           "has {} columns where a pose has 8, stamp tx ty tz qx qy qz qw, or the 12 of a 3x4 "
+           "matrix row by row",
+           n);
   }
   return c;
 }
@@ -251,7 +258,7 @@ void sort_by_stamp(Trajectory* poses) {
   poses->erase(std::unique(poses->begin(), poses->end(), same), poses->end());
 }
 
-/// One file, read twice: how it is written, and its rows. Memory: its text and its poses.
+/// Reads one file in two passes: its format, then its rows. Memory holds its text and its poses.
 class Reader {
  public:
   Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
@@ -304,7 +311,7 @@ class Reader {
     out_.order_reported = columns_.order || options_.quaternion || columns_.layout != Layout::pose;
     out_.order = columns_.order.value_or(QuaternionOrder::xyzw);
     if (!columns_.order && columns_.layout == Layout::pose) {
-      // EuRoC and those who write as it does (VINS): w first, commas, whole nanoseconds.
+      // EuRoC and VINS write w first, with commas and whole nanoseconds.
       const bool csv = sample_.separator != ' ' && form_.unit == TimeUnit::nanoseconds;
       if (csv) out_.order = QuaternionOrder::wxyz;
       if (csv && !euroc_ && !options_.quaternion)
@@ -313,18 +320,19 @@ class Reader {
             "commas");
     }
     if (!options_.quaternion) return;
-    // The user speaks of the columns as they stand in the file.
+    // The user's order refers to the columns as they are in the file.
     out_.order = *options_.quaternion;
     std::sort(columns_.pose.begin() + 3, columns_.pose.end());
   }
 
   [[nodiscard]] std::size_t max_rows() const {
-    constexpr std::size_t kShortest = 15;  // bytes of eight numbers
+    // Minimum length of eight numbers in bytes.
+    constexpr std::size_t kShortest = 15;
     const auto ends = static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n'));
     return std::min(ends, text_.size() / kShortest) + 1;
   }
 
-  /// False: the row is the last, and its writer stopped in it.
+  /// Returns false if the row is the last one and incomplete.
   bool read_row(const TextTable& table) {
     const auto& fields = table.fields();
     if (fields.size() < columns_.needed()) {
@@ -332,9 +340,8 @@ class Reader {
         out_.remarks.emplace_back("the last row is unfinished and left out");
         return false;
       }
-      refuse(file_, table.line(),
-             fmt::format("has {} columns where the other rows have {}", fields.size(),
-                         columns_.needed()));
+      refuse(file_, table.line(), "has {} columns where the other rows have {}", fields.size(),
+             columns_.needed());
     }
     StampedPose pose;
     if (!read_stamp(fields, table.line(), &pose.stamp) ||
@@ -346,11 +353,11 @@ class Reader {
     return true;
   }
 
-  /// False: the row has no number there. InputError: it has something else.
+  /// Returns false if the field has no value. Throws InputError for other text.
   bool read_field(std::string_view field, std::size_t line, double* value) const {
     if (parse_number(field, value)) return true;
     if (is_no_value(field)) return false;
-    refuse(file_, line, fmt::format("`{}` is not a finite number", field.substr(0, 40)));
+    refuse(file_, line, "`{}` is not a finite number", field.substr(0, 40));
   }
 
   bool read_stamp(const std::vector<std::string_view>& fields, std::size_t line, Stamp* stamp) {
@@ -363,26 +370,22 @@ class Reader {
     if (columns_.counted) {
       const auto number = parse_integer(field);
       if (!number || *number < 0 || *number > kMaxPoses)
-        refuse(file_, line, fmt::format("`{}` is not the number of a pose", field.substr(0, 40)));
+        refuse(file_, line, "`{}` is not the number of a pose", field.substr(0, 40));
       max_number_ = std::max(max_number_, static_cast<std::size_t>(*number));
       *stamp = Stamp(*number * kRowStep);
       return true;
     }
     const auto read = read_time(fields, *columns_.time, form_);
     if (!read)
-      refuse(file_, line,
-             fmt::format("`{}` is not a stamp in {}", field.substr(0, 40), to_string(form_.unit)));
+      refuse(file_, line, "`{}` is not a stamp in {}", field.substr(0, 40), to_string(form_.unit));
     *stamp = *read;
     return true;
   }
 
   bool read_pose(const std::vector<std::string_view>& fields, std::size_t line, Transform* T) {
     std::array<double, 16> v{};
-    const std::size_t count = columns_.layout == Layout::pose        ? 7
-                              : columns_.layout == Layout::matrix3x4 ? 12
-                                                                     : 16;
     bool there = true;
-    for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t i = 0; i < columns_.count(); ++i)
       there = read_field(
                   fields[columns_.layout == Layout::pose ? columns_.pose[i] : columns_.first + i],
                   line, &v[i]) &&
@@ -395,20 +398,18 @@ class Reader {
       if (q.norm() == 0) return false;
       if (!(std::abs(q.norm() - 1.0) <= kQuaternionLength))
         refuse(file_, line,
-               fmt::format("the quaternion has length {:.6f} and not 1: check the order of the "
-                           "columns",
-                           q.norm()));
+               "the quaternion has length {:.6f} and not 1: check the order of the columns",
+               q.norm());
       *T = {q.normalized().toRotationMatrix(), {v[0], v[1], v[2]}};
       return true;
     }
     const Mat3 written = to_rotation(v);
     const double off = off_rotation(written);
     if (!(off <= kNearRotation))
-      refuse(
-          file_, line,
-          fmt::format("the matrix is not a rotation: it is off orthonormal by more than {:g}, or "
-                      "it is a reflection",
-                      kNearRotation));
+      refuse(file_, line,
+             "the matrix is not a rotation: it is off orthonormal by more than {:g}, or it is a "
+             "reflection",
+             kNearRotation);
     roughest_ = std::max(roughest_, off);
     *T = {normalised(written), {v[3], v[7], v[11]}};
     return true;
@@ -424,25 +425,25 @@ class Reader {
     repeated_ = all - poses.size();
     if (all > 2 && poses.size() == 1)
       refuse(file_, 0,
-             fmt::format("has the same stamp in all of its {} rows: times were written with too "
-                         "few digits, or this column is no time",
-                         all));
+             "has the same stamp in all of its {} rows: times were written with too few digits, or "
+             "this column is no time",
+             all);
     if (2 * repeated_ > all)
       refuse(file_, 0,
-             fmt::format("has only {} different stamps in {} rows: times were written with too few "
-                         "digits",
-                         poses.size(), all));
+             "has only {} different stamps in {} rows: times were written with too few digits",
+             poses.size(), all);
     if (options_.unit || options_.unit_option.empty() || !out_.timed || poses.size() < 3) return;
     std::vector<std::int64_t> steps(poses.size() - 1);
     for (std::size_t i = 0; i < steps.size(); ++i)
-      steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);  // halves do not overflow
-    constexpr double kLongest = 10;                                        // s
+      // Halves do not overflow.
+      steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);
+    // In s.
+    constexpr double kLongest = 10;
     if (const double step = 2e-9 * static_cast<double>(median(std::span(steps))); step > kLongest)
-      refuse(
-          file_, 0,
-          fmt::format("has poses that follow one another after {:.6g} (median), read as seconds: "
-                      "say the unit of its times with {}",
-                      step, options_.unit_option));
+      refuse(file_, 0,
+             "has poses that follow one another after {:.6g} (median), read as seconds: say the "
+             "unit of its times with {}",
+             step, options_.unit_option);
   }
 
   void add_remarks() {
@@ -460,10 +461,9 @@ class Reader {
           "rotations have few decimals, they are up to {:.1g} off orthonormal", roughest_));
   }
 
-  /// NaN and infinity in all their spellings, and an empty field.
+  /// True for NaN and infinity in all spellings, and for an empty field.
   static bool is_no_value(std::string_view field) {
-    std::string word;
-    for (const char c : field.substr(0, 12)) word.push_back(static_cast<char>(c | 0x20));
+    std::string word = detail::lower(field.substr(0, 12));
     if (word.starts_with('-') || word.starts_with('+')) word.erase(0, 1);
     return word.empty() || word.starts_with("nan") || word == "inf" || word == "infinity" ||
            word == "null" || word == "none" || word == "n/a";
@@ -485,21 +485,20 @@ fs::path parent_folder(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
-/// The first of these files that is there.
+/// First of these files that exists.
 std::optional<fs::path> first_present(std::initializer_list<fs::path> candidates) {
   for (const fs::path& candidate : candidates)
     if (present(candidate)) return candidate.lexically_normal();
   return std::nullopt;
 }
 
-/// Row k at times[k], or frame k.
+/// Assigns times[k] to row k, or to frame k.
 void set_times(const fs::path& file, std::span<const Stamp> times, const std::string& times_name,
                TrajectoryFile* trajectory) {
   Trajectory& poses = trajectory->poses;
   if (trajectory->numbered ? trajectory->rows > times.size() : trajectory->rows != times.size())
-    refuse(file, 0,
-           fmt::format("has {} poses, but {} has {} times", trajectory->rows, times_name,
-                       times.size()));
+    refuse(file, 0, "has {} poses, but {} has {} times", trajectory->rows, times_name,
+           times.size());
   for (StampedPose& pose : poses)
     pose.stamp = times[static_cast<std::size_t>(pose.stamp.ns() / kRowStep)];
   sort_by_stamp(&poses);
@@ -557,7 +556,7 @@ Trajectory read_kitti(const fs::path& poses_file, std::span<const Stamp> times) 
 }
 
 std::optional<TruthFiles> find_truth(const fs::path& folder) {
-  // `sequences/06/` with a slash at its end has no name of its own.
+  // `sequences/06/` with a trailing slash has no file name.
   const fs::path sequence = (folder.has_filename() ? folder : folder.parent_path()).filename();
   for (const fs::path& poses :
        {folder / "poses.txt", folder / ".." / ".." / "poses" / (sequence.string() + ".txt")})

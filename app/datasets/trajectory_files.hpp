@@ -47,7 +47,8 @@ struct TrajectoryFile {
   bool timed = true;
   /// Headings, a matrix or the user define how rotations are written.
   bool order_reported = false;
-  QuaternionOrder order = QuaternionOrder::xyzw;  // as read
+  // Order that was read.
+  QuaternionOrder order = QuaternionOrder::xyzw;
 };
 
 /// Reads an argument of `evaluate`: a file or a directory. For a session that is its

@@ -12,7 +12,7 @@ namespace {
 struct Vocabulary {
   std::string_view part, words;
 };
-/// The last part of a key in small letters without signs, the camera's words and number taken off.
+/// Last part of a key in lower-case letters, without the words and number of the camera.
 constexpr std::array kWords{
     Vocabulary{"matrix",
                " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
@@ -51,9 +51,11 @@ constexpr std::array kWords{
     Vocabulary{"file", " calib camcalib "}};
 
 struct Program {
-  std::string_view key;  // at the root, or the beginning of one
+  // Key at the root; with a final underscore the beginning of one.
+  std::string_view key;
   std::string_view name;
-  std::string_view needs;  // nothing: its files are not read, whatever they hold
+  // Required parts; empty if files of the program are never supported.
+  std::string_view needs;
 };
 constexpr std::array kPrograms{
     Program{"value0", "Basalt", ""},
@@ -70,8 +72,9 @@ constexpr std::array kPrograms{
     Program{"projection_matrix", "ROS", "camera_info of both cameras, with P"},
     Program{"cam0", "Kalibr", "T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) of both"}};
 
-/// Parts of a key: letters and digits apart, capitals inside a word begin the next.
-std::vector<std::string> tokens_of(std::string_view key) {
+/// Splits a key into parts: digits are separate from letters, and a capital inside a word begins a
+/// new part.
+std::vector<std::string> split_key(std::string_view key) {
   std::vector<std::string> tokens;
   enum { sign, digit, small, capital } before = sign;
   for (const char c : key) {
@@ -90,10 +93,11 @@ std::vector<std::string> tokens_of(std::string_view key) {
 
 bool is_number(const std::string& token) { return token[0] >= '0' && token[0] <= '9'; }
 
-/// Which camera a key or a group is of, as it counts; the token that says so is taken out.
+/// Camera of a key or group as counted in the file. The token that identifies it is removed.
 struct Side {
   std::optional<int> number{};
-  bool word = false;  // left or right: counted from 0
+  // True for left and right, which count from 0.
+  bool word = false;
 };
 Side extract_side(std::vector<std::string>* tokens) {
   const auto take = [&](std::size_t i, int number, bool word) {
@@ -113,9 +117,7 @@ Side extract_side(std::vector<std::string>* tokens) {
 }
 
 std::string joined(const std::vector<std::string>& tokens) {
-  std::string word;
-  for (const std::string& token : tokens) word += token;
-  return word;
+  return fmt::format("{}", fmt::join(tokens, ""));
 }
 
 const Vocabulary* find_part(const std::string& word) {
@@ -125,7 +127,7 @@ const Vocabulary* find_part(const std::string& word) {
   });
 }
 
-/// k1 … k6, p1 or p2 of a scalar, whose number is no camera's; empty: another key.
+/// k1 to k6, p1 or p2 of a scalar, whose number is not that of a camera; empty for other keys.
 std::string_view find_coefficient(const std::vector<std::string>& tokens) {
   if (tokens.size() < 2) return {};
   constexpr std::array<std::string_view, 8> kNames{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
@@ -192,7 +194,7 @@ class Walk {
       groups.push_back(key.substr(0, dot));
       key.erase(0, dot + 1);
     }
-    std::vector<std::string> tokens = tokens_of(key);
+    std::vector<std::string> tokens = split_key(key);
     if (tokens.empty()) return;
     Fact fact;
     fact.file = &file_;
@@ -204,7 +206,7 @@ class Walk {
       tokens.resize(tokens.size() - 2);
       side = extract_side(&tokens);
     } else if (!parse_transform(tokens, &fact)) {
-      // Numbers in these names are no camera's.
+      // Numbers in these names are not those of cameras.
       const std::string whole = joined(tokens);
       if (whole == "tcncnm1")
         tokens.pop_back();
@@ -213,7 +215,7 @@ class Walk {
       if (!find_fact(tokens, groups, &side, &fact)) return;
     }
     for (std::size_t i = groups.size(); !side.number && i-- > 0;) {
-      std::vector<std::string> group = tokens_of(groups[i]);
+      std::vector<std::string> group = split_key(groups[i]);
       side = extract_side(&group);
     }
     fact.camera = side.number;
@@ -221,7 +223,7 @@ class Walk {
     facts_.push_back(std::move(fact));
   }
 
-  /// `T_c1_c2`, `T_cam1_cam0`, `T_right_left`, `Tlr`: between two cameras that the key names.
+  /// Parses a transform between two named cameras: `T_c1_c2`, `T_cam1_cam0`, `T_right_left`, `Tlr`.
   static bool parse_transform(const std::vector<std::string>& tokens, Fact* fact) {
     const std::string word = joined(tokens);
     std::vector<int> cameras;
@@ -239,7 +241,7 @@ class Walk {
     return true;
   }
 
-  /// `KL` is K of the left camera, `stereo_R` is R.
+  /// Finds the part of a key: `KL` is K of the left camera, `stereo_R` is R.
   static bool find_fact(const std::vector<std::string>& tokens,
                         const std::vector<std::string>& groups, Side* side, Fact* fact) {
     std::string word = joined(tokens);
@@ -258,7 +260,8 @@ class Walk {
 
   const YamlFile& file_;
   std::vector<Fact> facts_;
-  std::vector<std::size_t> counted_;  // facts whose camera is counted as the file counts
+  // Facts whose camera number counts as the file does.
+  std::vector<std::size_t> counted_;
 };
 
 }  // namespace

@@ -22,10 +22,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr unsigned kPatience = 4;  // s: for a request to arrive, for an answer to be read
+// Time in s for a request to arrive and for a response to be read.
+constexpr unsigned kPatience = 4;
 constexpr int kBacklog = 1024;
 
-/// Content security policy: nothing but the page's own content.
+/// The content security policy allows only the page's own content.
 constexpr std::array<std::pair<const char*, const char*>, 5> kHeaders{{
     {"Cache-Control", "no-store"},
     {"X-Content-Type-Options", "nosniff"},
@@ -36,8 +37,8 @@ constexpr std::array<std::pair<const char*, const char*>, 5> kHeaders{{
      "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
 }};
 
-/// The name in a Host header, without port and brackets.
-std::string_view name_of(std::string_view host) noexcept {
+/// Name in a Host header, without port and brackets.
+std::string_view host_name(std::string_view host) noexcept {
   if (host.starts_with('[')) {
     const auto end = host.find(']');
     return end == std::string_view::npos ? host : host.substr(1, end - 1);
@@ -46,13 +47,11 @@ std::string_view name_of(std::string_view host) noexcept {
 }
 
 bool names_this_machine(std::string_view host, const HttpPolicy& policy) noexcept {
-  const std::string_view name = name_of(host);
-  if (name == policy.host || name == "localhost" || name == "::1") return true;
-  return name.starts_with("127.") &&
-         name.find_first_not_of("0123456789.") == std::string_view::npos;
+  const std::string name(host_name(host));
+  return name == policy.host || HostPort{name}.loopback();
 }
 
-/// Equal, in a time that tells nothing of where they differ. No token is no key.
+/// Compares in constant time. An empty token never matches.
 bool same_token(std::string_view a, std::string_view b) noexcept {
   if (a.size() != b.size() || b.empty()) return false;
   unsigned difference = 0;
@@ -103,7 +102,7 @@ FileDescriptor listen_at(const HostPort& address) {
   return socket;
 }
 
-std::string_view value_of(MHD_Connection* c, MHD_ValueKind kind, const char* name) noexcept {
+std::string_view find_value(MHD_Connection* c, MHD_ValueKind kind, const char* name) noexcept {
   const char* value = ::MHD_lookup_connection_value(c, kind, name);
   return value == nullptr ? std::string_view() : value;
 }
@@ -145,7 +144,7 @@ HttpDecision decide(const HttpRequest& r, const HttpPolicy& policy) noexcept {
   return {HttpRoute::state, 200, ""};
 }
 
-/// No exception may pass through the library.
+/// No exception may propagate through the library.
 struct HttpServer::Callbacks {
   static MHD_Result request(void* server, MHD_Connection* c, const char* url, const char* method,
                             const char* /*version*/, const char* /*body*/, std::size_t* /*size*/,
@@ -154,8 +153,8 @@ struct HttpServer::Callbacks {
     HttpRequest r;
     r.method = method;
     r.path = url;
-    const auto header = [c](const char* name) { return value_of(c, MHD_HEADER_KIND, name); };
-    const auto query = [c](const char* name) { return value_of(c, MHD_GET_ARGUMENT_KIND, name); };
+    const auto header = [c](const char* name) { return find_value(c, MHD_HEADER_KIND, name); };
+    const auto query = [c](const char* name) { return find_value(c, MHD_GET_ARGUMENT_KIND, name); };
     r.host = header("Host");
     r.origin = header("Origin");
     r.token = header("X-Vergence-Token");
@@ -183,7 +182,7 @@ struct HttpServer::Callbacks {
     } catch (const std::exception&) {
     }
     if (asking.size() <= kAsking) return;
-    // The library closes what has come to its end.
+    // The library closes the connection after its shutdown.
     const MHD_ConnectionInfo* socket =
         ::MHD_get_connection_info(asking.front(), MHD_CONNECTION_INFO_CONNECTION_FD);
     if (socket != nullptr) (void)::shutdown(socket->connect_fd, SHUT_RDWR);

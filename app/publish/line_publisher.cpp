@@ -52,8 +52,8 @@ void LinePublisher::on_pose(const FrameReport& report) noexcept {
   wake();
 }
 
-// A session has fewer alignments and calibrations in a second than their rings hold; one that finds
-// no room is replaced by the next one.
+// The rings hold more alignments and calibrations than a session has per second. One that finds no
+// room is superseded by the next one.
 void LinePublisher::on_enu_alignment(const EnuAlignment& alignment,
                                      const Geodetic& origin) noexcept {
   (void)alignments_.push({alignment, origin});
@@ -80,8 +80,8 @@ void LinePublisher::on_event(const EventRecord& event) noexcept {
 
 void LinePublisher::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-lines");
-  // A tenth of a percent of a core, for which a reader waits: before other work, where the system
-  // lets us.
+  // The thread uses a tenth of a percent of a core, and readers wait for it. So it gets priority
+  // where the system permits.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   for (;;) {
     const bool last = stop_.load(std::memory_order_acquire);
@@ -123,7 +123,8 @@ void LinePublisher::send(const FrameReport& report) {
   behind_pose_.add((sent - report.estimated).to_seconds() * 1e3);
   if (!tie) return;
   age_.add((tie->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
-  constexpr std::uint64_t kBetween = 64;  // lines: a percentile walks through thousands of bins
+  // In lines, because a percentile iterates over thousands of bins.
+  constexpr std::uint64_t kBetween = 64;
   if (lines_ % kBetween == 1) age_p99_ms_.store(age_.percentile(0.99), std::memory_order_relaxed);
 }
 
@@ -183,8 +184,8 @@ LineResponse LinePublisher::answer(std::string_view request) {
   }
   if (!start_.can_recalibrate)
     return refuse(
-        "this session does not recalibrate on request; use a live session with "
-        "calibration.online: on");
+        "this session does not recalibrate on request; use a live session with calibration.online: "
+        "on");
   requests_->recalibrate.store(true, std::memory_order_relaxed);
   return {response_line(name, true, "recalibration starts at the next frame"), {}};
 }

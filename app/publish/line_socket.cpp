@@ -25,7 +25,7 @@ namespace vergence::app {
 
 namespace {
 
-/// Names of this machine for other computers.
+/// Name of this machine for other computers.
 std::string machine_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 && name[0] != 0 ? name.data()
@@ -87,11 +87,14 @@ LineAddress parse_line_address(std::string_view text, std::string_view key) {
 
 namespace {
 
-constexpr std::size_t kReaders = 8;  // robots have a handful of programs that want the pose
-constexpr Duration kPatience = Duration::seconds(5);  // for a reader that does not read
-constexpr int kPending = 4;                           // connections that wait between two frames
+// Robots have a handful of programs that read the pose.
+constexpr std::size_t kReaders = 8;
+// Patience with a reader that does not read.
+constexpr Duration kPatience = Duration::seconds(5);
+// Connections that may wait between two frames.
+constexpr int kPending = 4;
 
-/// Waits for events; the first one is of an eventfd, which is reset.
+/// Waits for events. The first one is that of an eventfd, which is reset.
 void wait_for(std::span<pollfd> events, Duration timeout) noexcept {
   const auto ms = std::max<std::int64_t>(timeout.ns() / 1'000'000 + 1, 0);
   if (::poll(events.data(), events.size(), static_cast<int>(ms)) < 0)
@@ -100,7 +103,7 @@ void wait_for(std::span<pollfd> events, Duration timeout) noexcept {
   if (events[0].revents != 0) (void)::eventfd_read(events[0].fd, &ignored);
 }
 
-/// Takes away a stale socket file, left by a program that was killed.
+/// Removes a stale socket file of a killed program.
 void remove_stale(const sockaddr_un& address, std::string_view key) {
   struct stat status {};
   if (::lstat(address.sun_path, &status) != 0) return;
@@ -112,7 +115,8 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
       errno == EAGAIN)
     throw InputError(fmt::format("{}: another program sends its lines to {}; name another path",
                                  key, address.sun_path));
-  // Only this shows that no program listens: a socket of datagrams or one of another user may live.
+  // Only ECONNREFUSED proves that no program listens. A datagram socket or one of another user may
+  // be in use.
   if (errno == ECONNREFUSED)
     (void)::unlink(address.sun_path);
   else if (errno != ENOENT)
@@ -120,8 +124,8 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
                                  key, address.sun_path, std::strerror(errno)));
 }
 
-/// A stream, not datagrams: readers come and go as they like without an address of their own, any
-/// number up to kReaders, and a line is what ends with a line feed.
+/// A stream socket, so that up to kReaders readers can connect and disconnect without own
+/// addresses. A line ends with a line feed.
 class UnixLineSocket final : public LineSocket {
  public:
   UnixLineSocket(const std::string& path, std::string_view key) : path_(path) {
@@ -132,7 +136,8 @@ class UnixLineSocket final : public LineSocket {
     listener_ = FileDescriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     if (!listener_ ||
         ::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        ::chmod(address.sun_path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 ||  // whatever umask
+        // The mode must not depend on the umask.
+        ::chmod(address.sun_path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 ||
         ::listen(listener_.get(), kPending) != 0)
       throw InputError(fmt::format("{}: no socket at {} ({}); does its folder exist?", key, path,
                                    std::strerror(errno)));
@@ -164,7 +169,7 @@ class UnixLineSocket final : public LineSocket {
       Reader& reader = readers_[i];
       if (reader.copies_images() && !reader.rest.empty() && now - reader.progress >= kPatience)
         close(&reader);
-      // One request after the other: the next one when the answer to the last one is out.
+      // A reader's next request is read after the response to the previous one was sent.
       const short event = !reader.rest.empty() ? POLLOUT : reader.asks ? POLLIN : short{0};
       events[2 + i] = {reader.socket.get(), event, 0};
     }
@@ -173,7 +178,7 @@ class UnixLineSocket final : public LineSocket {
       if ((events[2 + i].revents & POLLOUT) != 0)
         flush(monotonic_now(), &readers_[i]);
       else if (events[2 + i].revents != 0)
-        hear(events[2 + i].revents, answer, &readers_[i]);
+        read_requests(events[2 + i].revents, answer, &readers_[i]);
     }
     if (events[1].revents != 0) accept_readers();
   }
@@ -187,7 +192,7 @@ class UnixLineSocket final : public LineSocket {
     for (Reader& reader : readers_) {
       if (!reader.image_due(now)) continue;
       reader.rest = bytes;
-      // The rate holds on average; a long delay is not made up for.
+      // The rate holds on average, but a long delay is not compensated.
       reader.next_image =
           std::max(reader.next_image + reader.image_interval, now + reader.image_interval / 2);
       ++counters_.images;
@@ -199,12 +204,18 @@ class UnixLineSocket final : public LineSocket {
  private:
   struct Reader {
     FileDescriptor socket;
-    std::string rest;           // of lines that went out in part; the next one waits for it
-    bool greeted = false;       // has, or has in `rest`, the newest greeting
-    bool asks = true;           // has not closed its side
-    std::string asked;          // the beginning of a request
-    HostStamp progress{};       // when it last took something
-    Duration image_interval{};  // positive: it gets images and no lines
+    // Unsent rest of lines; the next line waits for it.
+    std::string rest;
+    // True if the newest greeting was sent or is in `rest`.
+    bool greeted = false;
+    // True until the reader closes its side.
+    bool asks = true;
+    // Incomplete request.
+    std::string asked;
+    // Time at which the reader last accepted data.
+    HostStamp progress{};
+    // If positive, the reader gets images instead of lines.
+    Duration image_interval{};
     HostStamp next_image{};
 
     [[nodiscard]] bool copies_images() const noexcept { return image_interval > Duration{}; }
@@ -219,7 +230,7 @@ class UnixLineSocket final : public LineSocket {
           ::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
       const HostStamp now = monotonic_now();
       if (!socket) {
-        // Without descriptors to spare the connection would wake this thread for ever.
+        // Without free descriptors the pending connection would wake this thread continuously.
         if (errno != EAGAIN && errno != EINTR) accept_again_ = now + Duration::seconds(1);
         return;
       }
@@ -238,7 +249,7 @@ class UnixLineSocket final : public LineSocket {
     }
   }
 
-  /// Bytes that went out; −1: the reader is gone.
+  /// Returns the number of sent bytes; −1 if the reader has disconnected.
   static ssize_t write(const Reader& reader, std::string_view bytes) noexcept {
     const ssize_t n =
         ::send(reader.socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
@@ -246,7 +257,7 @@ class UnixLineSocket final : public LineSocket {
     return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
   }
 
-  /// Sends pending data as far as the reader has room: the rest of a line, then a greeting.
+  /// Sends pending data while the reader has room: the rest of a line, then a greeting.
   void flush(HostStamp now, Reader* reader) noexcept {
     while (!reader->rest.empty() || !reader->greeted) {
       if (reader->rest.empty()) {
@@ -283,9 +294,10 @@ class UnixLineSocket final : public LineSocket {
     reader->socket.reset();
   }
 
-  /// Reads what a reader has sent, and answers whole lines.
-  void hear(short events, const Answer& answer, Reader* reader) noexcept {
-    constexpr std::size_t kMaxRequest = 512;  // bytes
+  /// Reads a reader's requests and answers complete lines.
+  void read_requests(short events, const Answer& answer, Reader* reader) noexcept {
+    // In bytes.
+    constexpr std::size_t kMaxRequest = 512;
     std::array<char, kMaxRequest> bytes;
     const ssize_t n = reader->asks && reader->rest.empty()
                           ? ::recv(reader->socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT)

@@ -22,7 +22,8 @@
 #include "app/datasets/jpeg_writer.hpp"
 #include "app/publish/frame_images.hpp"
 #include "app/publish/live_state.hpp"
-#include "app/publish/page_parts.hpp"  // made by CMake from app/publish/page/
+// CMake generates this header from app/publish/page/.
+#include "app/publish/page_parts.hpp"
 #include "app/report/style.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/memory/ring.hpp"
@@ -43,7 +44,8 @@ std::string thumbnail(const ImageView& image) {
         sum += image.row(y * step + i / step)[x * step + i % step];
       means.push_back(static_cast<std::uint8_t>(sum / (step * step)));
     }
-  constexpr int kQuality = 70;  // grey blocks do not show beside the points
+  // Compression artefacts are hidden by the points.
+  constexpr int kQuality = 70;
   return grey_jpeg({means.data(), width, height, width}, kQuality);
 }
 
@@ -78,10 +80,12 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kBetweenImages{100};
-constexpr milliseconds kFarewell{500};  // for viewers to learn of the session's end
-constexpr int kNiceness = 5;            // beside the estimator's threads
+// Time for viewers to receive the end of the session.
+constexpr milliseconds kFarewell{500};
+// The estimator's threads take precedence.
+constexpr int kNiceness = 5;
 
-/// A point that the left camera followed, raw pixels, and where the right one saw it.
+/// Point tracked by the left camera in raw pixels, and its position in the right image.
 struct LivePoint {
   std::array<float, 2> left{}, right{};
   bool both = false;
@@ -92,18 +96,18 @@ struct Posed {
   FrameReport report{};
 };
 
-/// `publish.http`: the live page (docs/live_interface.md).
+/// Live page of `publish.http` (docs/live_interface.md).
 ///
-/// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
-///          picture, copies two images; no lock, no system call. Everything else: a thread
-///          of its own, made by the constructor, that yields to the estimator's where a core is
-///          short.
-/// Memory   Rings fixed; the images' memory with the first viewer. Ring full: frames are left out,
-///          totals stay true.
-/// Errors   The constructor throws InputError (HttpServer), std::system_error.
+/// Threads  on_…() run on the estimator's thread: they push into rings and, if a viewer waits for
+///          an image, copy two images, without a lock or system call. Everything else runs on an
+///          own thread with a lower priority, which the constructor starts.
+/// Memory   Rings are fixed; images are allocated for the first viewer. If a ring is full, frames
+///          are dropped, but totals stay correct.
+/// Errors   The constructor throws InputError (HttpServer) and std::system_error.
 class LivePage final : public SessionObserver {
  public:
-  /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
+  /// `requests` must outlive it. `line_age_ms` returns the 99th percentile of the pose lines' age;
+  /// negative if there are none.
   LivePage(const LivePageOptions& options, SessionRequests* requests,
            std::function<double()> line_age_ms)
       : requests_(requests),
@@ -115,7 +119,8 @@ class LivePage final : public SessionObserver {
         thread_([this] {
           try {
             work();
-          } catch (const std::exception& e) {  // no memory: viewers lose the page, not the session
+          } catch (const std::exception& e) {
+            // Without memory viewers lose the page, but the session continues.
             fmt::print(stderr, "vergence: the live page has ended ({}); the run continues\n",
                        e.what());
           }
@@ -183,7 +188,7 @@ class LivePage final : public SessionObserver {
   }
   void work() {
     (void)pthread_setname_np(pthread_self(), "vergence-page");
-    // On Linux a thread has a niceness of its own.
+    // On Linux each thread has its own niceness.
     (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
     while (!stop_.load(std::memory_order_acquire)) {
       server_.step(milliseconds(100));
@@ -199,7 +204,7 @@ class LivePage final : public SessionObserver {
       state_.begin(start_);
       begun_ = true;
     }
-    // Before the rings: what is in them by then is all of the drive.
+    // The flag is read before the rings, which then contain the rest of the session.
     const bool ended = ended_.load(std::memory_order_acquire);
     for (Item item; items_.pop(&item);)
       std::visit([this](const auto& record) { add(record); }, item);
@@ -218,7 +223,8 @@ class LivePage final : public SessionObserver {
   [[nodiscard]] std::string state_since(const HttpRequest& request) {
     asked_ = Clock::now();
     drain();
-    if (!begun_) return "";  // the simulated world takes its time; viewers wait for the session
+    // Viewers wait for the session, because the simulated world starts slowly.
+    if (!begun_) return "";
     counts_.updates.fetch_add(1, std::memory_order_relaxed);
     const bool known = request.epoch == epoch_;
     std::uint64_t version = 0;
@@ -249,7 +255,7 @@ class LivePage final : public SessionObserver {
           {{"width", image.width}, {"height", image.height}, {"jpeg", base64(thumbnail(image))}});
     }
     auto& points = out["points"] = nlohmann::json::array();
-    // Tenths of pixels, as integers: half the bytes.
+    // Tenths of pixels as integers halve the size.
     const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
     for (const LivePoint& p : points_) {
       nlohmann::json point{tenths(p.left[0]), tenths(p.left[1])};
@@ -265,23 +271,28 @@ class LivePage final : public SessionObserver {
   SessionRequests* requests_;
   std::function<double()> line_age_ms_;
 
-  // From the estimator's thread to the page's.
+  // Passed from the estimator's thread to the page's.
   Ring<Item, 256> items_;
   struct Counts {
     std::atomic<std::uint64_t> updates{0}, dropped{0};
   } counts_;
   FrameImages images_;
-  FixedVector<LivePoint, 600> points_;  // of images_: as many as a page can show
+  // Points of the images in images_: the maximum that a page can show.
+  FixedVector<LivePoint, 600> points_;
   std::atomic<bool> started_{false}, ended_{false}, stop_{false};
-  SessionStart start_{};  // published by started_
+  // Published by started_.
+  SessionStart start_{};
 
   // Used by the page's thread only.
   LiveState state_;
   bool begun_ = false;
-  const std::string epoch_;  // tells a viewer that the program was started again
+  // Identifies this run, so that viewers detect a restart.
+  const std::string epoch_;
   nlohmann::json newest_images_{};
-  std::string newest_image_{};            // number of their frame
-  Clock::time_point asked_{}, wanted_{};  // for the state, for images
+  // Frame number of newest_images_.
+  std::string newest_image_{};
+  // Times of the last request for the state, and of the last one for images.
+  Clock::time_point asked_{}, wanted_{};
   HttpServer server_;
   std::thread thread_;
 };

@@ -22,8 +22,8 @@ struct LivePageOptions {
   HttpPolicy policy{};
 };
 
-/// The live page as an observer of a session. `line_age_ms`: age of the pose stream's lines, 99th
-/// percentile; negative: unknown. InputError: as HttpServer.
+/// The live page as an observer of a session. `line_age_ms` returns the 99th percentile of the age
+/// of the pose stream's lines; negative if unknown. Throws InputError as HttpServer does.
 [[nodiscard]] std::unique_ptr<SessionObserver> make_live_page(const LivePageOptions& options,
                                                               SessionRequests* requests,
                                                               std::function<double()> line_age_ms);

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A number with as many digits as a page needs; none for what is no number.
+/// Rounds to the digits that a page needs; null if the number is not finite.
 json rounded(double value, double digits) {
   if (!std::isfinite(value)) return nullptr;
   const double scale = std::pow(10.0, digits);
@@ -44,11 +44,12 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
 
 // A status is old after this time without a frame, or after this many intervals between frames.
 constexpr double kSilenceSeconds = 1, kMaxIntervals = 3;
-constexpr double kSmoothing = 8;  // frames
+// In frames.
+constexpr double kSmoothing = 8;
 
 }  // namespace
 
-/// A gap counts as twice the interval at most: an outage does not make the next one unseen.
+/// A gap counts at most as twice the interval, so that one outage does not hide the next one.
 void LiveState::add_interval(HostStamp estimated) noexcept {
   const double gap = (estimated - newest_->estimated).to_seconds();
   if (interval_s_ <= 0) interval_s_ = gap;
@@ -114,7 +115,8 @@ json LiveState::frame_json(HostStamp now) const {
   json out{
       {"frame", p.frame},
       {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
-      {"since_s", rounded(silence, 1)},  // when it came
+      // Time since the frame arrived.
+      {"since_s", rounded(silence, 1)},
       {"silent", silence > std::max(kSilenceSeconds, kMaxIntervals * interval_s_)},
       {"state", to_string(p.state)},
       {"status", to_string(p.status)},
@@ -225,7 +227,8 @@ json LiveState::since(std::uint64_t version, HostStamp now, double line_age_ms) 
 
 namespace {
 
-constexpr float kMaxStep = 16;  // m: a map of longer ones shows no way any more
+// In m. With longer steps a map no longer shows the path.
+constexpr float kMaxStep = 16;
 
 float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
@@ -237,7 +240,7 @@ void LiveTrail::add(const Place& place) {
   if (places_.size() == kMax) thin(place.version);
   if (places_.empty() || distance(place.world, places_.back().world) >= min_step_m_)
     return places_.push_back(place);
-  // A rig that stands for weeks uses up no places, whatever its status does.
+  // A rig that stands still for weeks uses no further points, regardless of its status.
   Place& last = places_.back();
   if (place.status <= last.status) return;
   last.status = place.status;

@@ -106,7 +106,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A line of its type with `fields`. Names may hold bytes that are no UTF-8.
+/// A line of its type with `fields`. Names may contain invalid UTF-8.
 std::string format_line(const char* type, const json& fields) {
   json line{{"version", kPoseStreamVersion}, {"type", type}};
   line.update(fields);
@@ -143,7 +143,8 @@ std::string calibration_line(const CalibrationRecord& record, std::span<const st
                        {"distortion", lens.distortion},
                        {"T_camera_left", rows(rig.T_camera_left[k])}});
   }
-  constexpr double kDepth = 20;  // m: where health() evaluates the rig
+  // In m: depth at which health() evaluates the rig.
+  constexpr double kDepth = 20;
   const bool known = calibration::depth_error_percent(rig, kDepth) > 0;
   return format_line(
       "calibration",

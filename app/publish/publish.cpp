@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMinToken = 16, kMaxToken = 128;
 
-/// 128 bits of the kernel's, in hexadecimal digits.
+/// 128 random bits of the kernel as hexadecimal digits.
 std::string new_token() {
   std::array<std::uint8_t, 16> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
@@ -33,10 +33,9 @@ std::string read_token(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line(kMaxToken + 2, '\0');
   if (!in)
-    throw InputError(
-        fmt::format("publish.token_file: {} cannot be read; write a line of letters "
-                    "and digits into it",
-                    file.string()));
+    throw InputError(fmt::format(
+        "publish.token_file: {} cannot be read; write a line of letters and digits into it",
+        file.string()));
   in.getline(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(std::strlen(line.c_str()));
   const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
@@ -44,10 +43,9 @@ std::string read_token(const std::filesystem::path& file) {
            c == '_';
   });
   if (line.size() < kMinToken || line.size() > kMaxToken || !plain)
-    throw InputError(
-        fmt::format("publish.token_file: the first line of {} is no token: {} to {} "
-                    "letters, digits, - and _",
-                    file.string(), kMinToken, kMaxToken));
+    throw InputError(fmt::format(
+        "publish.token_file: the first line of {} is no token: {} to {} letters, digits, - and _",
+        file.string(), kMinToken, kMaxToken));
   return line;
 }
 
@@ -83,7 +81,7 @@ void Publishing::open_page(const Configuration& configuration) {
   try {
     page_ = make_live_page(options, &requests_,
                            [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
-    // Behind a # it is not part of a request, so it appears in no log.
+    // The fragment after # is not part of a request, so the token appears in no log.
     fmt::print(
         stderr, "live page: {}\n",
         settings.token_file.empty()

@@ -23,7 +23,8 @@ class Publishing {
   void open_page(const Configuration& configuration);
 
   SessionRequests requests_;
-  std::unique_ptr<LinePublisher> lines_;  // outlives the page, which shows its latency
+  // Must outlive the page, which shows its latency.
+  std::unique_ptr<LinePublisher> lines_;
   std::unique_ptr<SessionObserver> page_;
 };
 

@@ -38,7 +38,7 @@ class SystemDisk final : public Disk {
   [[nodiscard]] int truncate(int fd, std::uint64_t size) noexcept override {
     return ::ftruncate(fd, static_cast<off_t>(size)) == 0 ? 0 : -errno;
   }
-  // Not every file system can: the pages then wait as those of any other file.
+  // Where the file system does not support it, pages are written as those of any other file.
   void start_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept override {
     (void)::sync_file_range(fd, static_cast<off64_t>(offset), static_cast<off64_t>(size),
                             SYNC_FILE_RANGE_WRITE);
@@ -73,9 +73,10 @@ Disk& system_disk() noexcept {
 namespace {
 
 constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
-constexpr std::size_t kRecordHead = 9;                // opcode u8, length u64
-constexpr std::size_t kChunkHead = kRecordHead + 40;  // start, end, size u64, check sum u32, no
-                                                      // compression u32, size u64
+// Opcode u8, length u64.
+constexpr std::size_t kRecordHead = 9;
+// Start, end and size u64, checksum u32, empty compression u32, size u64.
+constexpr std::size_t kChunkHead = kRecordHead + 40;
 constexpr std::size_t kScratch = std::size_t{256} << 10;
 
 enum class Opcode : std::uint8_t {
@@ -92,7 +93,7 @@ enum class Opcode : std::uint8_t {
   data_end = 0x0F
 };
 
-/// A record whose length is known when its content is written.
+/// Writes a record whose length is determined by its content.
 template <class Content>
 void put_record(ByteWriter* out, Opcode opcode, const Content& content) noexcept {
   out->put(static_cast<std::uint8_t>(opcode));
@@ -111,7 +112,8 @@ void McapMessageHead::write(std::span<std::uint8_t, kSize> out) const noexcept {
   w.put(channel);
   w.put(sequence);
   w.put(log_time);
-  w.put(log_time);  // publish time: equal to the time of measurement
+  // The publish time equals the time of measurement.
+  w.put(log_time);
 }
 
 McapMessageHead McapMessageHead::read(std::span<const std::uint8_t, kSize> in) noexcept {
@@ -125,19 +127,20 @@ McapMessageHead McapMessageHead::read(std::span<const std::uint8_t, kSize> in) n
   return head;
 }
 
-/// Small records behind each other through a buffer, with the check sum that a summary has.
+/// Appends small records through a buffer, with the checksum of a summary.
 class McapFile::Appender {
  public:
   explicit Appender(McapFile* file) noexcept : file_(file), out_(file->scratch_) {}
 
   template <class Content>
   void record(Opcode opcode, const Content& content) noexcept {
-    constexpr std::size_t kMaxRecord = kScratch / 2;  // schemas are the longest
+    // Schemas are the longest records.
+    constexpr std::size_t kMaxRecord = kScratch / 2;
     if (out_.size() > kScratch - kMaxRecord) flush();
     put_record(&out_, opcode, content);
   }
   void bytes(const void* data, std::size_t size) noexcept { out_.bytes(data, size); }
-  /// From here on.
+  /// The checksum begins here.
   void begin_crc() noexcept {
     flush();
     crc_ = 0;
@@ -193,7 +196,8 @@ int McapFile::create(const char* path) noexcept {
   out.flush();
   if (out.error() != 0) {
     abandon();
-    disk_.remove(path);  // it is no recording, and in the way of the next attempt
+    // A file without its head is no recording and would block the next attempt.
+    disk_.remove(path);
   }
   return out.error();
 }
@@ -231,7 +235,8 @@ int McapFile::append(iovec* pieces, int count) noexcept {
     }
     const std::int64_t n = disk_.write(fd_, pieces, count, at);
     if (n < 0) {
-      (void)disk_.truncate(fd_, end_);  // what was taken is no whole chunk
+      // An incomplete chunk is cut off.
+      (void)disk_.truncate(fd_, end_);
       return static_cast<int>(n);
     }
     at += static_cast<std::uint64_t>(n);
@@ -246,7 +251,7 @@ int McapFile::append(iovec* pieces, int count) noexcept {
   return 0;
 }
 
-/// Where each message of a chunk is, and the check sum over all of them.
+/// Lists the positions of a chunk's messages, and computes its checksum.
 void McapFile::index_messages(std::span<const std::span<const std::uint8_t>> parts,
                               ChunkIndex* chunk, std::uint32_t* crc) noexcept {
   entries_.clear();
@@ -304,7 +309,8 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   std::array<iovec, kMaxParts + 2> pieces{};
   int count = 0;
   pieces[static_cast<std::size_t>(count++)] = {head.data(), head.size()};
-  for (const auto& part : parts)  // written from, never to
+  // The parts are only read.
+  for (const auto& part : parts)
     pieces[static_cast<std::size_t>(count++)] = {const_cast<std::uint8_t*>(part.data()),
                                                  part.size()};
   pieces[static_cast<std::size_t>(count++)] = {scratch_.data(), index.size()};
@@ -318,7 +324,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   return 0;
 }
 
-/// The disk writes this chunk while the next one is gathered; the one before is there by now.
+/// The disk writes this chunk while the next one is gathered; the previous one is written by now.
 void McapFile::write_back(const ChunkIndex& chunk) noexcept {
   disk_.start_writeback(fd_, chunk.offset, end_ - chunk.offset);
   if (chunk.offset > writeback_) {
@@ -329,7 +335,7 @@ void McapFile::write_back(const ChunkIndex& chunk) noexcept {
   waiting_ += entries_.size();
 }
 
-/// The kernel does not report which pages failed: all that waited may be missing.
+/// The kernel does not report which pages failed, so all pending messages may be missing.
 void McapFile::record_unwritten(int error) noexcept {
   if (error == 0) return;
   if (unwritten_.error == 0) unwritten_.error = error;
@@ -341,10 +347,14 @@ void McapFile::write_statistics(Appender* out) const noexcept {
     std::uint64_t messages = 0;
     for (const std::uint64_t n : counts_) messages += n;
     w->put(messages);
-    w->put(static_cast<std::uint16_t>(topics_.size()));  // schemas
-    w->put(static_cast<std::uint32_t>(topics_.size()));  // channels
-    w->put(std::uint32_t{0});                            // attachments
-    w->put(std::uint32_t{0});                            // metadata
+    // Number of schemas.
+    w->put(static_cast<std::uint16_t>(topics_.size()));
+    // Number of channels.
+    w->put(static_cast<std::uint32_t>(topics_.size()));
+    // Number of attachments.
+    w->put(std::uint32_t{0});
+    // Number of metadata records.
+    w->put(std::uint32_t{0});
     w->put(static_cast<std::uint32_t>(chunks_.size()));
     w->put(first_);
     w->put(last_);
@@ -402,7 +412,7 @@ int McapFile::finish() noexcept {
         w->put(group.start);
         w->put(group.end - group.start);
       });
-  // The check sum covers the footer up to itself.
+  // The checksum covers the footer up to itself.
   std::array<std::uint8_t, kRecordHead + 16> footer{};
   ByteWriter w(footer);
   w.put(static_cast<std::uint8_t>(Opcode::footer));

@@ -6,6 +6,8 @@
 #include <set>
 #include <vector>
 
+#include <fmt/format.h>
+
 namespace vergence::app {
 namespace {
 
@@ -44,15 +46,16 @@ void put_crc(CdrWriter* out) noexcept {
 }
 
 /// Rectification of a pair: x along the baseline, z between the optical axes. R maps from a camera
-/// into the axes common to both.
+/// to the common axes.
 struct Rectification {
   Mat3 R = Mat3::Identity();
-  double focal = 0, cx = 0, cy = 0;  // px
-  double baseline_x = 0;             // m: 0 for the left camera, −|baseline| for the other
+  // In px.
+  double focal = 0, cx = 0, cy = 0;
+  // In m: 0 for the left camera, −|baseline| for the other one.
+  double baseline_x = 0;
 };
 
-/// Rectification of `camera` in the pair with camera 0; camera 0 itself is that with
-/// camera 1.
+/// Rectification of `camera` in the pair with camera 0; for camera 0 in the pair with camera 1.
 Rectification rectification(const RigCalibration& rig, int camera, bool calibrated) noexcept {
   const auto& lenses = rig.intrinsics;
   const Intrinsics& lens = lenses[static_cast<std::size_t>(camera)];
@@ -106,7 +109,8 @@ void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,
   const double fy = calibrated ? r.focal : lens.fy;
   out->items(std::array{r.focal, 0.0, r.cx, r.focal * r.baseline_x, 0.0, fy, r.cy, 0.0, 0.0, 0.0,
                         1.0, 0.0});
-  for (int i = 0; i < 6; ++i) out->put(std::uint32_t{0});  // binning, region of interest: all
+  // Binning and region of interest are 0 for the full sensor.
+  for (int i = 0; i < 6; ++i) out->put(std::uint32_t{0});
   out->boolean(false);
 }
 
@@ -135,7 +139,8 @@ void write_imu(CdrWriter* out, const InsSample& s) noexcept {
   out->items(s.attitude_valid ? std::array{tilt, 0.0, 0.0, 0.0, tilt, 0.0, 0.0, 0.0,
                                            s.heading_sigma * s.heading_sigma}
                               : kNotMeasured);
-  for (int i = 0; i < 2; ++i) {  // rates, accelerations
+  // Rates and accelerations are not measured.
+  for (int i = 0; i < 2; ++i) {
     put_vector(out, Vec3::Zero());
     out->items(kNotMeasured);
   }
@@ -170,7 +175,8 @@ void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept {
     odometry.pose = sample.T_world_left;
   else
     odometry.pose_covariance[0] = -1.0;
-  odometry.twist_covariance[0] = -1.0;  // the speed is not measured
+  // The twist is not measured.
+  odometry.twist_covariance[0] = -1.0;
   write_odometry(out, sample.stamp, "world", "left", odometry);
 }
 
@@ -249,38 +255,36 @@ namespace {
 /// Fields of the packages common_interfaces and geometry2 as of ROS 2 Humble, without their
 /// comments and constants.
 struct Definition {
-  std::string_view name;  // without /msg/, as fields name it
+  // Name as in topics, or as in the fields of other definitions, without /msg/.
+  std::string_view name;
   std::string_view fields;
 };
+// The types of RosType come first, in its order.
 constexpr std::array kDefinitions{
-    Definition{"sensor_msgs/Image",
+    Definition{"sensor_msgs/msg/Image",
                "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
                "uint8 is_bigendian\nuint32 step\nuint8[] data\n"},
-    Definition{"sensor_msgs/CameraInfo",
+    Definition{"sensor_msgs/msg/CameraInfo",
                "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\n"
                "float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\n"
                "uint32 binning_y\nsensor_msgs/RegionOfInterest roi\n"},
-    Definition{"sensor_msgs/NavSatFix",
+    Definition{"sensor_msgs/msg/NavSatFix",
                "std_msgs/Header header\nsensor_msgs/NavSatStatus status\nfloat64 latitude\n"
                "float64 longitude\nfloat64 altitude\nfloat64[9] position_covariance\n"
                "uint8 position_covariance_type\n"},
-    Definition{"sensor_msgs/Imu",
+    Definition{"sensor_msgs/msg/Imu",
                "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n"
                "float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n"
                "float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\n"
                "float64[9] linear_acceleration_covariance\n"},
-    Definition{"nav_msgs/Odometry",
+    Definition{"nav_msgs/msg/Odometry",
                "std_msgs/Header header\nstring child_frame_id\n"
                "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"},
-    Definition{"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
-    Definition{"std_msgs/String", "string data\n"},
-    Definition{"geometry_msgs/PoseWithCovarianceStamped",
-               "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n"},
-    Definition{"diagnostic_msgs/DiagnosticArray",
-               "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
+    Definition{"tf2_msgs/msg/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
+    Definition{"std_msgs/msg/String", "string data\n"},
     // Input and result of one estimator call: everything that a replay needs besides
     // the images. `crc` is the CRC-32 of the message's bytes before it, `image_crc` that of pixels.
-    Definition{"vergence_msgs/Frame",
+    Definition{"vergence_msgs/msg/Frame",
                "std_msgs/Header header\nuint64 number\nint64 stamp_ns\nint64 stamp_error_ns\n"
                "int64 spread_ns\nuint8 pairing\nuint8 cameras\nuint8 images_present\n"
                "uint8 images_recorded\nuint32[] image_crc\nbool recalibration_requested\n"
@@ -288,8 +292,8 @@ constexpr std::array kDefinitions{
                "geometry_msgs/Pose pose\nint32 inliers\nfloat64 reprojection_px\n"
                "float32 estimate_ms\nuint8 points_percent\nuint8 window_keyframes\n"
                "uint8 window_steps\nuint32 crc\n"},
-    // A reading of the INS on the host's clock. Body forward, left, up; axes east, north, up.
-    Definition{"vergence_msgs/InsReading",
+    // INS sample on the host's clock. Body forward, left, up; axes east, north, up.
+    Definition{"vergence_msgs/msg/InsReading",
                "std_msgs/Header header\nuint64 number\nint64 stamp_ns\nint64 stamp_error_ns\n"
                "uint8 fix\nbool attitude_valid\nbool velocity_valid\nfloat64 latitude_deg\n"
                "float64 longitude_deg\nfloat64 height_m\nfloat64[3] velocity_enu\n"
@@ -297,12 +301,16 @@ constexpr std::array kDefinitions{
                "float64 velocity_sigma\nfloat64 tilt_sigma\nfloat64 heading_sigma\n"
                "uint32 device_status\nbool utc_valid\nint64 utc_ns\nuint8 satellites\n"
                "float32 position_dop\nbool filter_valid\nbool sync_out\nuint32 crc\n"},
-    Definition{"vergence_msgs/Pulse",
+    Definition{"vergence_msgs/msg/Pulse",
                "std_msgs/Header header\nuint64 number\nuint32 boot\nint64 edge_device_ns\n"
                "int64 arrival_host_ns\nbool resumed\nuint8 exposures_seen\n"
                "int64[] exposure_start_ns\nint64[] exposure_end_ns\nbool mapped\n"
                "int64 edge_ns\nint64 edge_error_ns\n"},
-    // Definitions of the parts of those.
+    Definition{"geometry_msgs/msg/PoseWithCovarianceStamped",
+               "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n"},
+    Definition{"diagnostic_msgs/msg/DiagnosticArray",
+               "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
+    // The following types are parts of the others.
     Definition{"diagnostic_msgs/DiagnosticStatus",
                "byte level\nstring name\nstring message\nstring hardware_id\n"
                "diagnostic_msgs/KeyValue[] values\n"},
@@ -330,27 +338,11 @@ constexpr std::array kDefinitions{
                "geometry_msgs/Transform transform\n"},
 };
 
-constexpr std::array<std::string_view, kRosTypes> kNames{
-    "sensor_msgs/msg/Image",
-    "sensor_msgs/msg/CameraInfo",
-    "sensor_msgs/msg/NavSatFix",
-    "sensor_msgs/msg/Imu",
-    "nav_msgs/msg/Odometry",
-    "tf2_msgs/msg/TFMessage",
-    "std_msgs/msg/String",
-    "vergence_msgs/msg/Frame",
-    "vergence_msgs/msg/InsReading",
-    "vergence_msgs/msg/Pulse",
-    "geometry_msgs/msg/PoseWithCovarianceStamped",
-    "diagnostic_msgs/msg/DiagnosticArray"};
-
-const Definition* find(std::string_view name) {
-  for (const Definition& d : kDefinitions)
-    if (d.name == name) return &d;
-  return nullptr;
+const Definition& find(std::string_view name) {
+  return *std::ranges::find(kDefinitions, name, &Definition::name);
 }
 
-/// Types that the lines of a definition begin with.
+/// Types of the fields of a definition.
 std::vector<std::string_view> parts(std::string_view fields) {
   std::vector<std::string_view> out;
   while (!fields.empty()) {
@@ -366,22 +358,19 @@ std::vector<std::string_view> parts(std::string_view fields) {
 }  // namespace
 
 std::string_view ros_type_name(RosType type) noexcept {
-  return kNames[static_cast<std::size_t>(type)];
+  return kDefinitions[static_cast<std::size_t>(type)].name;
 }
 
 std::string ros_definition(RosType type) {
-  std::string name(ros_type_name(type));
-  name.erase(name.find("/msg"), 4);
-  const Definition* top = find(name);
-  std::string text(top->fields);
-  std::vector<std::string_view> open = parts(top->fields);
+  const std::string_view fields = kDefinitions[static_cast<std::size_t>(type)].fields;
+  std::string text(fields);
+  std::vector<std::string_view> open = parts(fields);
   std::set<std::string_view> written;
   for (std::size_t i = 0; i < open.size(); ++i) {
     if (!written.insert(open[i]).second) continue;
-    const Definition* part = find(open[i]);
-    text += std::string(80, '=') + "\nMSG: " + std::string(part->name) + "\n";
-    text += part->fields;
-    const auto more = parts(part->fields);
+    const Definition& part = find(open[i]);
+    text += fmt::format("{:=<80}\nMSG: {}\n{}", "", part.name, part.fields);
+    const auto more = parts(part.fields);
     open.insert(open.end(), more.begin(), more.end());
   }
   return text;

@@ -27,7 +27,8 @@ namespace {
 RecordRing::RecordRing(std::size_t bytes) {
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
   capacity_ = (std::max<std::size_t>(bytes, 1) + page - 1) / page * page;
-  const FileDescriptor memory(::memfd_create("vergence-record", MFD_CLOEXEC));  // mappings keep it
+  // The mappings keep the memory.
+  const FileDescriptor memory(::memfd_create("vergence-record", MFD_CLOEXEC));
   if (!memory || ::ftruncate(memory.get(), static_cast<off_t>(capacity_)) != 0)
     fail("memory for the recording's queue");
   void* both = ::mmap(nullptr, 2 * capacity_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -74,20 +75,25 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPollInterval = 20ms;             // between two looks at the queues
-constexpr std::int64_t kMaxWaitNs = 40'000'000;  // of a message for its chunk: with a look and
-                                                 // the write it is less than 100 ms
-constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;  // half of what readers take
-constexpr std::size_t kSpare = std::size_t{1} << 20;           // of a queue, for what is not bulky
-constexpr int kNice = 5;  // poses come first; what is recorded waits in memory
+// Interval of checking the queues.
+constexpr auto kPollInterval = 20ms;
+// Maximum time that a message waits for its chunk. With the polling interval and the write it stays
+// below 100 ms.
+constexpr std::int64_t kMaxWaitNs = 40'000'000;
+// Half of the readers' limit.
+constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;
+// Space of a queue that large messages leave free.
+constexpr std::size_t kSpare = std::size_t{1} << 20;
+// Poses take precedence; recorded data wait in memory.
+constexpr int kNice = 5;
 
-/// Fill limit of a queue that is not written: a producer that does not wait finds room for an
-/// image; one that waits (`hurried`) for anything that fits at all.
+/// Fill limit of a queue while nothing is written. A producer that does not wait finds room for an
+/// image; one that waits (`hurried`) finds room for anything that fits.
 std::size_t room_left_at(const RecordRing& ring, bool hurried) noexcept {
   return hurried ? ring.capacity() / 4 : ring.capacity() / 8 * 7;
 }
 
-McapMessageHead head_of(std::span<const std::uint8_t> records) noexcept {
+McapMessageHead read_head(std::span<const std::uint8_t> records) noexcept {
   return McapMessageHead::read(records.first<McapMessageHead::kSize>());
 }
 
@@ -108,7 +114,8 @@ std::span<std::uint8_t> Recording::begin(std::size_t queue, std::size_t topic, S
                                          std::size_t most, bool bulky) noexcept {
   Queue& q = *queues_[queue];
   q.head.channel = static_cast<std::uint16_t>(topic + 1);
-  q.head.sequence = sequences_[topic]++;  // one that is dropped leaves a gap
+  // A dropped message leaves a gap in the sequence.
+  q.head.sequence = sequences_[topic]++;
   q.head.log_time = static_cast<std::uint64_t>(std::max<std::int64_t>(stamp.ns(), 0));
   const std::size_t size = McapMessageHead::kSize + most;
   const std::size_t spare = bulky ? std::min(kSpare, q.ring.capacity() / 8) : 0;
@@ -150,7 +157,7 @@ void Recording::work() noexcept {
   for (bool last = false; !last;) {
     bool hurried = false;
     {
-      // Looks by the clock: a producer that had to wake it would pay a system call a message.
+      // The thread polls, because waking it would cost the producer a system call per message.
       std::unique_lock lock(mutex_);
       (void)wake_.wait_for(lock, kPollInterval, [this] { return stop_ || hurry_; });
       last = stop_;
@@ -188,7 +195,7 @@ Recording::Batch Recording::gather() const noexcept {
     const std::span<const std::uint8_t> waiting = queues_[i]->ring.waiting();
     std::size_t at = 0;
     while (at < waiting.size()) {
-      const McapMessageHead head = head_of(waiting.subspan(at));
+      const McapMessageHead head = read_head(waiting.subspan(at));
       const std::size_t size = head.record_size();
       batch.filled = batch.messages == McapFile::kMaxMessages ||
                      (batch.bytes > 0 && batch.bytes + size > kMaxChunkBytes);
@@ -216,11 +223,11 @@ void Recording::release(const Batch& batch) noexcept {
 }
 
 void Recording::drop_oldest(RecordRing* ring) noexcept {
-  ring->release(head_of(ring->waiting()).record_size());
+  ring->release(read_head(ring->waiting()).record_size());
   counts_.lost.fetch_add(1, std::memory_order_relaxed);
 }
 
-/// While the disk takes nothing: the newest are worth more than the oldest.
+/// While the disk accepts nothing, the oldest messages are dropped in favour of new ones.
 void Recording::make_room(bool hurried) noexcept {
   for (const auto& q : queues_)
     while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring);

@@ -14,23 +14,22 @@
 namespace vergence::app {
 namespace {
 
-constexpr const char* kQosOf[] = {
-    // reliable, keep last, volatile; and for what is latched: transient local
-    "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n  deadline:\n    sec: "
-    "2147483647\n    nsec: 4294967295\n  lifespan:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "liveliness: 1\n  liveliness_lease_duration:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "avoid_ros_namespace_conventions: false\n",
-    "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n  deadline:\n    sec: "
-    "2147483647\n    nsec: 4294967295\n  lifespan:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "liveliness: 1\n  liveliness_lease_duration:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "avoid_ros_namespace_conventions: false\n"};
+/// Quality of service of a topic: reliable, and for latched topics transient local.
+std::string qos(bool latched) {
+  constexpr const char* kForever = "    sec: 2147483647\n    nsec: 4294967295\n";
+  return fmt::format(
+      "- history: 1\n  depth: {}\n  reliability: 1\n  durability: {}\n  deadline:\n{}  "
+      "lifespan:\n{}"
+      "  liveliness: 1\n  liveliness_lease_duration:\n{}  avoid_ros_namespace_conventions: false\n",
+      latched ? 1 : 10, latched ? 1 : 2, kForever, kForever, kForever);
+}
 
 std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
   std::vector<McapTopic> out;
   out.reserve(topics.size());
   for (const RecordedTopic& t : topics)
-    out.push_back({t.name, std::string(ros_type_name(t.type)), ros_definition(t.type),
-                   kQosOf[t.latched ? 1 : 0]});
+    out.push_back(
+        {t.name, std::string(ros_type_name(t.type)), ros_definition(t.type), qos(t.latched)});
   return out;
 }
 
@@ -90,7 +89,7 @@ void RecordingFiles::end_file() noexcept {
   if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
 }
 
-/// It is not tried again: the system has forgotten what it could not write.
+/// The data are not written again, because the system no longer has them.
 void RecordingFiles::record_unwritten() noexcept {
   const McapFile::Unwritten missing = file_.pop_unwritten();
   if (missing.messages == 0) return;
@@ -108,8 +107,8 @@ int RecordingFiles::open() noexcept {
   return 0;
 }
 
-/// Written before the first chunk of a file, with its time: the start of the file is unknown
-/// before. → 0
+/// Writes the preamble before the first chunk of a file, with that chunk's time. Returns 0 or an
+/// error.
 int RecordingFiles::write_preamble(std::uint64_t time) noexcept {
   for (std::span<std::uint8_t> rest(preamble_); !rest.empty();) {
     McapMessageHead head = McapMessageHead::read(rest.first<McapMessageHead::kSize>());

@@ -22,22 +22,23 @@ Enum to_enum(const std::array<const char*, N>& words, const std::string& word,
                    "\", which no version of this program writes there");
 }
 
+/// Calls each(key, value) for all members that JSON has in the same form.
+template <class Description, class Each>
+void for_each_member(Description& d, const Each& each) {
+  each("program", d.program), each("calibration", d.calibration), each("nominal", d.nominal);
+  each("cause", d.cause), each("source", d.source), each("ins", d.ins);
+  each("mount_source", d.mount_source), each("settings", d.settings), each("cameras", d.cameras);
+}
+
 }  // namespace
 
 std::string to_json(const SessionDescription& d) {
-  return nlohmann::json{{"version", SessionDescription::kVersion},
-                        {"program", d.program},
-                        {"calibration", d.calibration},
-                        {"nominal", d.nominal},
-                        {"trust", kTrust[static_cast<std::size_t>(d.trust)]},
-                        {"cause", d.cause},
-                        {"source", d.source},
-                        {"adoption", kAdoption[static_cast<std::size_t>(d.adoption)]},
-                        {"ins", d.ins},
-                        {"mount_source", d.mount_source},
-                        {"settings", d.settings},
-                        {"cameras", d.cameras}}
-      .dump(1, ' ', false, nlohmann::json::error_handler_t::replace);  // names need not be UTF-8
+  nlohmann::json json{{"version", SessionDescription::kVersion},
+                      {"trust", kTrust[static_cast<std::size_t>(d.trust)]},
+                      {"adoption", kAdoption[static_cast<std::size_t>(d.adoption)]}};
+  for_each_member(d, [&](const char* key, const auto& value) { json[key] = value; });
+  // Names need not be UTF-8.
+  return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 SessionDescription parse_session_description(std::string_view json, const std::string& name) {
@@ -50,17 +51,9 @@ SessionDescription parse_session_description(std::string_view json, const std::s
                       name, version, SessionDescription::kVersion,
                       j.value("program", "of which it says nothing")));
     SessionDescription d;
-    j.at("program").get_to(d.program);
-    j.at("calibration").get_to(d.calibration);
-    j.at("nominal").get_to(d.nominal);
+    for_each_member(d, [&](const char* key, auto& value) { j.at(key).get_to(value); });
     d.trust = to_enum<CalibrationTrust>(kTrust, j.at("trust"), name);
-    j.at("cause").get_to(d.cause);
-    j.at("source").get_to(d.source);
     d.adoption = to_enum<Adoption>(kAdoption, j.at("adoption"), name);
-    j.at("ins").get_to(d.ins);
-    j.at("mount_source").get_to(d.mount_source);
-    j.at("settings").get_to(d.settings);
-    j.at("cameras").get_to(d.cameras);
     return d;
   } catch (const nlohmann::json::exception& e) {
     throw InputError(name + ": the description of the recorded session cannot be read (" +

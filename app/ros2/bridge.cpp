@@ -17,16 +17,19 @@ namespace {
 using nlohmann::json;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double kUnknownVariance = 1e6;  // m², rad², and of speeds: a filter ignores the value
-constexpr std::size_t kImages = 2;        // cameras whose images are published
-constexpr double kLongestStep = 1;        // s between two poses that a speed is measured from
+// In m², rad² and for speeds: large enough for a filter to ignore the value.
+constexpr double kUnknownVariance = 1e6;
+// Cameras whose images are published.
+constexpr std::size_t kImages = 2;
+// Maximum time in s between two poses for a measured speed.
+constexpr double kLongestStep = 1;
 
 /// Factor on the standard deviations of a degraded pose (docs/ros2.md).
-double widening_of(std::string_view reason) {
-  // Motion that was carried on, not measured.
+double sigma_factor(std::string_view reason) {
+  // The motion was extrapolated, not measured.
   for (const std::string_view r : {"time_gap", "map_reset", "no_image"})
     if (reason == r) return 10;
-  // Lengths that stand on a calibration which is not, or not yet, that of the rig.
+  // The scale depends on a calibration that is not, or not yet, that of the rig.
   for (const std::string_view r :
        {"unverified_calibration", "recalibrating", "uncalibrated", "single_camera", "out_of_sync",
         "no_stereo_matches", "cameras_swapped"})
@@ -48,7 +51,7 @@ Transform transform(const json& rows) {
   return T;
 }
 
-/// From 21 numbers of the upper triangle; null: nothing is known.
+/// Covariance from the 21 numbers of the upper triangle; unknown if null.
 Matrix6 covariance(const json& upper) {
   Matrix6 m = kUnknownVariance * Matrix6::Identity();
   if (upper.is_null()) return m;
@@ -64,17 +67,17 @@ std::array<double, 36> items(const Matrix6& m) {
   return out;
 }
 
-/// [A B; 0 C].
+/// Returns [A B; 0 C].
 Matrix6 blocks(const Mat3& A, const Mat3& B, const Mat3& C) {
   Matrix6 m = Matrix6::Zero();
   m << A, B, Mat3::Zero(), C;
   return m;
 }
 
-/// Forward, left, up from the optical axes (right, down, forward).
+/// Axes forward, left, up from the optical axes (right, down, forward).
 Transform forward_left_up() { return mount_of(Vec3::Zero(), Vec3::Zero()); }
 
-/// The part of a topic or frame that a camera's name gives: letters, digits and underscores.
+/// Part of a topic or frame for a camera's name: letters, digits and underscores.
 std::string ros_name(std::string name) {
   for (char& c : name)
     if (!(c >= '0' && c <= '9') && !(c >= 'a' && c <= 'z') && !(c >= 'A' && c <= 'Z')) c = '_';
@@ -105,7 +108,7 @@ Bridge::Bridge(const BridgeOptions& options, TopicWriter* writer)
 
 Bridge::~Bridge() = default;
 
-/// Diagnostics have texts of any length: the buffer grows until the message fits.
+/// The buffer grows until the message fits, because texts of diagnostics have any length.
 template <class Write>
 void Bridge::publish(const std::string& topic, const Write& write) {
   for (;; buffer_.resize(2 * buffer_.size())) {
@@ -119,10 +122,10 @@ std::optional<Bridge::Response> Bridge::add(std::string_view text) {
   try {
     const json line = json::parse(text);
     if (const json& version = line.at("version"); version != kVersion)
-      throw InputError(fmt::format(
-          "pose stream: vergence sends version {}, vergence-ros2 reads version {}; install both "
-          "packages in the same version",
-          version.dump(), kVersion));
+      throw InputError(
+          fmt::format("pose stream: vergence sends version {}, vergence-ros2 reads version {}; "
+                      "install both packages in the same version",
+                      version.dump(), kVersion));
     const std::string& type = line.at("type").get_ref<const std::string&>();
     if (type == "pose") on_pose(line);
     if (type == "calibration" && text != calibration_text_) {
@@ -152,10 +155,10 @@ void Bridge::on_pose(const json& line) {
                                position};
   const PosedChild now{Stamp(line.at("stamp_ns").get<std::int64_t>()),
                        T_odom_world_ * T_world_left * T_left_child_};
-  const double factor = widening_of(line.at("reason").get_ref<const std::string&>());
+  const double factor = sigma_factor(line.at("reason").get_ref<const std::string&>());
   const double widening = factor * factor;
 
-  // A rotation of the camera about the world's axes moves the child, which lies beside it.
+  // A rotation of the camera about the world's axes also moves the child, which is offset from it.
   const Vec3 lever = T_world_left.R * T_left_child_.t;
   const Mat3& R = T_odom_world_.R;
   const Matrix6 J = blocks(Mat3::Identity(), -skew(lever), Mat3::Identity());
@@ -179,7 +182,7 @@ void Bridge::on_pose(const json& line) {
   previous_ = now;
 }
 
-/// The mean motion since the pose before, about the child's axes.
+/// Mean motion since the previous pose, about the child's axes.
 void Bridge::measure_twist(const json& line, const PosedChild& now, double widening,
                            OdometryMessage* odometry) const {
   const double dt = previous_ ? (now.stamp - previous_->stamp).to_seconds() : 0;
@@ -190,7 +193,8 @@ void Bridge::measure_twist(const json& line, const PosedChild& now, double widen
   }
   const Transform T_before_now = previous_->T_odom_child.inverse() * now.T_odom_child;
   const Vec3 turn = log_so3(T_before_now.R);
-  // The chord of an arc, seen from its middle: what a constant speed along it is, to second order.
+  // The chord of an arc in the axes at its middle is the constant velocity along it, to second
+  // order.
   odometry->linear = exp_so3(-0.5 * turn) * T_before_now.t / dt;
   odometry->angular = turn / dt;
   const Transform T_child_left = T_left_child_.inverse();
@@ -208,7 +212,7 @@ void Bridge::publish_in_enu(Stamp stamp, const Transform& T_world_left, const Ma
   const Mat3& R = alignment_->T_enu_world.R;
   const Matrix6 turn = blocks(R, Mat3::Zero(), R);
   Matrix6 P = turn * in_world * turn.transpose();
-  // The alignment turns the path about where it was fitted, near the odometry's start.
+  // The alignment rotates the path about the position of its fit, near the odometry's start.
   const Mat3 lever = skew(T_enu_child.t - alignment_->T_enu_world.t);
   P.topLeftCorner<3, 3>() += alignment_->position_variance.asDiagonal();
   P.topLeftCorner<3, 3>() += lever * alignment_->rotation_variance.asDiagonal() * lever.transpose();

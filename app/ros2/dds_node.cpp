@@ -34,15 +34,15 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 namespace {
 
-/// A message as its serialised bytes, encapsulation included.
+/// Serialised bytes of a message including the encapsulation.
 using Bytes = std::vector<std::uint8_t>;
 
-/// A type whose messages are serialised already: Fast DDS only carries their bytes.
+/// Type of serialised messages, of which Fast DDS only transports the bytes.
 class SerialisedType final : public dds::TopicDataType {
  public:
   explicit SerialisedType(const std::string& name) {
     setName(name.c_str());
-    // Bytes of a payload at first; it grows with the messages.
+    // Initial size of a payload in bytes; it grows with the messages.
     m_typeSize = 1024;
     m_isGetKeyDefined = false;
     auto_fill_type_object(false);
@@ -88,8 +88,8 @@ bool this_machine_only() {
   return is("ROS_LOCALHOST_ONLY", "1") || is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
 }
 
-/// rmw_dds_common/ParticipantEntitiesInfo of one node. `gid_bytes`: 24 in Humble, 16 later; a GUID
-/// fills the first 16.
+/// Encodes rmw_dds_common/ParticipantEntitiesInfo of one node. `gid_bytes` is 24 in Humble and 16
+/// later; a GUID fills the first 16.
 Bytes node_info(const rtps::GUID_t& participant, std::span<const rtps::GUID_t> readers,
                 std::span<const rtps::GUID_t> writers, std::size_t gid_bytes) {
   Bytes bytes(256 + (readers.size() + writers.size()) * gid_bytes);
@@ -138,8 +138,8 @@ std::string_view type_hash(RosType type) noexcept {
 
 struct DdsNode::Request {
   rtps::SampleIdentity identity{};
-  // rmw_cyclonedds: number of the client and of its request, in front of the request and, repeated,
-  // of the reply.
+  // In rmw_cyclonedds, the numbers of the client and of its request precede the request and are
+  // repeated in the reply.
   std::vector<std::uint8_t> header{};
 };
 
@@ -153,12 +153,13 @@ struct DdsNode::Parts : dds::DataReaderListener {
   int wake = -1;
   Bytes message;
 
-  // ROS node: its announcement (null: none), its endpoints.
+  // Announcement of the ROS node (null without one), and its endpoints.
   dds::DataWriter* discovery = nullptr;
   std::size_t gid_bytes = 16;
   std::vector<rtps::GUID_t> node_readers, node_writers;
 
-  std::mutex mutex;  // guards requests
+  // Guards requests.
+  std::mutex mutex;
   std::deque<std::shared_ptr<const Request>> requests;
 
   ~Parts() override {
@@ -170,10 +171,10 @@ struct DdsNode::Parts : dds::DataReaderListener {
   template <class Entity>
   Entity* required(Entity* entity, std::string_view what) const {
     if (entity == nullptr)
-      throw InputError(fmt::format(
-          "ROS_DOMAIN_ID: domain {} cannot be joined (no {}); check the network, the ports from {} "
-          "on and the Fast DDS profile",
-          domain, what, 7400 + 250 * domain));
+      throw InputError(
+          fmt::format("ROS_DOMAIN_ID: domain {} cannot be joined (no {}); check the network, the "
+                      "ports from {} on and the Fast DDS profile",
+                      domain, what, 7400 + 250 * domain));
     return entity;
   }
 
@@ -185,7 +186,7 @@ struct DdsNode::Parts : dds::DataReaderListener {
     return required(participant->create_topic(name, type_name, dds::TOPIC_QOS_DEFAULT), name);
   }
 
-  /// ROS 2's reliable quality of service with `depth` messages kept.
+  /// Reliable quality of service as in ROS 2, with `depth` messages kept.
   template <class Qos>
   static Qos reliable(bool latched, int depth, const std::string& hash) {
     Qos qos;
@@ -203,9 +204,9 @@ struct DdsNode::Parts : dds::DataReaderListener {
   dds::DataWriter* writer(const std::string& name, std::string_view type, bool latched, int depth,
                           const std::string& hash) {
     auto qos = reliable<dds::DataWriterQos>(latched, depth, hash);
-    // The caller's thread sends: the shortest way, and a datagram does not wait.
+    // The caller's thread sends, which has the lowest latency; datagrams do not block.
     qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
-    // Except of images: they would keep poses waiting.
+    // Images are sent by another thread, because poses would wait behind them.
     if (type == ros_type_name(RosType::image))
       qos.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
     return required(publisher->create_datawriter(topic(name, type), qos), name);
@@ -217,7 +218,7 @@ struct DdsNode::Parts : dds::DataReaderListener {
     discovery->write(&message);
   }
 
-  /// Fast DDS's thread.
+  /// Runs on a thread of Fast DDS.
   void on_data_available(dds::DataReader* reader) override {
     Bytes bytes;
     dds::SampleInfo info;
@@ -226,7 +227,7 @@ struct DdsNode::Parts : dds::DataReaderListener {
       constexpr std::size_t kEncapsulation = 4, kHeader = 16;
       Request request;
       request.identity = info.sample_identity;
-      // rmw_fastrtps waits for the reply with the reader that its request names, if it does.
+      // rmw_fastrtps expects the reply for the reader named in the request, if there is one.
       if (info.related_sample_identity.writer_guid() != rtps::GUID_t::unknown())
         request.identity.writer_guid() = info.related_sample_identity.writer_guid();
       if (bytes.size() >= kEncapsulation + kHeader)
@@ -247,11 +248,11 @@ DdsNode::DdsNode(std::uint32_t domain, const std::string& ros_distribution)
   factory->load_profiles();
   dds::DomainParticipantQos qos = factory->get_default_participant_qos();
   qos.name("vergence_ros2");
-  // ROS 2 counts a participant with an enclave among its own.
+  // ROS 2 recognises its participants by an enclave.
   constexpr std::string_view kEnclave = "enclave=/;";
   qos.user_data().data_vec({kEnclave.begin(), kEnclave.end()});
-  // Without a profile of the user's: UDP alone. Shared memory does not reach programs of other
-  // users, and the service has a user of its own.
+  // Without a profile of the user only UDP is used. Shared memory does not reach programs of other
+  // users, and the service has its own user.
   if (qos.transport().use_builtin_transports && qos.transport().user_transports.empty()) {
     auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
     if (this_machine_only()) udp->interfaceWhiteList.emplace_back("127.0.0.1");
@@ -274,8 +275,8 @@ DdsNode::~DdsNode() = default;
 
 void DdsNode::advertise(const std::string& topic, RosType type, bool latched) {
   dds::DataWriter*& writer = parts_->writers[topic];
-  // Depths as ROS 2 has them: 10 by default, 100 of /tf, the last one of what is latched.
-  // Two images are kept: each is large, and only the newest is of use.
+  // Depths are those of ROS 2: 10 by default, 100 for /tf, 1 for latched topics. Two images are
+  // kept, because each is large and only the newest is useful.
   const int depth = latched ? 1 : type == RosType::tf ? 100 : type == RosType::image ? 2 : 10;
   if (writer != nullptr) return;
   writer =

@@ -77,7 +77,7 @@ void declare(CLI::App* app, Options* o) {
 }
 
 void finish(Options* o) {
-  // The pose stream serves no slower rate.
+  // The pose stream does not accept a lower rate.
   if (o->image_rate_hz > 0 && o->image_rate_hz < 0.01)
     throw InputError(
         fmt::format("--image-rate-hz {:g}: must be 0 or 0.01 to 200", o->image_rate_hz));
@@ -97,9 +97,9 @@ void finish(Options* o) {
       mount_of({x[0], x[1], x[2]}, Vec3(r[0], r[1], r[2]) * (std::numbers::pi / 180));
 }
 
-/// The program's loop: the stream in, topics out, service calls across.
+/// Main loop: reads the stream, publishes topics and forwards service calls.
 ///
-/// Threads  One; Fast DDS's write to an eventfd.
+/// Threads  One. Fast DDS's threads write to an eventfd.
 class Program {
  public:
   explicit Program(const Options& options)
@@ -128,7 +128,7 @@ class Program {
         bridge_.publish_stale(wall_clock(), client_.connected() ? "no status from vergence"
                                                                 : "vergence is not running");
       }
-      // Long enough to cost nothing, short enough for a signal that comes just before poll().
+      // Long enough to cost nothing, and short enough for a signal that arrives just before poll().
       constexpr int kTimeoutMs = 200;
       std::array<pollfd, 3> events{{{client_.descriptor(), POLLIN, 0},
                                     {wake_.get(), POLLIN, 0},
@@ -178,7 +178,7 @@ class Program {
     return client_.read(on_line, {});
   }
 
-  /// Images come over a connection of their own, so that poses do not wait behind them.
+  /// Images use a separate connection, so that poses do not wait behind them.
   void request_images() {
     if (image_rate_hz_ <= 0 || images_.connected() || images_.connect() != 0) return;
     (void)images_.send(
@@ -235,7 +235,8 @@ ExitCode run(int argc, char** argv) {
   declare(&app, &options);
   try {
     app.parse(argc, argv);
-  } catch (const CLI::Success& asked) {  // --help, --version
+  } catch (const CLI::Success& asked) {
+    // These are --help and --version.
     app.exit(asked);
     return ExitCode::done;
   } catch (const CLI::ParseError& error) {

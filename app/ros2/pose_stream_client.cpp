@@ -17,8 +17,8 @@ PoseStreamClient::PoseStreamClient(std::string_view address) {
   if (address.starts_with(kUnix)) path_ = address.substr(kUnix.size());
   if (!path_.starts_with('/') || path_.size() >= sizeof(sockaddr_un::sun_path))
     throw InputError(
-        fmt::format("--socket: \"{}\" is not unix:///PATH of at most {} bytes; give "
-                    "the address of publish.pose_stream",
+        fmt::format("--socket: \"{}\" is not unix:///PATH of at most {} bytes; give the address of "
+                    "publish.pose_stream",
                     address.substr(0, 120), sizeof(sockaddr_un::sun_path) - 1));
 }
 
@@ -46,7 +46,8 @@ bool PoseStreamClient::read(const OnLine& on_line, const OnImage& on_image) {
   std::string_view rest = rest_;
   for (;;) {
     const std::size_t end = image_size_ > 0 ? image_size_ : rest.find('\n');
-    if (end > rest.size()) break;  // npos, too
+    // This includes npos.
+    if (end > rest.size()) break;
     if (image_size_ > 0) {
       image_size_ = 0;
       on_image(rest.substr(0, end));

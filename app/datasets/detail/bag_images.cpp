@@ -14,13 +14,13 @@ std::uint16_t sample_at(const std::uint8_t* row, int x, bool big_endian) noexcep
   return static_cast<std::uint16_t>(at[big_endian ? 0 : 1] << 8U | at[big_endian ? 1 : 0]);
 }
 
-/// `red`, `blue`: place of the colours in a pixel of `bytes`.
+/// `red` and `blue` are the positions of the colours in a pixel of `bytes`.
 void colour_to_grey(const std::uint8_t* row, int width, std::size_t bytes, std::size_t red,
                     std::size_t blue, std::uint8_t* out) noexcept {
   for (int x = 0; x < width; ++x, row += bytes) out[x] = luminance(row[red], row[1], row[blue]);
 }
 
-/// One row of a layout that needs no others.
+/// Converts one row of a layout that needs no neighbouring rows.
 void row_to_grey(const RosImage& image, const std::uint8_t* in, int deep_bits,
                  std::uint8_t* out) noexcept {
   const int width = image.size.width;
@@ -90,7 +90,7 @@ ImageFileStatus BagImages::size(const std::string& name, ImageSize* size) const 
 }
 
 std::shared_ptr<const std::vector<std::uint8_t>> BagImages::unpacked(const BagImage& entry) const {
-  // One at a time: who comes second for the same chunk finds it here.
+  // Threads unpack one at a time, so that a second one finds the chunk here.
   const std::lock_guard lock(mutex_);
   for (const Unpacked& u : unpacked_)
     if (u.records && u.chunk == entry.place.chunk && u.file == entry.file) return u.records;

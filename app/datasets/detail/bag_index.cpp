@@ -23,11 +23,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxFiles = 100'000;  // of a minute each: ten weeks
-constexpr std::size_t kMaxImages =
-    4'000'000;  // of all topics: a day and a half at 30 Hz, 320 MB of index
-constexpr std::size_t kMaxAttitudes = 8'000'000;  // of all topics: five hours at 400 Hz, 460 MB
-constexpr std::size_t kMaxBytes = 65536;          // of a CameraInfo and of a reading
+// Files of a minute each: ten weeks.
+constexpr std::size_t kMaxFiles = 100'000;
+// Images of all topics: a day and a half at 30 Hz, 320 MB of index.
+constexpr std::size_t kMaxImages = 4'000'000;
+// Samples of all topics: five hours at 400 Hz, 460 MB.
+constexpr std::size_t kMaxAttitudes = 8'000'000;
+// Size of a CameraInfo and of an INS sample.
+constexpr std::size_t kMaxBytes = 65536;
 
 struct Container {
   BagFormat format;
@@ -62,9 +65,8 @@ std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
   if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
   if (files.size() > kMaxFiles)
-    refuse(bag, 0,
-           fmt::format("holds {} {} files; at most {} are read", files.size(), ending, kMaxFiles));
-  // Recorders count without leading zeros: drive_2.mcap stands before drive_10.mcap.
+    refuse(bag, 0, "holds {} {} files; at most {} are read", files.size(), ending, kMaxFiles);
+  // Recorders count without leading zeros: drive_2.mcap precedes drive_10.mcap.
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return in_name_order(a.filename().string(), b.filename().string());
   });
@@ -104,9 +106,7 @@ class Indexer {
     const BagFile& file = bag_.files[file_];
     const auto scan =
         scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { read_message(m); });
-    if (!scan)
-      refuse(path_, 0,
-             fmt::format("{} is not {}", file.name, find_container(bag_.format).beginning));
+    if (!scan) refuse(path_, 0, "{} is not {}", file.name, find_container(bag_.format).beginning);
     scan->remark(file.name, &bag_.remarks);
   }
 
@@ -142,7 +142,7 @@ class Indexer {
         image && !topic.images.empty() && image->size != topic.images.front().image.size;
     if (image && !other_size) {
       if (++images_ > kMaxImages)
-        refuse(path_, 0, fmt::format("brings more than {} images; cut the bag", kMaxImages));
+        refuse(path_, 0, "brings more than {} images; cut the bag", kMaxImages);
       topic.images.push_back(
           {*image, message.log_time, message.place, static_cast<std::uint32_t>(file_)});
       return;
@@ -152,15 +152,15 @@ class Indexer {
     ++(image ? topic.left_out.other_size : topic.left_out.unreadable);
   }
 
-  /// Recorders may compress message by message, which leaves nothing of a message's own head.
+  /// Refuses recordings that are compressed message by message, because the heads of their messages
+  /// are not readable.
   void refuse_packed(std::span<const std::uint8_t> head) const {
     constexpr std::array<std::uint8_t, 4> kZstd{0x28, 0xB5, 0x2F, 0xFD};
     if (head.size() >= kZstd.size() && std::equal(kZstd.begin(), kZstd.end(), head.begin()))
-      refuse(
-          path_, 0,
-          "has messages that are compressed one by one (compression_mode: MESSAGE), which is not "
-          "read: unpack them with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml has "
-          "`output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
+      refuse(path_, 0,
+             "has messages that are compressed one by one (compression_mode: MESSAGE), which is "
+             "not read: unpack them with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml has "
+             "`output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
   }
 
   void read_info(const BagMessage& message) {
@@ -181,13 +181,13 @@ class Indexer {
     constexpr bool kAttitude = std::is_same_v<Reading, RosAttitude>;
     constexpr std::size_t kMax = kAttitude ? kMaxAttitudes : kMaxReadings;
     if (++(kAttitude ? attitudes_ : readings_) > kMax)
-      refuse(path_, 0,
-             fmt::format("brings more than {} {}; cut the bag", kMax,
-                         kAttitude ? "orientations" : "readings of an INS"));
+      refuse(path_, 0, "brings more than {} {}; cut the bag", kMax,
+             kAttitude ? "orientations" : "readings of an INS");
     topic->readings.push_back(*reading);
   }
 
-  /// Drivers that set no stamp leave 0: the time of recording less the topic's usual delay.
+  /// Replaces stamps of 0, which some drivers write, by the recording time minus the topic's usual
+  /// delay.
   static void replace_zero_stamps(ImageTopic* topic) {
     std::vector<std::int64_t> delays;
     for (const BagImage& image : topic->images)
@@ -196,8 +196,8 @@ class Indexer {
             !__builtin_sub_overflow(image.log_time, image.image.stamp.ns(), &delay))
           delays.push_back(delay);
     std::int64_t usual = 0;
-    constexpr std::int64_t kLongestDelay =
-        10'000'000'000;  // ns: else the clocks are different ones
+    // In ns. A longer delay means that the clocks differ.
+    constexpr std::int64_t kLongestDelay = 10'000'000'000;
     if (!delays.empty()) usual = median(std::span(delays));
     if (std::abs(usual) >= kLongestDelay) usual = 0;
     for (BagImage& image : topic->images) {
@@ -207,7 +207,7 @@ class Indexer {
     }
   }
 
-  /// Leaves out the images whose stamps do not go forward.
+  /// Drops the images whose stamps do not increase.
   void put_in_order(ImageTopic* topic) {
     replace_zero_stamps(topic);
     std::vector<Stamp> stamps;
@@ -230,7 +230,8 @@ class Indexer {
 
   const fs::path& path_;
   BagIndex bag_{};
-  std::size_t file_ = 0;  // in hand
+  // Index of the file that is being scanned.
+  std::size_t file_ = 0;
   std::size_t images_ = 0, readings_ = 0, attitudes_ = 0;
 };
 

@@ -9,7 +9,8 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr Duration kMaxGap = Duration::milliseconds(100);  // between two orientations
+// Maximum distance of two orientations that are interpolated.
+constexpr Duration kMaxGap = Duration::milliseconds(100);
 
 template <typename Topics>
 std::vector<std::string> usable(const Topics& topics) {
@@ -20,9 +21,7 @@ std::vector<std::string> usable(const Topics& topics) {
 }
 
 std::string joined(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list.empty() ? "none" : list;
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 template <typename Reading>
@@ -58,8 +57,8 @@ InsRecord to_reading(const RosFix& fix, std::size_t number) {
   return r;
 }
 
-/// Orientation at the fix's time from those around it; *next: the first that is not before, of the
-/// fix before on entry. False: none is near.
+/// Interpolates the orientation at the fix's time. *next is the index of the first orientation that
+/// is not before the previous fix, and is advanced to this one. Returns false if none is near.
 bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, InsRecord* r) {
   const Stamp stamp = r->sample.stamp;
   while (*next < attitudes.size() && attitudes[*next].stamp < stamp) ++*next;
@@ -80,7 +79,7 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, I
   return true;
 }
 
-void print_without_fix(const std::string& name, RecordedIns* ins) {
+void remark_without_fix(const std::string& name, RecordedIns* ins) {
   const auto without =
       std::count_if(ins->readings.begin(), ins->readings.end(), [](const InsRecord& r) {
         return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
@@ -91,8 +90,8 @@ void print_without_fix(const std::string& name, RecordedIns* ins) {
                     ins->readings.size()));
 }
 
-RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
-                     const std::string& imu, const std::vector<RosAttitude>& attitudes) {
+RecordedIns combine(const std::string& name, const std::vector<RosFix>& fixes,
+                    const std::string& imu, const std::vector<RosAttitude>& attitudes) {
   RecordedIns ins;
   ins.readings.reserve(fixes.size());
   std::size_t next = 0, without = 0;
@@ -101,7 +100,7 @@ RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
     if (!attitude_at(attitudes, &next, &r)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
-  print_without_fix(name, &ins);
+  remark_without_fix(name, &ins);
   if (without > 0)
     ins.remarks.push_back(
         fmt::format("{}: {} fixes have no orientation of {} within {} ms around them: nothing is "
@@ -114,9 +113,9 @@ void require(const std::filesystem::path& path, const BagIndex& bag, const std::
              const std::string& requested, const std::vector<std::string>& there) {
   if (requested.empty() || std::find(there.begin(), there.end(), requested) != there.end()) return;
   refuse(path, 0,
-         fmt::format("has no reading on {} that can be used as {} says; of NavSatFix are {}, of "
-                     "Imu with an orientation {}",
-                     requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes))));
+         "has no reading on {} that can be used as {} says; of NavSatFix are {}, of Imu with an "
+         "orientation {}",
+         requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes)));
 }
 
 }  // namespace
@@ -133,16 +132,16 @@ RecordedIns bag_ins(const std::filesystem::path& path, const BagIndex& bag,
   RecordedIns ins;
   if (fix.empty() && fixes.empty()) return ins;
   if (!fix.empty() && !imu.empty()) {
-    ins = of_fixes(fix, bag.fixes.at(fix).readings, imu, bag.attitudes.at(imu).readings);
+    ins = combine(fix, bag.fixes.at(fix).readings, imu, bag.attitudes.at(imu).readings);
     remark_left_out(imu, bag.attitudes.at(imu), &ins.remarks);
   } else if (!fix.empty() && imus.empty()) {
     ins.remarks.push_back("the NavSatFix of " + fix +
                           " has no matching Imu orientation: nothing can be compared");
   } else {
-    ins.remarks.push_back(fmt::format(
-        "several topics could be the INS, nothing is compared; choose with --ins-topic and "
-        "--imu-topic; topics of NavSatFix: {}; of Imu with an orientation: {}",
-        joined(fixes), joined(imus)));
+    ins.remarks.push_back(
+        fmt::format("several topics could be the INS, nothing is compared; choose with --ins-topic "
+                    "and --imu-topic; topics of NavSatFix: {}; of Imu with an orientation: {}",
+                    joined(fixes), joined(imus)));
   }
   if (!fix.empty()) remark_left_out(fix, bag.fixes.at(fix), &ins.remarks);
   return ins;

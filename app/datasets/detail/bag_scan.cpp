@@ -50,7 +50,8 @@ std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file, const 
 
 bool unpack_chunk(BagFormat format, const ByteSource& file, std::uint64_t offset,
                   std::vector<std::uint8_t>* records) {
-  if (format == BagFormat::sqlite) return false;  // it has no chunks
+  // SQLite bags have no chunks.
+  if (format == BagFormat::sqlite) return false;
   return format == BagFormat::mcap ? unpack_mcap_chunk(file, offset, records)
                                    : unpack_rosbag_chunk(file, offset, records);
 }

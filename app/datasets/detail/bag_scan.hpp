@@ -114,9 +114,4 @@ struct BagScan {
 [[nodiscard]] bool unpack_rosbag_chunk(const ByteSource& file, std::uint64_t offset,
                                        std::vector<std::uint8_t>* records);
 
-/// Decompresses `packed` by the method `name` ("zstd", "lz4", "bz2") into exactly `records.size()`
-/// bytes; false if that fails.
-[[nodiscard]] bool decompress(std::string_view name, std::span<const std::uint8_t> packed,
-                              std::span<std::uint8_t> records) noexcept;
-
 }  // namespace vergence::app::detail

@@ -6,10 +6,11 @@
 namespace vergence::app::detail {
 namespace {
 
-// Where things stand: the file header of 14 bytes, then the information header.
+// Offsets of the fields: the file header has 14 bytes, the information header follows.
 constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28,
                       kCompression = 30, kColours = 46;
-constexpr std::size_t kBmpHead = 26;  // bytes up to the end of the size
+// Size of the header up to the image size, in bytes.
+constexpr std::size_t kBmpHead = 26;
 constexpr std::size_t kFileHeader = 14, kMinHeader = 40, kWholeHead = kFileHeader + kMinHeader;
 
 std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
@@ -19,9 +20,9 @@ std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
   return u16(b, at) | u16(b, at + 2) << 16U;
 }
 
-/// A negative height says that the first row is the top one.
+/// A negative height means that the first row is the top one.
 bool top_down(ImageBytes b) noexcept { return (u32(b, kHeight) & 0x80000000U) != 0; }
-/// Rows of pixels. With bit fields, 32 bits are blue, green, red as everywhere.
+/// True for uncompressed rows. With bit fields, 32 bits are blue, green, red as usual.
 bool is_plain(ImageBytes b) noexcept {
   constexpr std::uint32_t kBitFields = 3;
   return u32(b, kCompression) == 0 || (u32(b, kCompression) == kBitFields && u16(b, kBits) == 32);
@@ -30,7 +31,7 @@ std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
   return (std::size_t{width} * bits + 31) / 32 * 4;
 }
 
-/// The grey value of one pixel (blue, green, red).
+/// Grey value of one pixel (blue, green, red).
 std::uint8_t to_grey(const std::uint8_t* bgr) noexcept { return luminance(bgr[2], bgr[1], bgr[0]); }
 
 /// Grey levels of the palette's indices; without a palette the indices are grey levels.
@@ -53,7 +54,8 @@ bool is_bmp(ImageBytes bytes) noexcept {
 ImageFileStatus bmp_size(ImageBytes b, ImageSize* size) noexcept {
   if (b.size() < kBmpHead) return ImageFileStatus::truncated;
   if (u32(b, kHeaderSize) < kMinHeader)
-    return ImageFileStatus::not_an_image;  // an older kind, or no BMP at all
+    // This is an older kind, or no BMP.
+    return ImageFileStatus::not_an_image;
   const std::uint32_t width = u32(b, kWidth),
                       height = top_down(b) ? 0U - u32(b, kHeight) : u32(b, kHeight);
   return accept_size(width, height, size);
@@ -63,7 +65,8 @@ ImageFileStatus check_bmp(ImageBytes b) noexcept {
   ImageSize size;
   if (const auto status = bmp_size(b, &size); status != ImageFileStatus::ok) return status;
   if (b.size() < kWholeHead) return ImageFileStatus::truncated;
-  if (!is_plain(b) || u16(b, kBits) > 32) return ImageFileStatus::ok;  // the decoder refuses it
+  // The decoder refuses these kinds.
+  if (!is_plain(b) || u16(b, kBits) > 32) return ImageFileStatus::ok;
   const std::size_t pixels = u32(b, kPixelsAt);
   const std::size_t needed = row_bytes(static_cast<std::uint32_t>(size.width), u16(b, kBits)) *
                              static_cast<std::size_t>(size.height);

@@ -14,8 +14,8 @@
 namespace vergence::app::detail {
 namespace {
 
-/// The file that a thread read last stays open: there may be more of them than a process may have.
-/// → −1: it cannot be opened.
+/// Returns the descriptor of the file; −1 if it cannot be opened. A thread keeps only its last file
+/// open, because there may be more files than a process may open.
 int opened(std::uint64_t number, const std::filesystem::path& file) noexcept {
   struct Last {
     std::uint64_t number = 0;

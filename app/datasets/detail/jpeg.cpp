@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <csetjmp>
-#include <cstdio>  // jpeglib.h leans on it
+#include <cstdio>
 
 #include <jpeglib.h>
 
@@ -11,17 +11,19 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr int kMaxScans = 100;  // a progressive image has ten; each costs a pass over all of it
+// Progressive images have ten scans; each costs a pass over the whole image.
+constexpr int kMaxScans = 100;
 
 std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
   return (std::uint32_t{b[at]} << 8U) | b[at + 1];
 }
 
-bool is_frame_header(std::uint8_t marker) noexcept {  // SOF0 … SOF15 without DHT, JPG, DAC
+// Frame headers are SOF0 to SOF15 without DHT, JPG and DAC.
+bool is_frame_header(std::uint8_t marker) noexcept {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }
 
-/// libjpeg's error handler and progress monitor, and where they leave to.
+/// State of libjpeg's error handler and progress monitor, and the point to which they jump.
 struct Decoder {
   jpeg_decompress_struct jpeg{};
   jpeg_error_mgr errors{};
@@ -34,7 +36,7 @@ Decoder* decoder_of(j_common_ptr jpeg) noexcept { return static_cast<Decoder*>(j
 
 [[noreturn]] void fail(j_common_ptr jpeg) { std::longjmp(decoder_of(jpeg)->leave, 1); }
 
-/// The decoder goes on after these with grey blocks, or blocks in the wrong place.
+/// After these warnings the decoder continues with grey or misplaced blocks.
 bool is_damage(int code) noexcept {
   switch (code) {
     case JWRN_HIT_MARKER:
@@ -60,7 +62,7 @@ void count_scans(j_common_ptr jpeg) {
   if (decoder_of(jpeg)->jpeg.input_scan_number > kMaxScans) fail(jpeg);
 }
 
-/// Between setjmp and the handlers' longjmp nothing may stand that has a destructor.
+/// No object with a destructor may be created between setjmp and the handlers' longjmp.
 bool read_rows(Decoder* d, ImageBytes bytes, ImageSize size, std::uint8_t* out,
                std::size_t stride) noexcept {
   if (setjmp(d->leave) != 0) return false;
@@ -92,7 +94,8 @@ ImageFileStatus jpeg_size(ImageBytes b, ImageSize* size) noexcept {
   std::size_t at = 2;
   while (at + 9 <= b.size()) {
     if (b[at] != 0xff) return ImageFileStatus::truncated;
-    if (b[at + 1] == 0xff) {  // fill byte
+    if (b[at + 1] == 0xff) {
+      // This is a fill byte.
       ++at;
       continue;
     }
@@ -113,7 +116,8 @@ ImageFileStatus decode_jpeg(ImageBytes bytes, ImageSize size, std::uint8_t* out,
                             DeepSamples* /*deep*/) noexcept {
   Decoder decoder;
   decoder.jpeg.err = jpeg_std_error(&decoder.errors);
-  decoder.jpeg.client_data = &decoder;  // jpeg_create_decompress() keeps it
+  // jpeg_create_decompress() keeps this pointer.
+  decoder.jpeg.client_data = &decoder;
   decoder.errors.error_exit = fail;
   decoder.errors.emit_message = listen;
   decoder.progress.progress_monitor = count_scans;

@@ -2,17 +2,18 @@
 
 #include <algorithm>
 #include <map>
+#include <sstream>
 
 namespace vergence::app::detail {
 namespace {
 
 struct Sides {
-  std::string_view left, right;
+  std::string left, right;
 };
-/// Words for left and right in turns. Those that say more stand first: `left/cam0` is left by
-/// `left`. The last are those of images in one folder: frame 12 is `000012_0.png` and
+/// Words for left and right in turns, the more specific ones first: `left/cam0` is left because of
+/// `left`. The last ones are for images in one directory: frame 12 is `000012_0.png` and
 /// `000012_1.png`.
-constexpr std::string_view kSides =
+constexpr const char* kSides =
     "left right infrared_1 infrared_2 infra1 infra2 infra_1 infra_2 fisheye1 fisheye2 cam0 cam1 "
     "cam_0 cam_1 cam00 cam01 camera0 camera1 camera_0 camera_1 image_0 image_1 image_00 image_01 "
     "image0 image1 image_2 image_3 image_02 image_03 img0 img1 cam1 cam2 cam_1 cam_2 camera1 "
@@ -22,35 +23,28 @@ constexpr std::string_view kSides =
 
 std::vector<Sides> all_sides() {
   std::vector<Sides> all;
-  for (std::string_view rest = kSides; !rest.empty();) {
-    const auto take = [&rest] {
-      const std::string_view word = rest.substr(0, rest.find(' '));
-      rest.remove_prefix(std::min(word.size() + 1, rest.size()));
-      return word;
-    };
-    const std::string_view left = take();
-    all.push_back({left, take()});
-  }
+  std::istringstream words(kSides);
+  for (Sides sides; words >> sides.left >> sides.right;) all.push_back(sides);
   return all;
 }
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return c >= 'a' && c <= 'z'; }
 
-/// True if `word` stands at `at` of a name in small letters as a word of its own: a number is
-/// whole, and a word of one letter has no letter beside it.
+/// True if `word` at position `at` of a lower-case name is a separate word: a number is complete,
+/// and a word of one letter has no letter next to it.
 bool stands_alone(std::string_view name, std::size_t at, std::string_view word) {
   const char before = at > 0 ? name[at - 1] : '/';
   const char after = at + word.size() < name.size() ? name[at + word.size()] : '/';
   if (is_digit(word.back()) && is_digit(after)) return false;
   if (is_digit(word.front()) && is_digit(before)) return false;
   const bool whole = word.size() > 3 || !is_letter(before);
-  // One letter before a number names a side only where a file's name begins with it: `L0012.png`.
+  // One letter before a number is a side only at the beginning of a file name: `L0012.png`.
   return whole && (word.size() > 2 || (!is_letter(after) && !is_letter(before) &&
                                        (is_digit(word.back()) || !is_digit(after) || at == 0)));
 }
 
-/// The name with `from` replaced by `to` wherever it stands; nothing: it does not.
+/// The name with `from` replaced by `to` wherever it occurs; empty if it does not occur.
 std::optional<std::string> replaced(std::string name, std::string_view from, std::string_view to) {
   bool any = false;
   for (std::size_t at = name.find(from); at != std::string::npos;) {
@@ -62,7 +56,7 @@ std::optional<std::string> replaced(std::string name, std::string_view from, std
   return any ? std::optional(std::move(name)) : std::nullopt;
 }
 
-/// Takes a run of digits, or one other character, off the front of *text.
+/// Removes and returns a run of digits, or one other character, from the front of *text.
 std::string_view take(std::string_view* text) noexcept {
   const std::size_t digits = std::min(text->find_first_not_of("0123456789"), text->size());
   const std::string_view part = text->substr(0, std::max<std::size_t>(digits, 1));
@@ -70,7 +64,7 @@ std::string_view take(std::string_view* text) noexcept {
   return part;
 }
 
-/// A run of digits without its leading zeros; another character as it is.
+/// A run of digits without its leading zeros; other characters unchanged.
 std::string_view value_of(std::string_view part) noexcept {
   return part.substr(std::min(part.find_first_not_of('0'), part.size()));
 }
@@ -81,9 +75,7 @@ bool in_name_order(std::string_view a, std::string_view b) noexcept {
   std::string_view rest_a = a, rest_b = b;
   while (!rest_a.empty() && !rest_b.empty()) {
     const std::string_view value_a = value_of(take(&rest_a)), value_b = value_of(take(&rest_b));
-    const auto is_number = [](std::string_view v) {
-      return v.empty() || (v.front() >= '0' && v.front() <= '9');
-    };
+    const auto is_number = [](std::string_view v) { return v.empty() || is_digit(v.front()); };
     if (is_number(value_a) && is_number(value_b) && value_a.size() != value_b.size())
       return value_a.size() < value_b.size();
     if (value_a != value_b) return value_a < value_b;
@@ -101,7 +93,8 @@ std::string lower(std::string_view text) {
 }
 
 std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::string>& names) {
-  std::map<std::string, std::string> there;  // by small letters
+  // Names by their lower-case form.
+  std::map<std::string, std::string> there;
   for (const std::string& name : names) there.emplace(lower(name), name);
   std::vector<std::array<std::string, 2>> pairs;
   for (const Sides& sides : all_sides()) {
@@ -132,12 +125,13 @@ std::array<std::string, 2> side_names(const std::vector<std::string>& files) {
                  right = replaced(small, sides.right, "").has_value();
       if (left != right) ++of[left ? 0 : 1];
     }
-    // A folder of one camera has some names that look like sides, too, and numbers say least.
+    // A directory of one camera also has some names that look like sides. Numbers are the weakest
+    // evidence.
     if (std::min(of[0], of[1]) <= most || 10 * (of[0] + of[1]) < 9 * files.size() ||
         (is_digit(sides.left[0]) && (most > 0 || files.size() < 3)))
       continue;
     most = std::min(of[0], of[1]);
-    best = {std::string(sides.left), std::string(sides.right)};
+    best = {sides.left, sides.right};
   }
   return best;
 }

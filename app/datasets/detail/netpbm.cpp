@@ -6,13 +6,17 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr std::size_t kNetpbmHead = 4096;  // bytes in which the header ends, comments included
+// The header ends within this many bytes, comments included.
+constexpr std::size_t kNetpbmHead = 4096;
 
 struct Header {
   ImageSize size{};
-  std::uint32_t largest = 0;  // sample
-  std::size_t samples = 1;    // of a pixel
-  std::size_t begin = 0;      // of the pixels
+  // Maximum sample.
+  std::uint32_t largest = 0;
+  // Samples per pixel.
+  std::size_t samples = 1;
+  // Offset of the pixels.
+  std::size_t begin = 0;
   [[nodiscard]] std::size_t bytes_a_sample() const { return largest > 255 ? 2 : 1; }
   [[nodiscard]] std::size_t row() const {
     return static_cast<std::size_t>(size.width) * samples * bytes_a_sample();
@@ -21,7 +25,8 @@ struct Header {
 
 bool is_blank(std::uint8_t c) noexcept { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-/// Three whole numbers after the two letters, between them blanks and comments, then one blank.
+/// Reads three integers after the two letters. They are separated by blanks and comments, and one
+/// blank follows them.
 ImageFileStatus read_header(ImageBytes bytes, Header* header) noexcept {
   std::array<std::uint32_t, 3> numbers{};
   std::size_t at = 2;
@@ -82,7 +87,8 @@ ImageFileStatus decode_netpbm(ImageBytes bytes, ImageSize /*size*/, std::uint8_t
     for (std::size_t x = 0; x < width; ++x) {
       const std::uint8_t* pixel = in + x * header.samples * step;
       if (header.samples == 3) {
-        out[x] = luminance(pixel[0], pixel[step], pixel[2 * step]);  // of the upper 8 bits
+        // The upper 8 bits of deep samples are used.
+        out[x] = luminance(pixel[0], pixel[step], pixel[2 * step]);
       } else if (step == 2) {
         const auto sample = static_cast<std::uint16_t>(pixel[0] << 8U | pixel[1]);
         deep->peak = std::max(deep->peak, sample);

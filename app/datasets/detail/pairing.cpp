@@ -12,7 +12,7 @@
 namespace vergence::app::detail {
 namespace {
 
-/// At most what 64 bits hold: the stamps are whatever a file says.
+/// Distance of two stamps, limited to 64 bits because files may have arbitrary stamps.
 std::int64_t apart(Stamp a, Stamp b) {
   const auto later = static_cast<std::uint64_t>(std::max(a, b).ns()),
              earlier = static_cast<std::uint64_t>(std::min(a, b).ns());
@@ -20,7 +20,7 @@ std::int64_t apart(Stamp a, Stamp b) {
   return static_cast<std::int64_t>(std::min(later - earlier, kMax));
 }
 
-/// Stamps by time, whatever their order.
+/// Stamps ordered by time.
 class Sorted {
  public:
   explicit Sorted(std::span<const Stamp> stamps) : stamps_(stamps), order_(stamps.size()) {
@@ -28,7 +28,7 @@ class Sorted {
     std::stable_sort(order_.begin(), order_.end(),
                      [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
   }
-  /// Index of the nearest; the earlier of two. Precondition: there is one.
+  /// Index of the nearest stamp; the earlier one of two. Precondition: there is one.
   [[nodiscard]] std::size_t nearest(Stamp to) const {
     const auto after = std::lower_bound(order_.begin(), order_.end(), to,
                                         [&](std::size_t i, Stamp s) { return stamps_[i] < s; });
@@ -100,7 +100,8 @@ std::string describe(const PairOffset& offset) {
 
 bool is_suspicious(const PairOffset& offset, Duration interval) {
   constexpr Duration kSuspicious = Duration::milliseconds(5);
-  constexpr double kSuspiciousShare = 0.1;  // of the interval
+  // Share of the interval.
+  constexpr double kSuspiciousShare = 0.1;
   const Duration far = std::max({offset.median, -offset.median, offset.farthest});
   return far > kSuspicious || far.to_seconds() > kSuspiciousShare * interval.to_seconds();
 }
@@ -121,7 +122,8 @@ std::vector<std::size_t> ascending(std::span<const Stamp> stamps) {
     before[i] = place == ends.begin() ? i : *(place - 1);
     if (place == ends.end())
       ends.push_back(i);
-    else if (stamps[i] < stamps[*place])  // of equal ones the first stays
+    else if (stamps[i] < stamps[*place])
+      // The first of equal stamps stays.
       *place = i;
   }
   std::vector<std::size_t> kept(ends.size());

@@ -10,7 +10,8 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr std::size_t kPngHead = 33;  // bytes of the signature and the whole IHDR chunk
+// Size of the signature and the whole IHDR chunk, in bytes.
+constexpr std::size_t kPngHead = 33;
 constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
 std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
@@ -33,7 +34,7 @@ void read_on(png_structp png, png_bytep to, std::size_t n) {
 [[noreturn]] void fail(png_structp png, png_const_charp /*what*/) { png_longjmp(png, 1); }
 void ignore(png_structp /*png*/, png_const_charp /*what*/) noexcept {}
 
-/// libpng's two structures, released together.
+/// The two structures of libpng, which are released together.
 struct Reader {
   png_structp png = nullptr;
   png_infop info = nullptr;
@@ -46,7 +47,7 @@ struct Reader {
   Reader& operator=(const Reader&) = delete;
 };
 
-/// A row of 16-bit grey, big endian, to 8 bits in its place.
+/// Converts a row of big-endian 16-bit grey to 8 bits in place.
 void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
   if (row->bit_depth != 16) return;
   auto* deep = static_cast<DeepSamples*>(png_get_user_transform_ptr(png));
@@ -57,7 +58,7 @@ void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
   }
 }
 
-/// Everything to 8-bit grey.
+/// Requests the conversion to 8-bit grey.
 void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
   const int colours = png_get_color_type(png, info), depth = png_get_bit_depth(png, info);
   if (depth == 16 && (colours & PNG_COLOR_MASK_COLOR) != 0) {
@@ -74,8 +75,8 @@ void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
     png_set_expand_gray_1_2_4_to_8(png);
 }
 
-/// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the
-/// caller's.
+/// No object with a destructor may be created between setjmp and libpng's longjmp, so all of them
+/// are the caller's.
 bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_t* out,
                std::size_t stride, DeepSamples* deep) noexcept {
   png_structp png = reader.png;
@@ -96,7 +97,8 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
     return false;
   for (int pass = 0; pass < passes; ++pass)
     for (std::uint32_t y = 0; y < height; ++y) png_read_row(png, out + y * stride, nullptr);
-  png_read_end(png, nullptr);  // with the last check sums
+  // This also verifies the last checksums.
+  png_read_end(png, nullptr);
   return true;
 }
 
@@ -112,14 +114,16 @@ ImageFileStatus png_size(ImageBytes b, ImageSize* size) noexcept {
 }
 
 bool is_deep_png(ImageBytes b) noexcept {
-  constexpr std::size_t kDepthAt = 24;  // of the header
+  // Offset of the bit depth in the header.
+  constexpr std::size_t kDepthAt = 24;
   return b.size() > kDepthAt && b[kDepthAt] == 16;
 }
 
 ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
                            DeepSamples* deep) noexcept {
   const Reader reader;
-  if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
+  // libpng had no memory.
+  if (reader.info == nullptr) return ImageFileStatus::undecodable;
   Source source{bytes};
   return read_rows(reader, &source, size, out, stride, deep) ? ImageFileStatus::ok
                                                              : ImageFileStatus::truncated;

@@ -7,10 +7,12 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr double kUnitLength = 1e-2;     // what a quaternion's length may differ from 1 by
-constexpr double kUnknownHeight = 1000;  // m: sigma of a height that is not measured
+// Tolerance of a quaternion's length.
+constexpr double kUnitLength = 1e-2;
+// Standard deviation in m of a height that is not measured.
+constexpr double kUnknownHeight = 1000;
 
-/// From the variances of two axes, or of one twice.
+/// Standard deviation from the variances of two axes, or of one axis twice.
 double sigma(double a, double b) noexcept {
   const double variance = (a + b) / 2;
   return a >= 0 && b >= 0 && variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : 0;
@@ -30,12 +32,16 @@ std::optional<RosFix> read_ros_fix(std::span<const std::uint8_t> message,
   RosReader in(message, encoding);
   RosFix fix;
   fix.stamp = in.header();
-  const auto status = in.get<std::int8_t>();  // −1 no fix, 0 fix, 1 and 2 with corrections
-  (void)in.get<std::uint16_t>();              // of which systems
+  // −1 is no fix, 0 a fix, 1 and 2 a fix with corrections.
+  const auto status = in.get<std::int8_t>();
+  // The satellite systems are skipped.
+  (void)in.get<std::uint16_t>();
   fix.position.latitude_deg = in.get<double>();
   fix.position.longitude_deg = in.get<double>();
-  fix.position.height_m = in.get<double>();  // above the ellipsoid; NaN: not known
-  const auto covariance = in.doubles<9>();   // m², east, north, up
+  // Height above the ellipsoid; NaN if unknown.
+  fix.position.height_m = in.get<double>();
+  // In m²: east, north, up.
+  const auto covariance = in.doubles<9>();
   const auto covariance_type = in.get<std::uint8_t>();
   if (!in.ok()) return std::nullopt;
   fix.status = static_cast<std::uint8_t>(status);
@@ -63,7 +69,8 @@ std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> messa
   RosAttitude attitude;
   attitude.stamp = in.header();
   attitude.q_world_body = in.doubles<4>();
-  const auto covariance = in.doubles<9>();  // rad², about x, y, z; first −1: no orientation
+  // In rad² about x, y, z; the first is −1 without an orientation.
+  const auto covariance = in.doubles<9>();
   if (!in.ok() || covariance[0] < 0 || !make_unit(&attitude.q_world_body)) return std::nullopt;
   attitude.tilt_sigma = sigma(covariance[0], covariance[4]);
   attitude.heading_sigma = sigma(covariance[8], covariance[8]);

@@ -14,9 +14,11 @@ namespace {
 constexpr std::uint32_t kMaxCoefficients = 64;
 
 struct Encodings {
-  std::string_view names;  // in small letters: drivers write them in any
+  // Names in lower case, because drivers write them in either.
+  std::string_view names;
   PixelLayout layout;
-  std::uint32_t bytes;  // a pixel
+  // Bytes per pixel.
+  std::uint32_t bytes;
 };
 constexpr std::array kEncodings{
     Encodings{" mono8 8uc1 i420 yuv420 yuv422p nv12 nv21 nv24 ", PixelLayout::grey, 1},
@@ -80,7 +82,8 @@ std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> 
   RosReader in(head, encoding);
   RosImage image;
   image.stamp = in.header();
-  const std::string format = in.text();  // PNG or JPEG: the bytes tell it better
+  // The format is only used to detect mosaics, because the data identify PNG and JPEG.
+  const std::string format = in.text();
   if (name != nullptr) *name = format.substr(0, 40);
   image.layout = is_mosaic(format) ? PixelLayout::encoded_bayer : PixelLayout::encoded;
   image.bytes = in.get<std::uint32_t>();

@@ -12,7 +12,8 @@ RosReader::RosReader(std::span<const std::uint8_t> bytes, MessageEncoding encodi
 }
 
 std::string RosReader::text() {
-  const auto length = get<std::uint32_t>();  // of CDR with the 0 at its end
+  // In CDR the length includes the final 0.
+  const auto length = get<std::uint32_t>();
   if (!ok_ || length > bytes_.size() - at_) {
     ok_ = false;
     return "";
@@ -23,7 +24,8 @@ std::string RosReader::text() {
 }
 
 Stamp RosReader::header() {
-  if (!cdr_) (void)get<std::uint32_t>();  // the publisher's count
+  // ROS 1 headers begin with the publisher's sequence number.
+  if (!cdr_) (void)get<std::uint32_t>();
   // Seconds are signed in ROS 2 and unsigned in ROS 1.
   const auto seconds = get<std::uint32_t>();
   const auto ns = get<std::uint32_t>();

@@ -11,9 +11,10 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr unsigned kRowBits = 32;  // below them the offset in a row's bytes
+// The lower bits are the offset in a row's bytes, the upper ones the row.
+constexpr unsigned kRowBits = 32;
 
-/// A file's name as SQLite's URI has it.
+/// File name as a URI of SQLite.
 std::string to_uri(const std::filesystem::path& file) {
   constexpr std::string_view kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-";
@@ -26,7 +27,7 @@ std::string to_uri(const std::filesystem::path& file) {
     else
       uri.append({'%', kHex[byte >> 4U], kHex[byte & 15U]});
   }
-  // Without a log of writes nothing beside the file is needed, and nothing is written there.
+  // Without a write-ahead log no file next to it is needed, and none is written.
   std::error_code ignored;
   const auto log = std::filesystem::file_size(file.string() + "-wal", ignored);
   return uri + (ignored || log == 0 ? "?mode=ro&immutable=1" : "?mode=ro");
@@ -43,7 +44,7 @@ class Statement {
   Statement& operator=(const Statement&) = delete;
 
   [[nodiscard]] bool ok() const noexcept { return statement_ != nullptr; }
-  /// SQLITE_ROW, SQLITE_DONE, or what is wrong.
+  /// Returns SQLITE_ROW, SQLITE_DONE or an error.
   [[nodiscard]] int step() noexcept { return sqlite3_step(statement_); }
   [[nodiscard]] std::int64_t integer(int column) noexcept {
     return sqlite3_column_int64(statement_, column);
