@@ -15,7 +15,6 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
-#include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
@@ -38,14 +37,9 @@
 namespace vergence::bench {
 namespace {
 
-using app::StartingCalibration;
-using app::StereoSequence;
-using calibration::RigSolution;
-using calibration::SegmentSolver;
-using test::drive_recorded;
-using test::DriveOutcome;
-using test::RecordedSequence;
-using test::with_right_turned;
+using namespace app;
+using namespace calibration;
+using namespace test;
 
 void print(const std::string& drive_name, const std::string& what, const DriveOutcome& r) {
   fmt::print(
@@ -187,10 +181,8 @@ void rendered_stretches(const app::Configuration& c) {
   test::RenderedDriveOptions o;
   o.from_s = 20;
   test::RenderedDrive rendered(o);
-  EstimatorOptions options;
-  options.odometry = c.odometry;
-  options.calibration = c.calibration;
-  options.monitor = c.monitor;
+  EstimatorOptions options{
+      .odometry = c.odometry, .calibration = c.calibration, .monitor = c.monitor};
   const auto features = static_cast<std::size_t>(c.odometry.features);
   Arena arena;
   app::ThreadRunner two;

@@ -33,7 +33,8 @@
 namespace vergence::bench {
 namespace {
 
-constexpr double kChi95 = 7.815;  // χ² of three degrees of freedom at 95 %
+// The 95 % quantile of χ² with three degrees of freedom.
+constexpr double kChi95 = 7.815;
 
 /// Error of the ground truth, 1 σ of a pose.
 struct TruthSigma {
@@ -72,8 +73,10 @@ double nees(const Mat3& covariance, const Vec3& error) {
 /// Means over the starts of a drive.
 struct Means {
   int count = 0, within = 0;
-  double position = 0, rotation = 0;  // NEES
-  double error_m = 0, sigma_m = 0;    // root mean squares, of the length of the error
+  // Sums of NEES.
+  double position = 0, rotation = 0;
+  // Sums of squares of the error lengths.
+  double error_m = 0, sigma_m = 0;
   double error_rad = 0, sigma_rad = 0;
 
   void add(const Mat6& C, const Vec3& off_m, const Vec3& off_rad) {
@@ -136,14 +139,13 @@ std::vector<Posed> drive(const test::RecordedSequence& d) {
 /// The mock's street, of which the truth is exact; the calibration given is the true one.
 std::vector<Posed> drive_rendered(std::uint64_t frames) {
   test::RenderedDriveOptions street;
-  street.rate = 10;  // as the recorded drives
+  // The recorded drives have this rate, too.
+  street.rate = 10;
   street.drive.kind = mock::DriveKind::figure_eight;
   test::RenderedDrive drive(street);
   const app::Configuration c = app::load_configuration(std::nullopt, {});
-  EstimatorOptions options;
-  options.odometry = c.odometry;
-  options.calibration = c.calibration;
-  options.monitor = c.monitor;
+  EstimatorOptions options{
+      .odometry = c.odometry, .calibration = c.calibration, .monitor = c.monitor};
   Arena arena;
   SequentialRunner runner;
   ImmediateRunner solver;

@@ -7,9 +7,7 @@
 // poses whose 20 frames, or as many as there were since the last pose that was not `ok`, are; "over
 // 20" says how many there are when poses before that count, too, although they were told as
 // `degraded`.
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdlib>
 #include <numbers>
 #include <string>
@@ -31,7 +29,8 @@ using app::StartingCalibration;
 using test::RecordedSequence;
 
 struct Driven {
-  std::vector<PoseSample> samples;  // in order; also those without a pose
+  // Samples in order, including those without a pose.
+  std::vector<PoseSample> samples;
   int knocks = 0;
 };
 
@@ -73,9 +72,12 @@ std::vector<test::EvaluatedPose> evaluated_poses(const Driven& d) {
 
 struct Tally {
   int runs = 0, wrong_runs = 0, wrong = 0, ok = 0;
-  int cut_short = 0;      // runs that have not a sample for every pair
-  int not_evaluated = 0;  // `ok` poses without truth to hold them against
-  int unfit = 0;          // drives that give no measure of what is normal
+  // Number of runs without a sample for every pair.
+  int cut_short = 0;
+  // Number of `ok` poses without ground truth.
+  int not_evaluated = 0;
+  // Number of drives without a usable normal error.
+  int unfit = 0;
 };
 
 void evaluate(const RecordedSequence& drive_of, const std::string& what, std::size_t pairs,

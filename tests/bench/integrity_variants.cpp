@@ -12,7 +12,8 @@
 namespace vergence::bench {
 namespace {
 
-constexpr double kFocalOfWidth = 0.58;  // focal length over width: KITTI's; EuRoC's is 0.61
+// Focal length over width of KITTI; EuRoC's is 0.61.
+constexpr double kFocalOfWidth = 0.58;
 
 /// Image moved by (dx, dy) px, turned by `roll_deg` and magnified about its centre.
 void warp(cv::Mat* image, double dx, double dy, double roll_deg, double zoom) {
@@ -91,18 +92,21 @@ void occlude(cv::Mat* left, cv::Mat* right, std::size_t at, std::size_t count) {
 
 using Pairs = std::vector<app::StereoPair>;
 
-void keep_every(Pairs* pairs, std::size_t step) {
-  Pairs kept;
-  for (std::size_t i = 0; i < pairs->size(); i += step) kept.push_back((*pairs)[i]);
-  *pairs = std::move(kept);
+/// Removes the pairs whose number, counted from 0, `unwanted` is true for.
+template <class Unwanted>
+void drop(Pairs* pairs, const Unwanted& unwanted) {
+  std::size_t i = 0;
+  std::erase_if(*pairs, [&](const app::StereoPair&) { return unwanted(i++); });
+}
+
+template <std::size_t kStep>
+void keep_every(Pairs* pairs) {
+  drop(pairs, [](std::size_t i) { return i % kStep != 0; });
 }
 
 void drop_some(Pairs* pairs) {
   cv::RNG random(3);
-  Pairs kept;
-  for (const app::StereoPair& p : *pairs)
-    if (random.uniform(0.0, 1.0) >= 0.3) kept.push_back(p);
-  *pairs = std::move(kept);
+  drop(pairs, [&](std::size_t /*i*/) { return random.uniform(0.0, 1.0) < 0.3; });
 }
 
 void lag_right(Pairs* pairs, std::size_t from) {
@@ -117,10 +121,7 @@ void restamp(Pairs* pairs, Duration step) {
 
 /// Every tenth pair is left out: the interval there is twice as long, and so is the motion.
 void leave_out_every_tenth(Pairs* pairs) {
-  Pairs kept;
-  for (std::size_t i = 0; i < pairs->size(); ++i)
-    if (i % 10 != 9) kept.push_back((*pairs)[i]);
-  *pairs = std::move(kept);
+  drop(pairs, [](std::size_t i) { return i % 10 == 9; });
 }
 
 void leave_out_two_seconds(Pairs* pairs) {
@@ -141,10 +142,15 @@ void cover_lower_half(cv::Mat* image, std::size_t at) {
       .copyTo((*image)(cv::Rect(0, image->rows - texture.rows, image->cols, texture.rows)));
 }
 
-void halve(cv::Mat* image) { cv::resize(*image, *image, {}, 0.5, 0.5, cv::INTER_AREA); }
-
 using M = cv::Mat;
 using N = std::size_t;
+
+/// Changes both images by `kChange`, each with a number of its own.
+template <auto kChange>
+void both(M* left, M* right, N i, N /*count*/) {
+  kChange(left, 2 * i);
+  kChange(right, 2 * i + 1);
+}
 
 /// The right image moved and turned, from the start or half-way on.
 template <bool HalfWay, int Pixels, int YawCentidegrees, int PitchCentidegrees,
@@ -155,143 +161,79 @@ void knock(M* /*left*/, M* right, N i, N n) {
          pixels(*right, 0.01 * PitchCentidegrees), 0.01 * RollCentidegrees, 1 + 0.01 * ZoomPercent);
 }
 
-constexpr std::array kVariants = {
-    IntegrityVariant{"untouched", nullptr, nullptr},
-    IntegrityVariant{"yaw 0.3° from the start", knock<false, 0, 30, 0, 0, 0>, nullptr},
-    IntegrityVariant{"yaw 1° from the start", knock<false, 0, 100, 0, 0, 0>, nullptr},
-    IntegrityVariant{"yaw 0.3° half-way", knock<true, 0, 30, 0, 0, 0>, nullptr},
-    IntegrityVariant{"yaw −0.3° half-way", knock<true, 0, -30, 0, 0, 0>, nullptr},
-    IntegrityVariant{"2 px to the side half-way", knock<true, 2, 0, 0, 0, 0>, nullptr},
-    IntegrityVariant{"−2 px to the side half-way", knock<true, -2, 0, 0, 0, 0>, nullptr},
-    IntegrityVariant{"pitch 0.3° half-way", knock<true, 0, 0, 30, 0, 0>, nullptr},
-    IntegrityVariant{"roll 0.5° half-way", knock<true, 0, 0, 0, 50, 0>, nullptr},
-    IntegrityVariant{"zoom 1 % from the start", knock<false, 0, 0, 0, 0, 1>, nullptr},
-    IntegrityVariant{"zoom 1 % half-way", knock<true, 0, 0, 0, 0, 1>, nullptr},
-    IntegrityVariant{"both zoomed by 25 % from the start",
-                   [](M* l, M* r, N, N) {
-                     warp(l, 0, 0, 0, 1.25);
-                     warp(r, 0, 0, 0, 1.25);
-                   },
-                   nullptr},
-    IntegrityVariant{"knock while covered",
-                   [](M* l, M* r, N i, N n) {
-                     if (i >= n / 2) warp(r, pixels(*r, 0.5), 0, 0, 1);
-                     if (i >= n / 2 - 5 && i < n / 2 + 5) l->setTo(0), r->setTo(0);
-                   },
-                   nullptr},
-    IntegrityVariant{"right one frame late", nullptr, [](Pairs* p) { lag_right(p, 0); }},
-    IntegrityVariant{"right one frame late half-way", nullptr,
-                   [](Pairs* p) { lag_right(p, p->size() / 2); }},
-    IntegrityVariant{"cameras swapped", [](M* l, M* r, N, N) { std::swap(*l, *r); }, nullptr},
-    IntegrityVariant{"right mirrored", [](M*, M* r, N, N) { cv::flip(*r, *r, 1); }, nullptr},
-    IntegrityVariant{"right covered for a while",
-                   [](M*, M* r, N i, N n) {
-                     if (i >= n / 2 && i < n / 2 + 15) r->setTo(3);
-                   },
-                   nullptr},
-    IntegrityVariant{"both covered for a while",
-                   [](M* l, M* r, N i, N n) {
-                     if (i >= n / 2 && i < n / 2 + 8) l->setTo(3), r->setTo(3);
-                   },
-                   nullptr},
-    IntegrityVariant{"right dark", [](M*, M* r, N i, N) { darken(r, 0.12, i); }, nullptr},
-    IntegrityVariant{"night",
-                   [](M* l, M* r, N i, N) {
-                     darken(l, 0.15, 2 * i);
-                     darken(r, 0.15, 2 * i + 1);
-                   },
-                   nullptr},
-    IntegrityVariant{"flicker",
-                   [](M* l, M* r, N i, N) {
-                     l->convertTo(*l, CV_8U, i % 2 == 0 ? 1.3 : 0.7);
-                     r->convertTo(*r, CV_8U, i % 3 == 0 ? 1.3 : 0.7);
-                   },
-                   nullptr},
-    IntegrityVariant{"dirt on both",
-                   [](M* l, M* r, N, N) {
-                     spots(l, 11, 25);
-                     spots(r, 12, 25);
-                   },
-                   nullptr},
-    IntegrityVariant{"rain",
-                   [](M* l, M* r, N i, N) {
-                     rain(l, 2 * i + 1);
-                     rain(r, 2 * i + 2);
-                   },
-                   nullptr},
-    IntegrityVariant{"JPEG 20",
-                   [](M* l, M* r, N, N) {
-                     jpeg(l, 20);
-                     jpeg(r, 20);
-                   },
-                   nullptr},
-    IntegrityVariant{
-        "blurred",
-        [](M* l, M* r, N, N) {
-          cv::GaussianBlur(*l, *l, {}, 2);
-          cv::GaussianBlur(*r, *r, {}, 2);
-        },
-        nullptr},
-    IntegrityVariant{"a wall drives past", occlude, nullptr},
-    IntegrityVariant{"30 % of the pairs lost", nullptr, drop_some},
-    IntegrityVariant{"every second pair", nullptr, [](Pairs* p) { keep_every(p, 2); }},
-    IntegrityVariant{"every third pair", nullptr, [](Pairs* p) { keep_every(p, 3); }},
+constexpr IntegrityVariant kVariants[] = {
+    {"untouched"},
+    {"yaw 0.3° from the start", knock<false, 0, 30, 0, 0, 0>},
+    {"yaw 1° from the start", knock<false, 0, 100, 0, 0, 0>},
+    {"yaw 0.3° half-way", knock<true, 0, 30, 0, 0, 0>},
+    {"yaw −0.3° half-way", knock<true, 0, -30, 0, 0, 0>},
+    {"2 px to the side half-way", knock<true, 2, 0, 0, 0, 0>},
+    {"−2 px to the side half-way", knock<true, -2, 0, 0, 0, 0>},
+    {"pitch 0.3° half-way", knock<true, 0, 0, 30, 0, 0>},
+    {"roll 0.5° half-way", knock<true, 0, 0, 0, 50, 0>},
+    {"zoom 1 % from the start", knock<false, 0, 0, 0, 0, 1>},
+    {"zoom 1 % half-way", knock<true, 0, 0, 0, 0, 1>},
+    {"both zoomed by 25 % from the start", both<[](M* m, N) { warp(m, 0, 0, 0, 1.25); }>},
+    {"knock while covered",
+     [](M* l, M* r, N i, N n) {
+       if (i >= n / 2) warp(r, pixels(*r, 0.5), 0, 0, 1);
+       if (i >= n / 2 - 5 && i < n / 2 + 5) l->setTo(0), r->setTo(0);
+     }},
+    {"right one frame late", nullptr, [](Pairs* p) { lag_right(p, 0); }},
+    {"right one frame late half-way", nullptr, [](Pairs* p) { lag_right(p, p->size() / 2); }},
+    {"cameras swapped", [](M* l, M* r, N, N) { std::swap(*l, *r); }},
+    {"right mirrored", [](M*, M* r, N, N) { cv::flip(*r, *r, 1); }},
+    {"right covered for a while",
+     [](M*, M* r, N i, N n) {
+       if (i >= n / 2 && i < n / 2 + 15) r->setTo(3);
+     }},
+    {"both covered for a while",
+     [](M* l, M* r, N i, N n) {
+       if (i >= n / 2 && i < n / 2 + 8) l->setTo(3), r->setTo(3);
+     }},
+    {"right dark", [](M*, M* r, N i, N) { darken(r, 0.12, i); }},
+    {"night", both<[](M* m, N number) { darken(m, 0.15, number); }>},
+    {"flicker",
+     [](M* l, M* r, N i, N) {
+       l->convertTo(*l, CV_8U, i % 2 == 0 ? 1.3 : 0.7);
+       r->convertTo(*r, CV_8U, i % 3 == 0 ? 1.3 : 0.7);
+     }},
+    {"dirt on both", both<[](M* m, N number) { spots(m, 11 + number % 2, 25); }>},
+    {"rain", both<[](M* m, N number) { rain(m, number + 1); }>},
+    {"JPEG 20", both<[](M* m, N) { jpeg(m, 20); }>},
+    {"blurred", both<[](M* m, N) { cv::GaussianBlur(*m, *m, {}, 2); }>},
+    {"a wall drives past", occlude},
+    {"30 % of the pairs lost", nullptr, drop_some},
+    {"every second pair", nullptr, keep_every<2>},
+    {"every third pair", nullptr, keep_every<3>},
 };
-
-constexpr std::array kTimes = {
-    IntegrityVariant{"right one frame late", nullptr, [](Pairs* p) { lag_right(p, 0); }},
-    IntegrityVariant{"right one frame late half-way", nullptr,
-                     [](Pairs* p) { lag_right(p, p->size() / 2); }},
-    IntegrityVariant{"every tenth interval doubled", nullptr, leave_out_every_tenth},
-    IntegrityVariant{"even 1 Hz", nullptr,
-                     [](Pairs* p) { restamp(p, Duration::milliseconds(1000)); }},
-    IntegrityVariant{"one frame 2.5 rows off",
-                     [](M*, M* r, N i, N n) {
-                       if (i == n / 2) warp(r, 0, 2.5, 0, 1);
-                     },
-                     nullptr},
-    IntegrityVariant{"a gap of two seconds", nullptr, leave_out_two_seconds},
+constexpr IntegrityVariant kTimes[] = {
+    {"right one frame late", nullptr, [](Pairs* p) { lag_right(p, 0); }},
+    {"right one frame late half-way", nullptr, [](Pairs* p) { lag_right(p, p->size() / 2); }},
+    {"every tenth interval doubled", nullptr, leave_out_every_tenth},
+    {"even 1 Hz", nullptr, [](Pairs* p) { restamp(p, Duration::milliseconds(1000)); }},
+    {"one frame 2.5 rows off",
+     [](M*, M* r, N i, N n) {
+       if (i == n / 2) warp(r, 0, 2.5, 0, 1);
+     }},
+    {"a gap of two seconds", nullptr, leave_out_two_seconds},
     // Three milliradians about each axis, in periods that do not fit each other.
-    IntegrityVariant{"right camera not rigid",
-                     [](M*, M* r, N i, N) {
-                       const auto turn = [i](double period) {
-                         return 0.17 * std::sin(2 * CV_PI * static_cast<double>(i) / period);
-                       };
-                       warp(r, pixels(*r, turn(23)), pixels(*r, turn(31)), turn(17), 1);
-                     },
-                     nullptr},
+    {"right camera not rigid",
+     [](M*, M* r, N i, N) {
+       const auto turn = [i](double period) {
+         return 0.17 * std::sin(2 * CV_PI * static_cast<double>(i) / period);
+       };
+       warp(r, pixels(*r, turn(23)), pixels(*r, turn(31)), turn(17), 1);
+     }},
 };
-
-constexpr std::array kScenes = {
-    IntegrityVariant{"contrast a quarter",
-                     [](M* l, M* r, N, N) {
-                       for (M* image : {l, r}) {
-                         const double mean = cv::mean(*image)[0];
-                         image->convertTo(*image, CV_8U, 0.25, 0.75 * mean);
-                       }
-                     },
-                     nullptr},
-    IntegrityVariant{"brightness a half",
-                     [](M* l, M* r, N, N) {
-                       for (M* image : {l, r}) image->convertTo(*image, CV_8U, 0.5);
-                     },
-                     nullptr},
-    IntegrityVariant{"noise of 10 grey levels",
-                     [](M* l, M* r, N i, N) {
-                       noise(l, 10, 2 * i);
-                       noise(r, 10, 2 * i + 1);
-                     },
-                     nullptr},
-    IntegrityVariant{"left half covered", [](M* l, M*, N i, N) { cover_lower_half(l, i); },
-                     nullptr},
-    IntegrityVariant{"right half covered", [](M*, M* r, N i, N) { cover_lower_half(r, i); },
-                     nullptr},
-    IntegrityVariant{"half resolution",
-                     [](M* l, M* r, N, N) {
-                       halve(l);
-                       halve(r);
-                     },
-                     nullptr},
+constexpr IntegrityVariant kScenes[] = {
+    {"contrast a quarter",
+     both<[](M* m, N) { m->convertTo(*m, CV_8U, 0.25, 0.75 * cv::mean(*m)[0]); }>},
+    {"brightness a half", both<[](M* m, N) { m->convertTo(*m, CV_8U, 0.5); }>},
+    {"noise of 10 grey levels", both<[](M* m, N number) { noise(m, 10, number); }>},
+    {"left half covered", [](M* l, M*, N i, N) { cover_lower_half(l, i); }},
+    {"right half covered", [](M*, M* r, N i, N) { cover_lower_half(r, i); }},
+    {"half resolution", both<[](M* m, N) { cv::resize(*m, *m, {}, 0.5, 0.5, cv::INTER_AREA); }>},
 };
 
 }  // namespace

@@ -14,8 +14,8 @@ namespace vergence::bench {
 /// may be null. Deterministic: what looks random is drawn from a generator seeded with `at`.
 struct IntegrityVariant {
   std::string_view name;
-  void (*image)(cv::Mat* left, cv::Mat* right, std::size_t at, std::size_t count);
-  void (*pairs)(std::vector<app::StereoPair>* pairs);
+  void (*image)(cv::Mat* left, cv::Mat* right, std::size_t at, std::size_t count) = nullptr;
+  void (*pairs)(std::vector<app::StereoPair>* pairs) = nullptr;
 };
 
 [[nodiscard]] std::span<const IntegrityVariant> integrity_variants();

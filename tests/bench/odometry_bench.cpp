@@ -28,7 +28,6 @@
 #include "app/runtime/version.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace {
@@ -39,20 +38,24 @@ struct Excerpt {
   const char* name;
   const char* folder;
   app::SequenceFormat format;
-  std::vector<double> lengths;  // m, of the segment error
+  // Lengths of the segments in m.
+  std::vector<double> lengths;
 };
 
 struct DecodedDrive {
   app::StereoSequence sequence;
   std::vector<std::array<cv::Mat, 2>> pairs;
   app::Trajectory truth;
-  double decode_ms = 0;  // mean a pair, one thread
+  // Mean time per pair on one thread.
+  double decode_ms = 0;
 };
 
 struct Replay {
   std::vector<StampedPose> poses;
-  std::vector<float> milliseconds;         // a frame
-  std::array<double, kStages> stage_ms{};  // sums
+  // Time of each frame.
+  std::vector<float> milliseconds;
+  // Sum over all frames.
+  std::array<double, kStages> stage_ms{};
 };
 
 struct Arguments {
@@ -66,7 +69,8 @@ struct Measured {
   const char* name = "";
   std::size_t frames = 0, posed = 0;
   TrajectoryEvaluation evaluation{};
-  double without_mount = 0;  // segment error after the scale and one mounting rotation
+  // Segment error after the scale and one mounting rotation.
+  double without_mount = 0;
   double mean_ms = 0, p50_ms = 0, p99_ms = 0, max_ms = 0, online_mean_ms = 0, decode_ms = 0;
   std::array<double, kStages> stage_ms{};
 };
@@ -113,25 +117,21 @@ DecodedDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
 
 Replay replay(const DecodedDrive& d, const app::Configuration& configuration, int threads,
               bool online) {
-  EstimatorOptions options;
-  options.odometry = configuration.odometry;
-  options.online = online;
+  EstimatorOptions options{.odometry = configuration.odometry, .online = online};
   Arena arena;
   SequentialRunner one;
   std::optional<app::ThreadRunner> two;
   if (threads == 2) two.emplace();
   ImmediateRunner at_once;
-  std::optional<app::BackgroundThread> beside;  // calibrations are solved on it, as in a drive
+  // Calibrations are solved on this thread, as in a live run.
+  std::optional<app::BackgroundThread> beside;
   if (online) beside.emplace();
   Estimator estimator(options, d.sequence.calibration, d.sequence.calibration, arena,
                       two ? static_cast<PairRunner&>(*two) : one,
                       beside ? static_cast<BackgroundRunner&>(*beside) : at_once);
   Replay r;
   for (std::size_t i = 0; i < d.pairs.size(); ++i) {
-    RigFrame frame;
-    frame.number = i;
-    frame.stamp = d.sequence.pairs[i].stamp;
-    frame.cameras = 2;
+    RigFrame frame{.number = i, .stamp = d.sequence.pairs[i].stamp, .cameras = 2};
     for (std::size_t k = 0; k < 2; ++k) {
       const Intrinsics& c = d.sequence.calibration.intrinsics[k];
       frame.images[k] = {d.pairs[i][k].data, c.width, c.height,
@@ -207,8 +207,7 @@ Measured measure(const Excerpt& excerpt, const DecodedDrive& drive, const Argume
     online_means.push_back(static_cast<float>(
         mean(replay(drive, configuration, arguments.threads, true).milliseconds)));
   }
-  EvaluationOptions options;
-  options.segments = {{excerpt.lengths, 1, false}, {excerpt.lengths, 1, true}};
+  EvaluationOptions options{.segments = {{excerpt.lengths, 1, false}, {excerpt.lengths, 1, true}}};
   Measured m;
   m.name = excerpt.name;
   m.frames = drive.pairs.size();

@@ -38,14 +38,13 @@
 namespace vergence::bench {
 namespace {
 
-using app::StartingCalibration;
-using app::StereoSequence;
-using test::DriveOutcome;
-using test::RecordedSequence;
+using namespace app;
+using namespace test;
 
 struct Bench {
   app::Configuration online, off;
-  std::string variant;  // of `times` and `scenes`: part of its name
+  // Part of a variant's name for `times` and `scenes`.
+  std::string variant;
 };
 
 StereoSequence part(const StereoSequence& s, std::size_t first, std::size_t count) {
@@ -244,8 +243,7 @@ PlanarFit fit_planar(const DriveOutcome& r, std::size_t first, std::size_t last)
   for (const PoseSample& s : r.samples)
     if (s.frame >= first && s.frame < last && s.status != PoseStatus::lost)
       poses.push_back({stamps.at(s.frame), s.T_world_left});
-  EvaluationOptions options;
-  options.max_gap = Duration::seconds(1e6);
+  EvaluationOptions options{.max_gap = Duration::seconds(1e6)};
   PlanarFit best;
   for (double offset = -5; offset <= 5; offset += 0.05) {
     std::vector<StampedPose> shifted = poses;

@@ -6,11 +6,8 @@
 #include <vector>
 
 #include "app/datasets/detail/bag_images.hpp"
-#include "app/datasets/recorded_ins.hpp"
-#include "app/runtime/errors.hpp"
+#include "tests/fuzz/input_errors.hpp"
 #include "tests/support/bag_in_memory.hpp"
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace {
 
@@ -42,14 +39,12 @@ void check(const StereoSequence& s) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::vector<char> bytes(
-      data, data + size);  // exactly so many: a read behind the last one is found by ASan
+  // The exact size lets ASan find a read beyond the last byte.
+  const std::vector<char> bytes(data, data + size);
   const auto format = size > 0 && data[0] == '#'   ? detail::BagFormat::rosbag
                       : size > 0 && data[0] == 'S' ? detail::BagFormat::sqlite
                                                    : detail::BagFormat::mcap;
-  for (const bool given : {true, false}) try {
-      check(test::bag_in_memory(format, bytes, given));
-    } catch (const InputError&) {
-    }
+  for (const bool given : {true, false})
+    test::probe([&] { check(test::bag_in_memory(format, bytes, given)); });
   return 0;
 }

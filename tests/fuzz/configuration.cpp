@@ -5,18 +5,16 @@
 #include <string_view>
 
 #include "app/config/configuration.hpp"
-#include "app/runtime/errors.hpp"
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+#include "tests/fuzz/input_errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence::app;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  try {
+  vergence::test::probe([&] {
     const Configuration c = parse_configuration(text, "fuzz.yaml", {});
-    if (c.threads < 1 || c.cameras.size() < 2) std::abort();  // what every command rests on
+    // Every command relies on these minimums.
+    if (c.threads < 1 || c.cameras.size() < 2) std::abort();
     if (configuration_hash(c).size() != 16) std::abort();
-  } catch (const InputError&) {
-  }
+  });
   return 0;
 }

@@ -11,10 +11,8 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
-#include "app/runtime/errors.hpp"
+#include "tests/fuzz/input_errors.hpp"
 #include "tests/fuzz/scratch_folder.hpp"
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace {
 
@@ -27,8 +25,10 @@ constexpr std::string_view kPng("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x60\0\0\0\x
 
 struct Layout {
   SequenceFormat format;
-  std::vector<std::string> texts;   // in the order of the pieces
-  std::vector<std::string> images;  // whole
+  // Text files in the order of the pieces.
+  std::vector<std::string> texts;
+  // Image files.
+  std::vector<std::string> images;
 };
 
 const std::vector<Layout>& layouts() {
@@ -58,13 +58,7 @@ const std::vector<Layout>& layouts() {
   return all;
 }
 
-template <class Read>
-void probe(const Read& read) {
-  try {
-    read();
-  } catch (const InputError&) {
-  }
-}
+using test::probe;
 
 void check(const StereoSequence& s) {
   if (s.calibration.cameras < 2) std::abort();

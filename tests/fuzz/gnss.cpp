@@ -2,21 +2,14 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <span>
 
 #include "firmware_iface/nmea/nmea.hpp"
 #include "firmware_iface/ubx/ubx.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace vergence::test {
 namespace {
-
-void require(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "gnss: %s\n", what);
-  std::abort();
-}
 
 bool within(const std::optional<double>& v, double least, double most) {
   return !v || (*v >= least && *v <= most);
@@ -73,18 +66,13 @@ void probe_ubx(std::span<const std::uint8_t> bytes) {
   (void)ubx::decode_pvt(bytes, &pvt);
 }
 
-/// Gives hostile bytes to the decoders of NMEA and UBX. A breach of what must hold for any bytes
-/// aborts with a sentence on stderr.
-void probe_gnss(std::span<const std::uint8_t> bytes) {
-  probe_nmea(bytes);
-  probe_ubx(bytes);
-}
-
 }  // namespace
 }  // namespace vergence::test
 
+/// Any bytes as NMEA and as UBX. Entry point of libFuzzer.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
                                       std::size_t size) {  // NOLINT(readability-identifier-naming)
-  vergence::test::probe_gnss({data, size});
+  vergence::test::probe_nmea({data, size});
+  vergence::test::probe_ubx({data, size});
   return 0;
 }

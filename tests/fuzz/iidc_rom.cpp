@@ -8,20 +8,18 @@
 
 #include "firmware_iface/iidc/config_rom.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence::iidc;
-  std::vector<std::uint32_t> quadlets(
-      size / 4);  // exactly so many: a read behind the last one is found by ASan
+  // The exact size lets ASan find a read beyond the last byte.
+  std::vector<std::uint32_t> quadlets(size / 4);
   if (!quadlets.empty()) std::memcpy(quadlets.data(), data, quadlets.size() * 4);
-  ConfigRom rom;
-  rom.guid = 77;
+  ConfigRom rom{.guid = 77};
   const RomStatus status = parse_config_rom(quadlets, &rom);
-  if (status != RomStatus::ok && rom.guid != 77)
-    std::abort();  // a refused ROM leaves the result alone
+  // A refused ROM must leave the result unchanged.
+  if (status != RomStatus::ok && rom.guid != 77) std::abort();
   if (status == RomStatus::ok) {
-    if (rom.model.back() != 0) std::abort();  // the text ends
+    // The text must be terminated.
+    if (rom.model.back() != 0) std::abort();
     if (rom.command_base < kRegisterSpace || rom.command_base >= 0x1'0000'0000'0000) std::abort();
   }
   return 0;

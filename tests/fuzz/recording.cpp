@@ -1,21 +1,18 @@
 /// Any bytes as drive.mcap of a session, read for a replay. Entry point of libFuzzer.
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
 #include <vector>
 
 #include "app/datasets/recorded_session.hpp"
-#include "app/runtime/errors.hpp"
+#include "tests/fuzz/input_errors.hpp"
 #include "tests/fuzz/scratch_folder.hpp"
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence;
   constexpr int kMaxPixels = 1 << 20;
   static const test::ScratchFolder folder;
   folder.write("drive.mcap", {reinterpret_cast<const char*>(data), size});
-  try {
+  test::probe([&] {
     const auto session = app::RecordedSession::open(folder.path());
     std::vector<std::uint8_t> pixels;
     for (const app::RecordedFrame& frame : session.frames())
@@ -28,7 +25,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                       static_cast<std::size_t>(image.height));
         (void)session.read(frame, k, pixels.data(), static_cast<std::size_t>(image.width));
       }
-  } catch (const app::InputError&) {
-  }
+  });
   return 0;
 }

@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -41,8 +40,10 @@ std::vector<Bytes> read_corpus(const std::filesystem::path& folder) {
   return inputs;
 }
 
-const Bytes* at_hand = nullptr;  // what the entry point is given, for the handler
-std::string last;                // the file that it is left in
+// Input of the entry point, for the signal handler.
+const Bytes* at_hand = nullptr;
+// File in which the last input is stored.
+std::string last;
 
 /// Only what a handler may call.
 extern "C" void leave_input(int number) {
@@ -70,7 +71,8 @@ Bytes crossed(const Bytes& a, const Bytes& b, vergence::Random* random) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  constexpr double kLongest = 2;  // s of the processor, for an input: the machine may be busy
+  // Maximum processor time per input in s; the machine may be busy.
+  constexpr double kLongest = 2;
   if (argc != 3) {
     std::fprintf(stderr, "%s SECONDS CORPUS\n", argv[0]);
     return 2;

@@ -1,19 +1,14 @@
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 
 #include "firmware_iface/trigger/board/board.h"
+#include "tests/fuzz/require.hpp"
 
 namespace vergence {
 namespace {
 
-void promise(bool kept, const char* what) {
-  if (kept) return;
-  std::fprintf(stderr, "trigger probe: broken: %s\n", what);
-  std::abort();
-}
+using test::require;
 
 /// Encoding a decoded message must give the same bytes.
 void probe_decoder(const std::uint8_t* data, std::size_t size) {
@@ -22,15 +17,15 @@ void probe_decoder(const std::uint8_t* data, std::size_t size) {
   for (std::size_t i = 0; i < size; ++i) {
     const TriggerDecoder before = decoder;
     const TriggerDecodeStatus status = trigger_decode(&decoder, data[i], &frame);
-    promise(decoder.used <= sizeof decoder.buffer, "the decoder stays in its buffer");
-    promise(status == trigger_wait || (data[i] == 0 && decoder.used == 0),
+    require(decoder.used <= sizeof decoder.buffer, "the decoder stays in its buffer");
+    require(status == trigger_wait || (data[i] == 0 && decoder.used == 0),
             "only 00 ends a frame, and the next begins again");
-    promise(before.frames + before.bad_coding + before.bad_length + before.bad_crc +
+    require(before.frames + before.bad_coding + before.bad_length + before.bad_crc +
                     (status == trigger_wait ? 0U : 1U) ==
                 decoder.frames + decoder.bad_coding + decoder.bad_length + decoder.bad_crc,
             "every frame is counted once");
     if (status != trigger_frame_ready) continue;
-    promise(frame.size <= trigger_max_payload, "payloads have their limit");
+    require(frame.size <= trigger_max_payload, "payloads have their limit");
     std::uint8_t again[trigger_max_frame];
     TriggerDecoder other{};
     TriggerFrame copy{};
@@ -38,7 +33,7 @@ void probe_decoder(const std::uint8_t* data, std::size_t size) {
         trigger_write_frame(frame.type, frame.sequence, frame.payload, frame.size, again);
     TriggerDecodeStatus last = trigger_wait;
     for (std::size_t k = 0; k < n; ++k) last = trigger_decode(&other, again[k], &copy);
-    promise(last == trigger_frame_ready && copy.type == frame.type &&
+    require(last == trigger_frame_ready && copy.type == frame.type &&
                 copy.sequence == frame.sequence && copy.size == frame.size &&
                 std::memcmp(copy.payload, frame.payload, frame.size) == 0,
             "what is written is read");
@@ -96,7 +91,7 @@ class Bench {
     for (std::size_t i = 0; i < n; ++i) receive(frame[i]);
     n = trigger_write_frame(trigger_start, 1, nullptr, 0, frame);
     for (std::size_t i = 0; i < n; ++i) receive(frame[i]);
-    promise(board_.state == trigger_running, "a good configuration runs");
+    require(board_.state == trigger_running, "a good configuration runs");
   }
 
   void message() {
@@ -142,7 +137,7 @@ class Bench {
         return;
       case 5:
         if (board_wants_disarm(&board_)) {
-          promise(armed_, "only what is armed is taken back");
+          require(armed_, "only what is armed is taken back");
           armed_ = false;
           board_pulse_disarmed(&board_, now_);
         }
@@ -159,10 +154,10 @@ class Bench {
   void take() {
     BoardPulse pulse{};
     if (!board_schedule_pulse(&board_, now_, &pulse)) return;
-    promise(!armed_, "one pulse at a time");
-    promise(pulse.count >= now_ + 84 * board_lead_us && pulse.count <= now_ + 84'000'000 / 4,
+    require(!armed_, "one pulse at a time");
+    require(pulse.count >= now_ + 84 * board_lead_us && pulse.count <= now_ + 84'000'000 / 4,
             "pulses are armed in time, not long ahead");
-    promise(pulse.width > 0 && pulse.lines != 0, "pulses are some");
+    require(pulse.width > 0 && pulse.lines != 0, "pulses are some");
     if (script_.byte() % 8 == 0) {
       board_pulse_refused(&board_);
       return;
@@ -177,20 +172,20 @@ class Bench {
     TriggerFrame frame{};
     TriggerDecodeStatus status = trigger_wait;
     for (std::size_t i = 0; i < size; ++i) status = trigger_decode(&host_, out[i], &frame);
-    promise(size == 0 || status == trigger_frame_ready, "the board's frames are whole");
+    require(size == 0 || status == trigger_frame_ready, "the board's frames are whole");
     TriggerEvent event{};
     if (size == 0 || frame.type != trigger_event) return;
-    promise(trigger_get_event(frame.payload, frame.size, &event), "an EVENT has its size");
-    promise(static_cast<std::int64_t>(event.pulse) > last_pulse_, "numbers only grow");
+    require(trigger_get_event(frame.payload, frame.size, &event), "an EVENT has its size");
+    require(static_cast<std::int64_t>(event.pulse) > last_pulse_, "numbers only grow");
     last_pulse_ = event.pulse;
   }
 
   void check() {
-    promise(board_.outbox.used <= outbox_capacity && board_.outbox.first < outbox_capacity,
+    require(board_.outbox.used <= outbox_capacity && board_.outbox.first < outbox_capacity,
             "the outbox keeps its size");
-    promise(board_.state <= trigger_paused, "a state is one of three");
+    require(board_.state <= trigger_paused, "a state is one of three");
     const std::uint64_t tick = board_tick(&board_, now_);
-    promise(tick >= tick_, "ticks never go back");
+    require(tick >= tick_, "ticks never go back");
     tick_ = tick;
     (void)board_deadline(&board_);
   }

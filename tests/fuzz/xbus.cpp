@@ -2,20 +2,15 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <span>
 
 #include "firmware_iface/xbus/xbus.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace vergence::xbus {
 namespace {
 
-void require(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "xbus: %s\n", what);
-  std::abort();
-}
+using test::require;
 
 /// Reading and writing a layout gives the same bytes: no field is lost, shifted or made up.
 void probe_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout) {
@@ -85,7 +80,8 @@ void probe(std::span<const std::uint8_t> bytes) {
   // The stream against a reader without memory: the same frames, however the bytes are cut into
   // pieces.
   FrameStream stream;
-  std::size_t at = 0;  // of the reader without memory
+  // Position of the reader without memory.
+  std::size_t at = 0;
   std::span<const std::uint8_t> rest = bytes;
   std::size_t piece = 1 + (bytes.empty() ? 0 : bytes[0] % 67U);
   while (!rest.empty()) {

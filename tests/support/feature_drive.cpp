@@ -8,21 +8,21 @@ namespace vergence::test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-/// Height of the camera above the road, m.
+// Height of the camera above the road in m.
 constexpr double kHeight = 1.7;
-/// Length of a block of the street, m.
+// Length of a block of the street in m.
 constexpr double kBlock = 12.0;
-/// As far as the backdrop.
+// The blocks reach to the backdrop.
 constexpr int kBlocksAhead = 9;
-/// m/s².
+// Acceleration in m/s².
 constexpr double kAcceleration = 2.0;
-/// Share of the features on the road that are kept.
+// Share of features on the road that are kept.
 constexpr double kGroundKept = 0.4;
-/// Above it is sky, m.
+// Height of the backdrop in m; above it is sky.
 constexpr double kBackdropHeight = 15;
-/// Nothing nearer is looked at, m.
+// Minimum distance of a feature in m.
 constexpr double kBonnet = 2.0;
-/// Tries for one new feature; two in three hit something.
+// Maximum number of tries for a new feature; two of three hit something.
 constexpr int kTries = 200;
 // Root mean square over the image of 1, x, y, x² − 1/3, xy, y² − 1/3 with x, y in −1 … 1.
 constexpr std::array<double, 6> kFieldRms{1.0, 0.57735, 0.57735, 0.29814, 0.33333, 0.29814};
@@ -55,7 +55,7 @@ Stamp FeatureDrive::stamp() const noexcept {
 void FeatureDrive::next() {
   if (started_) ++frame_;
   move();
-  // It stood still before the first frame.
+  // The rig stands before the first frame.
   if (!started_) poses_[1] = poses_[0];
   wander();
   T_right_left_ = options_.T_right_left;
@@ -89,9 +89,8 @@ void FeatureDrive::next() {
     Point p;
     FeatureTrack t;
     if (!new_point(&p) || !sight(&p, &t)) continue;
-    if (!started_)
-      // Not all are born in the first frame.
-      p.life = 1 + static_cast<int>(random_.below(static_cast<std::uint32_t>(p.life)));
+    // The lives differ, so that not all tracks begin in the first frame.
+    if (!started_) p.life = 1 + static_cast<int>(random_.below(static_cast<std::uint32_t>(p.life)));
     points_.push_back(p);
     tracks_.push_back(t);
   }
@@ -112,13 +111,12 @@ void FeatureDrive::move() {
   const auto wave = [&](double hertz, std::size_t phase) {
     return std::sin(2 * std::numbers::pi * hertz * rocked_s_ + phases_[phase]);
   };
-  // Hz.
+  // Frequency of the weaving in Hz.
   constexpr double kWeave = 0.14;
   const double a = options_.rocking;
   const double pitch = a * 0.3 * kDegree * (0.6 * wave(1.1, 0) + 0.4 * wave(1.7, 1));
   const double roll = a * 0.35 * kDegree * (0.6 * wave(0.8, 2) + 0.4 * wave(1.4, 3));
   const double heave = a * 0.015 * wave(1.3, 4);
-  // The last term leads back to the middle.
   const double heading =
       a * 1.7 * kDegree / (2 * std::numbers::pi * kWeave) * wave(kWeave, 5) - 0.005 * x_;
   if (started_) {
@@ -203,7 +201,7 @@ bool FeatureDrive::new_point(Point* p) {
 
 bool FeatureDrive::hit(const Vec3& origin, const Vec3& ray, Vec3* p) const noexcept {
   double nearest = 1e9;
-  // A wall x = const.
+  // The wall is a plane of constant x.
   const auto try_at = [&](double along, double low_z, double high_z, double height) {
     if (!(along > 0) || along >= nearest) return;
     const Vec3 q = origin + along * ray;

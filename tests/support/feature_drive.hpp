@@ -14,13 +14,13 @@ namespace vergence::test {
 /// A change of the true T_right_left: R ← Exp(φ) R, t ← t + τ, growing from nothing at `frame` to
 /// the whole `over` frames later.
 struct RigChange {
-  /// The first frame that is different.
+  // First frame with the change.
   std::uint64_t frame = 0;
-  /// φ, rad.
+  // Rotation φ in rad.
   Vec3 rotation = Vec3::Zero();
-  /// τ, m.
+  // Translation τ in m.
   Vec3 translation = Vec3::Zero();
-  /// Frames; 0: a knock.
+  // Number of frames over which the change grows; 0 for a knock.
   std::uint64_t over = 0;
 };
 
@@ -32,34 +32,34 @@ struct LagChange {
 };
 
 struct FeatureDriveOptions {
-  /// px.
+  // Size of the images in px.
   int width = 1024, height = 768;
-  /// True; a test of wrong intrinsics computes with others.
+  // True intrinsics; a test of wrong intrinsics computes with others.
   Pinhole left{1247, 1247, 511.5, 383.5};
   Pinhole right{1247, 1247, 511.5, 383.5};
-  /// True, before any change.
+  // True transform before any change.
   Transform T_right_left{exp_so3({5e-3, -8e-3, 3e-3}), {-0.75, 0, 0}};
-  /// Hz.
+  // Frame rate in Hz.
   double rate = 30;
-  /// Alive in every frame, seen by both cameras.
+  // Number of tracks in every frame, seen by both cameras.
   int tracks = 300;
-  /// Frames.
+  // Life of a track in frames.
   int shortest_life = 5, longest_life = 20;
-  /// Speed when driving, m/s.
+  // Speed when driving, in m/s.
   double speed = 8;
-  /// Drives so long, stands so long, again and again; 0: never stops.
+  // Duration of each stretch of driving and of each stop; 0 never stops.
   double drive_s = 0, stop_s = 0;
-  /// Times pitch ±0.3°, roll ±0.35°, heave ±15 mm, heading ±1.7°/s.
+  // Factor of the rocking: pitch ±0.3°, roll ±0.35°, heave ±15 mm, heading ±1.7°/s.
   double rocking = 1;
-  /// Errors of each camera's coordinate: every frame, every track, a step a frame.
+  // Noise of each coordinate in px: per frame, per track, and as a random walk per frame.
   double white_px = 0.3, constant_px = 0.3, walk_px = 0.1;
-  /// The error that a track states.
+  // Sigma that a track states.
   double sigma_px = 0.5;
-  /// Share of tracks 3 to 30 px off in the right image.
+  // Share of tracks that are 3 to 30 px off in the right image.
   double outliers = 0.05;
-  /// Share of tracks on things that move by themselves, up to 10 m/s.
+  // Share of tracks on moving objects of up to 10 m/s.
   double movers = 0.03;
-  /// Smooth error field in the right image: rms of a coordinate, time constant.
+  // Smooth error field in the right image: rms of a coordinate and time constant.
   double bias_px = 0.02, bias_s = 10;
   std::vector<RigChange> changes;
   std::vector<LagChange> lags;
@@ -70,14 +70,14 @@ struct FeatureDriveOptions {
 /// it.
 struct FeatureTrack {
   std::uint32_t id = 0;
-  /// Ideal pixels.
+  // Ideal pixels.
   Vec2 left, right;
-  /// Bit 0: left, bit 1: right.
+  // Bit 0 is the left camera, bit 1 the right one.
   std::uint8_t seen = 3;
   double sigma_px = 0;
-  /// Truth, m.
+  // True position in m.
   Vec3 p_world = Vec3::Zero();
-  /// Truth: an outlier or a mover.
+  // True for an outlier or a moving object.
   bool wrong = false;
 };
 
@@ -94,29 +94,29 @@ class FeatureDrive {
 
   [[nodiscard]] std::uint64_t frame() const noexcept { return frame_; }
   [[nodiscard]] Stamp stamp() const noexcept;
-  /// Valid until the next call.
+  // Valid until the next call.
   [[nodiscard]] std::span<const FeatureTrack> tracks() const noexcept { return tracks_; }
-  /// True, when the left camera exposed.
+  // True pose when the left camera exposed.
   [[nodiscard]] const Transform& T_left_world() const noexcept { return T_left_world_; }
-  /// True, of the left camera.
+  // True motion of the left camera.
   [[nodiscard]] const Transform& T_now_previous() const noexcept { return T_now_previous_; }
-  /// True, of this frame.
+  // True transform of this frame.
   [[nodiscard]] const Transform& T_right_left() const noexcept { return T_right_left_; }
-  /// m/s.
+  // Speed in m/s.
   [[nodiscard]] double speed() const noexcept { return speed_; }
   [[nodiscard]] const FeatureDriveOptions& options() const noexcept { return options_; }
 
  private:
   struct Point {
     std::uint32_t id = 0;
-    /// Frames left.
+    // Remaining frames.
     int life = 0;
     Vec3 p_world = Vec3::Zero();
-    /// m a frame.
+    // Motion per frame in m.
     Vec3 velocity = Vec3::Zero();
-    /// Offset of an outlier in the right image, px.
+    // Offset of an outlier in the right image, in px.
     Vec2 offset = Vec2::Zero();
-    /// px.
+    // Errors of the coordinates in px.
     std::array<double, 4> constant{}, walked{};
     bool wrong = false;
   };
@@ -136,12 +136,12 @@ class FeatureDrive {
   std::uint64_t frame_ = 0;
   bool started_ = false;
   std::uint32_t next_id_ = 1;
-  /// Speed in m/s, seconds into the cycle of driving and standing, seconds of rocking.
+  // Speed in m/s, and times in the cycle of driving and of rocking in s.
   double speed_ = 0, phase_s_ = 0, rocked_s_ = 0;
-  /// Position of the left camera, m.
+  // Position of the left camera in m.
   double x_ = 0, z_ = 0;
   std::array<double, 8> phases_{};
-  /// T_left_world of the vehicle's clock: now, one frame ago.
+  // T_left_world by the vehicle's clock, now and one frame ago.
   std::array<Transform, 2> poses_{};
   Transform T_left_world_, T_right_world_, T_now_previous_, T_right_left_;
   std::array<Field, 2> field_{};

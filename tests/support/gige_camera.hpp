@@ -5,9 +5,6 @@
 #include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
 #include "tests/support/gvsp_sender.hpp"
 

@@ -25,14 +25,13 @@ class GigePair {
            const Images& images) {
     for (std::size_t k = 0; k < 2; ++k) {
       const int number = static_cast<int>(k);
-      GigeCameraOptions o;
-      o.address = GigeCamera::address(first_address + number);
-      o.serial = fmt::format("{}-{}", serial, k);
-      o.sensor_width = width;
-      o.sensor_height = height;
-      o.clock_drift_ppm = 25 - 60 * number;
-      o.number_images = false;
-      o.discoverable = false;
+      GigeCameraOptions o{.address = GigeCamera::address(first_address + number),
+                          .serial = fmt::format("{}-{}", serial, k),
+                          .sensor_width = width,
+                          .sensor_height = height,
+                          .clock_drift_ppm = 25 - 60 * number,
+                          .discoverable = false,
+                          .number_images = false};
       o.images = [images, k](std::uint64_t n) { return images(k, n); };
       cameras_[k] = std::make_unique<GigeCamera>(o);
     }

@@ -17,7 +17,7 @@
 /// than the rest: a focal length that is off turns every corner too far.
 namespace vergence::test {
 
-/// Fewer at the beginning.
+// The first poses have fewer frames.
 inline constexpr std::size_t kIntegrityFrames = 20;
 /// Frames of the untouched drive that what is normal is known over: those between 20 of a drive
 /// that has every third.
@@ -54,20 +54,19 @@ using NormalError = std::function<MotionError(Stamp from, Stamp to)>;
 
 struct Integrity {
   int ok = 0, lost = 0;
-  /// `ok`, and wrong over its frames since the last that was not `ok`.
+  // Number of `ok` poses that are wrong over their frames since the last pose not `ok`.
   int wrong = 0;
-  /// `ok`, and wrong over its frames since the last that was `lost`.
+  // Number of `ok` poses that are wrong over their frames since the last `lost` pose.
   int wrong_over_all = 0;
-  /// `ok`, without truth at its stamp or at that of the first pose it is held against: it says
-  /// where the rig was at another time.
+  // Number of `ok` poses without ground truth at their stamp or at that of the first pose.
   int not_evaluated = 0;
-  /// Index of the first wrong pose; then the error of its motion, and over how many frames.
+  // Index of the first wrong pose, its error, and the number of frames of the error.
   std::size_t first_wrong = 0;
   MotionError first_error{};
   std::size_t first_over = 0;
-  /// Most times the normal error among those that `wrong` counts.
+  // Largest ratio to the normal error over the frames that `wrong` counts.
   double most = 0;
-  /// The same among those over all kIntegrityFrames.
+  // Largest ratio to the normal error over all kIntegrityFrames.
   double max_full = 0;
 };
 /// `poses` in order, one for each frame, also the lost ones. The first `ok` pose after one that is

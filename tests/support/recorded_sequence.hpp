@@ -48,28 +48,28 @@ inline constexpr std::array kRecordedDrives = {"kitti06_51",     "kitti01_51",  
 /// Result of one pass. Frames count from 0; −1: never.
 struct DriveOutcome {
   int frames = 0, ok = 0, degraded = 0, lost = 0;
-  /// Told before `knock_at`.
+  // Number of knocks reported before `knock_at`.
   int knocks = 0;
   int verified_at = -1, since_verified = 0, ok_since_verified = 0;
   int contradicted_at = -1, ok_before_verified = 0;
-  /// After a knock.
+  // Frames of the report and of the recalibration after a knock.
   int reported_at = -1, mended_at = -1, ok_before_mended = 0;
   double contradicted_percent = 0;
-  /// ate_scaled_m: after one scale.
+  // ate_scaled_m is the error after one scale.
   double ate_m = 0, ate_scaled_m = 0, scale = 1;
-  /// −1: too short for segments of 10 to 50 m.
+  // −1 if the drive is too short for segments of 10 to 50 m.
   double segments_percent = -1;
-  /// Error of the last decision that had frames held out.
+  // Result of the last decision with held-out frames.
   double held_out_px = 0;
-  /// The newest.
+  // The newest measurement.
   FocalMeasurement focal;
-  /// In use at the end.
+  // Calibration in use at the end.
   std::optional<RigCalibration> rig;
-  /// One a frame.
+  // One sample per frame.
   std::vector<PoseSample> samples;
-  /// Number of adopted calibrations, and frame of the first.
+  // Number of adopted calibrations and frame of the first adoption.
   int adopted = 0, adopted_at = -1;
-  /// Share of the scene's points, at the adoption that cost most.
+  // Smallest share of map points that an adoption kept.
   double points_kept_percent = 100;
 };
 

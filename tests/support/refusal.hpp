@@ -1,9 +1,8 @@
 #pragma once
-#include <gtest/gtest.h>
-
 #include <string>
 
 #include "app/runtime/errors.hpp"
+#include "tests/support/mentions.hpp"
 
 namespace vergence::test {
 
@@ -19,20 +18,6 @@ std::string refusal_of(const F& f) {
     return e.what();
   }
   return "";
-}
-
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
-/// Every part stands in the text.
-template <class... Parts>
-testing::AssertionResult mentions(const std::string& text, const Parts&... parts) {
-  std::string missing;
-  for (const std::string& part : {std::string(parts)...})
-    if (!contains(text, part)) missing += " `" + part + "`";
-  if (missing.empty()) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "`" << text << "` lacks" << missing;
 }
 
 }  // namespace vergence::test

@@ -1,6 +1,5 @@
 #include "tests/support/rendered_drive.hpp"
 
-#include <algorithm>
 #include <thread>
 
 #include "core/camera/camera.hpp"
@@ -19,8 +18,7 @@ std::shared_ptr<const mock::World> world() {
 }  // namespace
 
 RigCalibration paper_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   const std::array<std::array<double, 4>, 2> k = {
       {{1246.561673900704, 1247.092336797580, 532.287936343425, 383.604069688392},
        {1244.805048771648, 1245.815687282771, 506.635543659909, 390.704813552426}}};
@@ -43,9 +41,7 @@ RigCalibration paper_rig() {
 }
 
 RigCalibration nominal_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
-  rig.baseline = 0.75;
+  RigCalibration rig{.cameras = 2, .baseline = 0.75};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& lens = rig.intrinsics[k];
     lens.width = 640;
@@ -103,8 +99,7 @@ const RigFrame& RenderedDrive::frame(std::uint64_t i) {
   const Transform T_left_enu = T_enu_left(i).inverse();
   const auto render = [&](int k) {
     const auto c = static_cast<std::size_t>(k);
-    mock::RenderRequest shot;
-    shot.noise_seed = static_cast<std::uint32_t>(i * kMaxCameras + c + 1);
+    mock::RenderRequest shot{.noise_seed = static_cast<std::uint32_t>(i * kMaxCameras + c + 1)};
     p.renderers[c].render(T_camera_left(k, i) * T_left_enu, shot, p.pixels[c].data(), p.stride[c]);
     const Intrinsics& size = p.options.rig.intrinsics[c];
     p.frame.images[c] = {p.pixels[c].data(), size.width, size.height, p.stride[c]};

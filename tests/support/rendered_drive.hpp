@@ -19,12 +19,12 @@ namespace vergence::test {
 [[nodiscard]] RigCalibration nominal_rig();
 
 struct RenderedDriveOptions {
-  /// True.
+  // True rig.
   RigCalibration rig = paper_rig();
   mock::DriveOptions drive{};
-  /// Time of frame 0 in the drive.
+  // Time of frame 0 within the drive.
   double from_s = 8;
-  /// Hz.
+  // Frame rate in Hz.
   double rate = 30;
   /// The true T_camera_left of camera k in frame i; empty: the rig's.
   std::function<Transform(int k, std::uint64_t frame)> placed;

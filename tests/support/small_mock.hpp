@@ -10,9 +10,8 @@ namespace vergence::test {
 /// A town of roads alone.
 [[nodiscard]] inline std::shared_ptr<const mock::World> empty_town() {
   static const auto town = [] {
-    mock::WorldOptions o;
-    o.texture_detail = 0;
-    o.built_fraction = o.tree_fraction = o.car_fraction = 0;
+    mock::WorldOptions o{
+        .texture_detail = 0, .built_fraction = 0, .car_fraction = 0, .tree_fraction = 0};
     return std::make_shared<const mock::World>(o);
   }();
   return town;
@@ -22,8 +21,7 @@ namespace vergence::test {
 [[nodiscard]] inline std::shared_ptr<const mock::RigTruth> small_truth(
     const std::vector<std::string>& faults = {}, int cameras = 2,
     mock::DriveKind kind = mock::DriveKind::brief) {
-  RigCalibration calibration;
-  calibration.cameras = cameras;
+  RigCalibration calibration{.cameras = cameras};
   for (Intrinsics& lens : calibration.intrinsics) {
     lens.width = 64;
     lens.height = 48;
@@ -34,8 +32,7 @@ namespace vergence::test {
   calibration.T_camera_left[1].t = {-0.75, 0, 0};
   std::vector<mock::Fault> parsed;
   for (const std::string& f : faults) parsed.push_back(mock::parse_fault(f));
-  mock::DriveOptions drive;
-  drive.kind = kind;
+  mock::DriveOptions drive{.kind = kind};
   return std::make_shared<const mock::RigTruth>(empty_town(), drive, calibration,
                                                 mock::default_T_body_left(), Transform{},
                                                 std::move(parsed));

@@ -40,11 +40,11 @@ class WatchedCamera final : public CameraDevice {
   void stop() noexcept override { camera_->stop(); }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
 
-  /// Not before the true edge, and at most 1.9 ms after it: the mock's jitter.
+  // The stamp is at most 1.9 ms after the true edge: the mock's jitter.
   std::array<HostStamp, 64> edge_of_slot{};
 
   static constexpr HostStamp kNever{std::numeric_limits<std::int64_t>::max()};
-  /// Gives nothing from then on, until it is started again.
+  // The camera sends nothing from then on until it is started again.
   HostStamp hangs_from = kNever;
   int starts = 0;
 

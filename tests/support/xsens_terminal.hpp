@@ -9,12 +9,11 @@ namespace vergence::test {
 
 /// A reading of an INS that stands still in Brisbane, with a fix.
 [[nodiscard]] inline InsSample resting_sample(std::uint64_t number, Duration /*time*/) {
-  InsSample s;
-  s.number = number;
-  s.fix = FixStatus::fix_3d;
-  s.attitude_valid = s.velocity_valid = true;
-  s.position = {-27.4975, 153.0137, 60};
-  return s;
+  return {.number = number,
+          .fix = FixStatus::fix_3d,
+          .attitude_valid = true,
+          .velocity_valid = true,
+          .position = {-27.4975, 153.0137, 60}};
 }
 
 /// A simulated XSens INS that rests so, from now on.

@@ -204,8 +204,9 @@ bool XsensMessages::fix_requested() const noexcept {
 XsensMessages::Message XsensMessages::fix() {
   const Sample& then = history_.front();
   const InsSample& s = then.sample;
-  GnssPvt p;
-  p.fix = s.fix == FixStatus::fix_3d ? 3 : s.fix == FixStatus::fix_2d ? 2 : 0;
+  GnssPvt p{.fix = std::uint8_t(s.fix == FixStatus::fix_3d   ? 3
+                                : s.fix == FixStatus::fix_2d ? 2
+                                                             : 0)};
   p.flags = p.fix > 1 ? 1 : 0;
   p.satellites = p.fix > 1 ? 11 : 0;
   const auto accuracy = [&p](double sigma) {

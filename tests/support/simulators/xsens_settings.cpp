@@ -196,16 +196,17 @@ XsensSettings::Reply XsensSettings::handle_mark4(const Message& m) {
 }
 
 DeviceConfiguration XsensSettings::configuration() const noexcept {
-  DeviceConfiguration c;
-  c.master_id = c.device_id = device_id_;
-  c.period = period_;
-  c.output_skip = skip_;
-  c.devices = 1;
-  c.output_mode = layout_.mode;
-  c.output_settings = layout_.settings;
-  c.data_length = static_cast<std::uint16_t>(layout_.payload_size().value_or(0));
-  c.scenario = scenario_;
-  c.firmware = {2, 6, 1};
+  DeviceConfiguration c{
+      .master_id = device_id_,
+      .period = period_,
+      .output_skip = skip_,
+      .devices = 1,
+      .device_id = device_id_,
+      .data_length = static_cast<std::uint16_t>(layout_.payload_size().value_or(0)),
+      .output_mode = layout_.mode,
+      .output_settings = layout_.settings,
+      .scenario = scenario_,
+      .firmware = {2, 6, 1}};
   return c;
 }
 

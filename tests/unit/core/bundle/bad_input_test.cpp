@@ -10,17 +10,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-SimulationOptions small() {
-  SimulationOptions s;
-  s.points = 30;
-  s.poses = 4;
-  return s;
-}
-
-SimulatedRig make() {
-  Random random(31);
-  return simulate_rig(small(), random);
-}
+SimulationOptions small() { return {.poses = 4, .points = 30}; }
 
 /// Something that is wrong with a problem, which is refused for it.
 struct Defect {
@@ -93,13 +83,13 @@ TEST(BadBundle, invalidProblemIsRefusedAndUnchanged) {
             [](auto*, auto*, auto*o) { o->intrinsics[1].free = 1U << kIntrinsicsSize; }},
        }) {
     SCOPED_TRACE(d.name);
-    SimulatedRig rig = make();
+    Simulated s(31, small());
+    SimulatedRig& rig = s.rig;
     BundleProblem p = rig.problem();
     BundleOptions o = calibration_options();
     d.spoil(&rig, &p, &o);
-    OwnAdjuster own(capacities_for(small()));
     const std::vector<Vec3> points(p.points.begin(), p.points.end());
-    const BundleResult r = own.adjuster.solve(p, o);
+    const BundleResult r = s.own.adjuster.solve(p, o);
     EXPECT_EQ(r.termination, d.termination);
     EXPECT_FALSE(r.usable());
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -108,16 +98,16 @@ TEST(BadBundle, invalidProblemIsRefusedAndUnchanged) {
 }
 
 TEST(BadBundle, unobservedPointIsUnchanged) {
-  SimulatedRig rig = make();
-  OwnAdjuster own(capacities_for(small()));
+  Simulated s(31, small());
+  SimulatedRig& rig = s.rig;
   std::erase_if(rig.observations, [](const BundleObservation& o) { return o.point == 5; });
   const Vec3 before = rig.points[5];
-  EXPECT_TRUE(own.adjuster.solve(rig.problem(), calibration_options()).converged());
+  EXPECT_TRUE(s.own.adjuster.solve(rig.problem(), calibration_options()).converged());
   EXPECT_EQ(rig.points[5], before);
 }
 
 TEST(BadBundle, problemBeyondTheCapacityIsRefused) {
-  SimulatedRig rig = make();
+  SimulatedRig rig = Simulated(31, small()).rig;
   for (const int what : {0, 1, 2, 3, 4, 5}) {
     BundleCapacities c = capacities_for(small());
     if (what == 0) c.points = 29;
@@ -137,22 +127,20 @@ TEST(BadBundle, problemBeyondTheCapacityIsRefused) {
 }
 
 TEST(BadBundle, poseWithTwoPointsIsRankDeficient) {
-  SimulatedRig rig = make();
-  OwnAdjuster own(capacities_for(small()));
+  Simulated s(31, small());
+  SimulatedRig& rig = s.rig;
   std::erase_if(rig.observations, [](const BundleObservation& o) {
     return o.pose == 3 && (o.point > 1 || o.camera == 1);
   });
   rig.T_camera_left = rig.true_cameras;
-  const BundleResult r = own.adjuster.solve(rig.problem(), {});
+  const BundleResult r = s.own.adjuster.solve(rig.problem(), {});
   EXPECT_EQ(r.termination, BundleTermination::rank_deficient);
   EXPECT_TRUE(rig.T_left_world[3].finite());
 }
 
 /// Random invalid problems give a named termination and finite results.
 TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
-  SimulationOptions s;
-  s.points = 20;
-  s.poses = 5;
+  SimulationOptions s{.poses = 5, .points = 20};
   OwnAdjuster own(capacities_for(s));
   int usable = 0;
   for (std::uint64_t seed = 1; seed <= 600; ++seed) {
@@ -197,9 +185,8 @@ TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
       }
       if (rig.observations.empty()) break;
     }
-    BundleOptions o;
-    o.configuration = static_cast<BundleConfiguration>(random.below(3));
-    o.loss = static_cast<BundleLoss>(random.below(3));
+    BundleOptions o{.configuration = static_cast<BundleConfiguration>(random.below(3)),
+                    .loss = static_cast<BundleLoss>(random.below(3))};
     o.length[1].kind = static_cast<BundleLength>(random.below(3));
     o.length[1].metres = random.uniform(0.1, 1);
     o.length[1].sigma = random.uniform(1e-4, 1e-1);
@@ -226,7 +213,8 @@ TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
     for (const Mat6& m : r.covariance_total) EXPECT_TRUE(m.allFinite()) << seed;
     usable += r.usable() ? 1 : 0;
   }
-  EXPECT_GT(usable, 100);  // the fuzz reaches the solver, not only its gate
+  // The fuzz must reach the solver, not only its input check.
+  EXPECT_GT(usable, 100);
 }
 
 }  // namespace

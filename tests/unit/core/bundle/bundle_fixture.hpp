@@ -1,5 +1,4 @@
 #pragma once
-#include <memory>
 
 #include "app/simulation/rig_simulation.hpp"
 
@@ -12,10 +11,17 @@ struct OwnAdjuster {
   BundleAdjuster adjuster;
 };
 
+/// A simulated rig and an adjuster with room for it.
+struct Simulated {
+  explicit Simulated(std::uint64_t seed, const SimulationOptions& s = {})
+      : own(capacities_for(s)), random(seed), rig(simulate_rig(s, random)) {}
+  OwnAdjuster own;
+  Random random;
+  SimulatedRig rig;
+};
+
 inline BundleOptions calibration_options() {
-  BundleOptions o;
-  o.configuration = BundleConfiguration::stereo_calibration;
-  return o;
+  return {.configuration = BundleConfiguration::stereo_calibration};
 }
 
 /// With covariances; intrinsics exact unless a test says otherwise.
@@ -27,10 +33,8 @@ inline BundleOptions with_covariance() {
 }
 
 inline SimulationOptions tight(int points = SimulationOptions{}.points) {
-  SimulationOptions s;
-  s.generator = SimulationGenerator::tight;
-  s.start_points = -1;
-  s.points = points;
+  SimulationOptions s{
+      .generator = SimulationGenerator::tight, .points = points, .start_points = -1};
   return s;
 }
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/bundle/bundle_fixture.hpp"
 
 namespace vergence {
@@ -13,11 +13,10 @@ namespace {
 constexpr double kExactPixel = 1e-11, kExactMetre = 1e-10, kExactRadian = 1e-11;
 
 TEST(Bundle, calibrationIsExactOnNoiseFreeData) {
-  SimulationOptions s;
-  s.noise = 0;
-  s.generator = SimulationGenerator::tight;
-  s.start_translation = 0.5;
-  s.start_points = -1;
+  SimulationOptions s{.generator = SimulationGenerator::tight,
+                      .noise = 0,
+                      .start_translation = 0.5,
+                      .start_points = -1};
   OwnAdjuster own(capacities_for(s));
   Random random(11);
   for (int run = 0; run < 100; ++run) {
@@ -32,8 +31,7 @@ TEST(Bundle, calibrationIsExactOnNoiseFreeData) {
 }
 
 TEST(Bundle, odometryIsExactAndKeepsTheRig) {
-  SimulationOptions s;
-  s.noise = 0;
+  SimulationOptions s{.noise = 0};
   OwnAdjuster own(capacities_for(s));
   Random random(13);
   for (int run = 0; run < 20; ++run) {
@@ -48,11 +46,9 @@ TEST(Bundle, odometryIsExactAndKeepsTheRig) {
 }
 
 TEST(Bundle, monocularPosesAreExactUpToScale) {
-  SimulationOptions s;
-  s.noise = 0;
+  SimulationOptions s{.noise = 0};
   OwnAdjuster own(capacities_for(s));
-  BundleOptions options;
-  options.configuration = BundleConfiguration::parallel_monocular;
+  BundleOptions options{.configuration = BundleConfiguration::parallel_monocular};
   Random random(14);
   for (int run = 0; run < 20; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
@@ -72,18 +68,14 @@ TEST(Bundle, monocularPosesAreExactUpToScale) {
 }
 
 TEST(Bundle, robustLossesSuppressOutliers) {
-  SimulationOptions s;
-  s.noise = 0.1;
-  Random random(17);
-  const SimulatedRig original = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
+  Simulated s(17, {.noise = 0.1});
   const auto error_with = [&](BundleLoss loss) {
-    SimulatedRig rig = original;
-    for (std::size_t i = 0; i < rig.observations.size(); i += 50)
-      rig.observations[i].x += 20;  // 2 % wrong by 200 sigmas
+    SimulatedRig rig = s.rig;
+    // Two percent of the observations are wrong by 200 sigmas.
+    for (std::size_t i = 0; i < rig.observations.size(); i += 50) rig.observations[i].x += 20;
     BundleOptions o = calibration_options();
     o.loss = loss;
-    const BundleResult r = own.adjuster.solve(rig.problem(), o);
+    const BundleResult r = s.own.adjuster.solve(rig.problem(), o);
     EXPECT_TRUE(r.usable());
     return rotation_error(rig, 1);
   };
@@ -93,15 +85,13 @@ TEST(Bundle, robustLossesSuppressOutliers) {
 }
 
 TEST(Bundle, squaredResidualsAreWhitened) {
-  SimulationOptions s;
-  s.points = 37;  // not a multiple of the batch
-  Random random(18);
-  SimulatedRig rig = simulate_rig(s, random);
+  // The number of points is not a multiple of the batch.
+  Simulated s(18, {.points = 37});
+  SimulatedRig& rig = s.rig;
   std::vector<float> squared(rig.observations.size());
   BundleProblem p = rig.problem();
   p.squared_residuals = squared;
-  OwnAdjuster own(capacities_for(s));
-  ASSERT_TRUE(own.adjuster.solve(p, calibration_options()).converged());
+  ASSERT_TRUE(s.own.adjuster.solve(p, calibration_options()).converged());
   for (std::size_t i = 0; i < squared.size(); ++i) {
     const BundleObservation& o = rig.observations[i];
     Vec2 pixel;
@@ -116,9 +106,8 @@ TEST(Bundle, squaredResidualsAreWhitened) {
 }
 
 TEST(Bundle, constantPosesAndPointsAreUnchanged) {
-  SimulationOptions s;
-  Random random(19);
-  SimulatedRig rig = simulate_rig(s, random);
+  Simulated s(19);
+  SimulatedRig& rig = s.rig;
   const SimulatedRig before = rig;
   std::vector<std::uint8_t> pose_constant(10, 0), point_constant(100, 0);
   pose_constant[0] = pose_constant[4] = 1;
@@ -126,8 +115,7 @@ TEST(Bundle, constantPosesAndPointsAreUnchanged) {
   BundleProblem p = rig.problem();
   p.pose_constant = pose_constant;
   p.point_constant = point_constant;
-  OwnAdjuster own(capacities_for(s));
-  ASSERT_TRUE(own.adjuster.solve(p, calibration_options()).usable());
+  ASSERT_TRUE(s.own.adjuster.solve(p, calibration_options()).usable());
   EXPECT_EQ(rig.T_left_world[4].t, before.T_left_world[4].t);
   EXPECT_EQ(rig.points[3], before.points[3]);
   EXPECT_EQ(rig.points[99], before.points[99]);
@@ -136,56 +124,43 @@ TEST(Bundle, constantPosesAndPointsAreUnchanged) {
 }
 
 TEST(Bundle, pointsAreFoundWithEveryPoseConstant) {
-  SimulationOptions s;
-  s.noise = 0;
-  Random random(24);
-  SimulatedRig rig = simulate_rig(s, random);
+  Simulated s(24, {.noise = 0});
+  SimulatedRig& rig = s.rig;
   rig.T_camera_left = rig.true_cameras;
   rig.T_left_world = rig.true_poses;
   const std::vector<std::uint8_t> constant(rig.T_left_world.size(), 1);
   BundleProblem p = rig.problem();
   p.pose_constant = constant;
-  OwnAdjuster own(capacities_for(s));
-  const BundleResult r = own.adjuster.solve(p, {});
+  const BundleResult r = s.own.adjuster.solve(p, {});
   ASSERT_TRUE(r.converged());
   for (std::size_t i = 0; i < rig.points.size(); ++i)
     EXPECT_LT((rig.points[i] - rig.true_points[i]).norm(), kExactMetre);
 }
 
 TEST(Bundle, solveAllocatesNothing) {
-  SimulationOptions s;
-  Random random(21);
-  SimulatedRig rig = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
+  Simulated s(21);
   BundleOptions o = calibration_options();
   o.covariance = true;
   o.intrinsics[1].free = 0b11;
   o.intrinsics[1].prior_mean = {887, 887, 0, 0, 0, 0, 0, 0, 0};
   o.intrinsics[1].prior_sigma = {1, 1, 0, 0, 0, 0, 0, 0, 0};
   o.loss = BundleLoss::cauchy;
-  BundleOptions odometry;
-  odometry.pose_covariance = true;
-  const BundleProblem p = rig.problem();
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
+  BundleOptions odometry{.pose_covariance = true};
+  const BundleProblem p = s.rig.problem();
   BundleResult first, second;
-  {
-    const SealedScope sealed;
-    first = own.adjuster.solve(p, o);
-    second = own.adjuster.solve(p, odometry);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  test::expect_no_allocations([&] {
+    first = s.own.adjuster.solve(p, o);
+    second = s.own.adjuster.solve(p, odometry);
+  });
   EXPECT_TRUE(first.has_covariance);
   EXPECT_TRUE(second.has_pose_covariance);
 }
 
 TEST(Bundle, everyTerminationIsReached) {
-  SimulationOptions s;
-  Random random(23);
-  const SimulatedRig original = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
+  Simulated s(23);
   const auto end = [&](const BundleOptions& o) {
-    SimulatedRig rig = original;
-    return own.adjuster.solve(rig.problem(), o).termination;
+    SimulatedRig rig = s.rig;
+    return s.own.adjuster.solve(rig.problem(), o).termination;
   };
   BundleOptions o = calibration_options();
   EXPECT_EQ(end(o), BundleTermination::small_cost_change);
@@ -196,7 +171,8 @@ TEST(Bundle, everyTerminationIsReached) {
   o.update_tolerance = 1e-3;
   EXPECT_EQ(end(o), BundleTermination::small_update);
   o = calibration_options();
-  o.length[1].kind = BundleLength::free;  // nothing fixes the scale
+  // Nothing fixes the scale.
+  o.length[1].kind = BundleLength::free;
   EXPECT_EQ(end(o), BundleTermination::rank_deficient);
   o.loss_threshold = -1;
   EXPECT_EQ(end(o), BundleTermination::invalid_input);

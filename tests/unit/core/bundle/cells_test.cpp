@@ -2,9 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
-#include <string>
 
 #include "tests/unit/core/bundle/bundle_fixture.hpp"
 
@@ -19,8 +17,7 @@ SimulatedRig small_motion(int poses, int life, Random& random,
                           const std::function<Vec2(const Vec2&)>& field_of_the_right) {
   constexpr double kNoise = 0.2;
   SimulatedRig rig;
-  Intrinsics lens;
-  lens.width = 1024, lens.height = 768, lens.fx = lens.fy = 887, lens.cx = 511.5, lens.cy = 383.5;
+  Intrinsics lens{.width = 1024, .height = 768, .fx = 887, .fy = 887, .cx = 511.5, .cy = 383.5};
   rig.cameras.assign(2, Camera(lens));
   rig.true_cameras = {Transform{}, Transform{exp_so3({5e-3, -8e-3, 3e-3}), {-0.7, 0.01, 0.02}}};
   for (int i = 0; i < poses; ++i) {
@@ -59,9 +56,7 @@ SimulatedRig small_motion(int poses, int life, Random& random,
 double ratio(int poses, int life, std::uint64_t seed, const std::function<Vec2(const Vec2&)>& field,
              int n = kCells) {
   Random random(seed);
-  SimulationOptions size;
-  size.poses = poses;
-  size.points = kPoints;
+  SimulationOptions size{.poses = poses, .points = kPoints};
   OwnAdjuster own(capacities_for(size));
   BundleOptions o = with_covariance();
   const SimulatedRig start = small_motion(poses, life, random, field);

@@ -78,7 +78,8 @@ TEST(BundleCovariance, clustersCoverErrorsSharedByATrack) {
   }
   EXPECT_GT(noise, 4.0);
   EXPECT_LT(noise, 6.0);
-  EXPECT_GT(white, 1.5 * noise);  // otherwise the errors above are not correlated enough to tell
+  // Otherwise the errors above are not correlated enough to show a difference.
+  EXPECT_GT(white, 1.5 * noise);
 }
 
 // Held intrinsics drawn from 0.5 px and 0.1 %: noise alone does not cover the error, the wide
@@ -136,13 +137,13 @@ TEST(BundleCovariance, focalLengthSigmaMatchesItsErrors) {
     ASSERT_GT(sigma, 0);
     sum += std::pow((rig.cameras[1].intrinsics().fx - f) / sigma, 2) / kRuns;
   }
-  EXPECT_NEAR(sum, 1.0, 0.3);  // χ²(1): standard error 0.1
+  // The standard error of χ²(1) over these runs is 0.1.
+  EXPECT_NEAR(sum, 1.0, 0.3);
 }
 
 /// Mean of the newest pose's normalised squared error.
 double newest_pose_error(BundleOptions o, int runs, std::uint64_t seed) {
-  SimulationOptions s;
-  s.points = 60;
+  SimulationOptions s{.points = 60};
   OwnAdjuster own(capacities_for(s));
   Random random(seed);
   o.pose_covariance = true;

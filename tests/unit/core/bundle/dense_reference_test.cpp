@@ -12,6 +12,11 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
+std::array<double*, 9> parameters(Intrinsics* k) {
+  auto& d = k->distortion;
+  return {&k->fx, &k->fy, &k->cx, &k->cy, &d[0], &d[1], &d[2], &d[3], &d[4]};
+}
+
 /// The parameters of one problem and how a vector moves them, written down independently of the
 /// adjuster.
 struct Dense {
@@ -59,15 +64,7 @@ struct Dense {
         }
       }
       Intrinsics in = out.cameras[k].intrinsics();
-      double* all[] = {&in.fx,
-                       &in.fy,
-                       &in.cx,
-                       &in.cy,
-                       &in.distortion[0],
-                       &in.distortion[1],
-                       &in.distortion[2],
-                       &in.distortion[3],
-                       &in.distortion[4]};
+      const auto all = parameters(&in);
       for (unsigned i = 0; i < 9; ++i)
         if (((options.intrinsics[k].free >> i) & 1U) != 0) *all[i] += v[at++];
       out.cameras[k] = Camera(in);
@@ -93,20 +90,12 @@ struct Dense {
         if (k > 0 && options.length[k].kind == BundleLength::measured)
           e.push_back((at.T_camera_left[k].t.norm() - options.length[k].metres) /
                       options.length[k].sigma);
-        const Intrinsics& in = at.cameras[k].intrinsics();
-        const double all[] = {in.fx,
-                              in.fy,
-                              in.cx,
-                              in.cy,
-                              in.distortion[0],
-                              in.distortion[1],
-                              in.distortion[2],
-                              in.distortion[3],
-                              in.distortion[4]};
+        Intrinsics in = at.cameras[k].intrinsics();
+        const auto all = parameters(&in);
         for (unsigned i = 0; i < 9; ++i)
           if (((options.intrinsics[k].free >> i) & 1U) != 0 &&
               options.intrinsics[k].prior_sigma[i] > 0)
-            e.push_back((all[i] - options.intrinsics[k].prior_mean[i]) /
+            e.push_back((*all[i] - options.intrinsics[k].prior_mean[i]) /
                         options.intrinsics[k].prior_sigma[i]);
       }
     return Eigen::Map<const Vector>(e.data(), static_cast<Eigen::Index>(e.size()));
@@ -145,7 +134,8 @@ struct Case {
   BundleLoss loss = BundleLoss::none;
   CameraModelKind kind = CameraModelKind::pinhole_radtan;
   std::array<double, 5> distortion{};
-  unsigned free = 0;  // intrinsics of every camera
+  // Free intrinsics of every camera.
+  unsigned free = 0;
   BundleConfiguration configuration = BundleConfiguration::stereo_calibration;
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -154,15 +144,14 @@ class DenseReference : public ::testing::TestWithParam<Case> {};
 
 TEST_P(DenseReference, oneStepMatchesTheDenseStep) {
   const Case& c = GetParam();
-  SimulationOptions s;
-  s.cameras = c.cameras;
-  s.points = 12;
-  s.poses = 4;
-  s.start_position = 0.01;
-  s.start_rotation = 0.002;
-  s.start_translation = 0.005;
-  s.start_points = 0.01;
-  s.noise = 0.5;
+  SimulationOptions s{.cameras = c.cameras,
+                      .poses = 4,
+                      .points = 12,
+                      .noise = 0.5,
+                      .start_position = 0.01,
+                      .start_rotation = 0.002,
+                      .start_translation = 0.005,
+                      .start_points = 0.01};
   Random random(51);
   Dense d;
   d.rig = simulate_rig(s, random);
@@ -180,8 +169,8 @@ TEST_P(DenseReference, oneStepMatchesTheDenseStep) {
     d.options.length[k] = {k > 1 ? BundleLength::free : c.length,
                            c.length == BundleLength::measured ? 0.8 : 0.0, 0.01};
   }
-  for (BundleObservation& o : d.rig.observations) {  // the truth seen through this lens, the noise
-                                                     // kept small against the curvature
+  // The truth is seen through this lens. The noise is small against the curvature.
+  for (BundleObservation& o : d.rig.observations) {
     Vec2 pixel;
     ASSERT_EQ(
         d.rig.cameras[o.camera].project(

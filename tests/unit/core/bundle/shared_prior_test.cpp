@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "tests/unit/core/bundle/bundle_fixture.hpp"
 
@@ -21,8 +20,7 @@ BundleOptions to_the_minimum() {
 }
 
 RigCalibration calibration_of(const SimulatedRig& rig, const RigCovariance& covariance) {
-  RigCalibration c;
-  c.cameras = static_cast<int>(rig.cameras.size());
+  RigCalibration c{.cameras = static_cast<int>(rig.cameras.size())};
   for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
     c.intrinsics[k] = rig.cameras[k].intrinsics();
     c.T_camera_left[k] = rig.T_camera_left[k];
@@ -102,7 +100,8 @@ TEST(BundleSharedPrior, sequentialHalvesMatchBothTogether) {
   ASSERT_TRUE(r1.converged() && r2.converged() && r.converged());
   const RigCalibration known = calibration_of(one, r1.covariance);
   BundleOptions second = first;
-  second.intrinsics[1].prior_sigma[0] = 0;  // the first half's covariance holds it instead
+  // The first half's covariance replaces the prior.
+  second.intrinsics[1].prior_sigma[0] = 0;
   second.shared_prior.rig = &known;
   const BundleResult after = h.solve(2, second, &two);
   ASSERT_TRUE(after.converged() && after.has_covariance);
@@ -115,7 +114,8 @@ TEST(BundleSharedPrior, sequentialHalvesMatchBothTogether) {
   };
   const Vec6 off = way(both.T_camera_left[1], two.T_camera_left[1]);
   for (int i = 0; i < 6; ++i) {
-    if (i == 3) continue;  // Along the baseline, whose length is exact.
+    // Row 3 is along the baseline, whose length is exact.
+    if (i == 3) continue;
     compare(extrinsic_row(1) + i, off[i]);
   }
   compare(intrinsic_row(1), two.cameras[1].intrinsics().fx - both.cameras[1].intrinsics().fx);
@@ -211,7 +211,8 @@ TEST(BundleSharedPrior, invalidPriorKeepsTheResultFinite) {
     hostile[4].T_camera_left[1].t.x() = bad;
     hostile[5].T_camera_left[1].R(0, 1) = bad;
     hostile[6].intrinsics[1].fx = bad;
-    hostile[7].covariance.set(0, 1, 1e9);  // no covariance: |ρ| > 1
+    // A correlation above 1 is no covariance.
+    hostile[7].covariance.set(0, 1, 1e9);
     hostile[8].covariance.set(1, 1, -1);
     for (std::size_t i = 0; i < hostile.size(); ++i) {
       BundleResult r;

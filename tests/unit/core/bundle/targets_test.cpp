@@ -10,16 +10,12 @@ namespace {
 /// The adjuster's kernels sum in another order on each target, and some fuse products with sums:
 /// the optimum is the same to rounding, and so is the number of steps to it.
 TEST(BundleTargets, everySimdTargetFindsTheSameOptimum) {
-  SimulationOptions s;
-  s.points = 61;
-  Random random(22);
-  const SimulatedRig original = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
-  SimulatedRig reference = original;
-  const BundleResult expected = own.adjuster.solve(reference.problem(), calibration_options());
+  Simulated s(22, {.points = 61});
+  SimulatedRig reference = s.rig;
+  const BundleResult expected = s.own.adjuster.solve(reference.problem(), calibration_options());
   test::on_every_target([&](const char* target) {
-    SimulatedRig rig = original;
-    const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
+    SimulatedRig rig = s.rig;
+    const BundleResult r = s.own.adjuster.solve(rig.problem(), calibration_options());
     EXPECT_EQ(r.steps, expected.steps) << target;
     // Sums of 2440 squares in another order: about √2440 roundings of 1e-16.
     EXPECT_NEAR(r.final_cost, expected.final_cost, 1e-12 * expected.final_cost) << target;

@@ -7,25 +7,21 @@
 
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::calibration {
 namespace {
 
-constexpr int kFree = 15;  // the transform of camera 1 and its intrinsics
+// The free parameters are the transform of camera 1 and its intrinsics.
+constexpr int kFree = 15;
 using Free = Eigen::Matrix<double, kFree, kFree>;
 using FreeVector = Eigen::Matrix<double, kFree, 1>;
 
 constexpr int row_of(int i) { return i < 6 ? extrinsic_row(1) + i : intrinsic_row(1) + i - 6; }
 
 RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = r.intrinsics[k];
-    c.width = 1024, c.height = 768, c.fx = c.fy = 1247, c.cx = 511.5, c.cy = 383.5;
-  }
-  r.T_camera_left[1] = {exp_so3({5e-3, -8e-3, 3e-3}), {-0.75, 0, 0}};
-  r.baseline = 0.75;
+  RigCalibration r = test::parallel_rig(test::pinhole(1024, 768, 1247), 0.75);
+  r.T_camera_left[1].R = exp_so3({5e-3, -8e-3, 3e-3});
   return r;
 }
 
@@ -111,10 +107,10 @@ TEST(Agreement, conditionalCovarianceOfCorrelatedIntrinsics) {
   const Free given = C.topLeftCorner<kFree, kFree>() -
                      cross * C.bottomRightCorner<4, 4>().ldlt().solve(cross.transpose());
   const RigCovariance left = noise_only(wide);
+  // The tolerance is for numbers near 20.
   for (int i = 0; i < kFree; ++i)
     for (int j = 0; j <= i; ++j)
-      EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10)
-          << i << ' ' << j;  // of numbers near 20
+      EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10) << i << ' ' << j;
 }
 
 TEST(Agreement, covarianceWithoutFixedIntrinsicsIsUnchanged) {

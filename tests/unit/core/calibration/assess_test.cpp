@@ -66,9 +66,11 @@ TEST(Assessment, wrongYawIsContradicted) {
 
 TEST(Assessment, onlyIndependentSourceAddsEvidence) {
   Measured sharp(1e-4);
-  EXPECT_TRUE(sharp.of({0, 0.5e-3, 0}).verified);   // 1.3 %
-  EXPECT_FALSE(sharp.of({0, 1.5e-3, 0}).verified);  // 4 %
-  Measured blunt(0.6e-3);  // 1.6 %, and 1.6 % of difference: together more than 2 %
+  // The differences are 1.3 % and 4 % of the depth.
+  EXPECT_TRUE(sharp.of({0, 0.5e-3, 0}).verified);
+  EXPECT_FALSE(sharp.of({0, 1.5e-3, 0}).verified);
+  // The sigma is 1.6 %; with 1.6 % of difference the sum exceeds 2 %.
+  Measured blunt(0.6e-3);
   EXPECT_TRUE(blunt.of({0, 0.6e-3, 0}).verified);
   blunt.source = CalibrationOrigin::this_drive;
   EXPECT_FALSE(blunt.of({0, 0.6e-3, 0}).verified);
@@ -76,7 +78,8 @@ TEST(Assessment, onlyIndependentSourceAddsEvidence) {
 
 TEST(Assessment, largeSigmaDecidesNothing) {
   for (const double yaw : {0.0, 1.5e-3, 5e-3}) {
-    Measured m(10e-3);  // 27 %: no evidence about a rig that may be 15 mrad off
+    // A sigma of 27 % is no evidence about a rig that may be 15 mrad off.
+    Measured m(10e-3);
     const Assessment a = m.of({0, yaw, 0});
     EXPECT_FALSE(a.verified) << yaw;
     EXPECT_FALSE(a.contradicted) << yaw;
@@ -86,7 +89,8 @@ TEST(Assessment, largeSigmaDecidesNothing) {
 
 TEST(Assessment, wrongPitchIsDetectedOnHeldOutFrames) {
   Measured m(1e-4);
-  const Assessment a = m.of({2e-3, 0, 0});  // 2.4 px of row, hardly anything of depth
+  // The pitch moves rows by 2.4 px and hardly changes the depth.
+  const Assessment a = m.of({2e-3, 0, 0});
   EXPECT_TRUE(a.better);
   EXPECT_FALSE(a.worse);
   EXPECT_FALSE(a.contradicted);
@@ -101,16 +105,12 @@ RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_
   test::FeatureDriveOptions o;
   o.seed = seed;
   o.changes = changes;
-  CalibrationOptions held;
-  held.max_frames = 60;
-  held.intrinsics = IntrinsicsEstimation::fixed;
+  CalibrationOptions held{.max_frames = 60, .intrinsics = IntrinsicsEstimation::fixed};
   test::SolverInArena s(held);
   test::FeatureDrive drive(o);
   test::log_drive(drive, 60, {}, s.solver.log());
   *nominal = test::rig_of(o);
-  RigSolveRequest request;
-  request.rig = *nominal;
-  request.from_rig = true;
+  RigSolveRequest request{.rig = *nominal, .from_rig = true};
   return s.solver.solve(request);
 }
 
@@ -122,9 +122,7 @@ TEST(GateRigChanged, rotationDuringTheFramesIsDated) {
     ASSERT_EQ(s.status, RigSolveStatus::ok);
     EXPECT_GE(s.changed_at, 20U) << axis.transpose();
     EXPECT_LE(s.changed_at, 40U) << axis.transpose();
-    AcceptanceInput q;
-    q.solution = &s;
-    q.nominal = &nominal;
+    AcceptanceInput q{.solution = &s, .nominal = &nominal};
     EXPECT_EQ(check_acceptance(q, {}), Gate::rig_changed) << axis.transpose();
   }
 }
@@ -135,9 +133,7 @@ TEST(GateRigChanged, unchangedRigHasNoChange) {
     const RigSolution s = solve_with({}, seed, &nominal);
     ASSERT_EQ(s.status, RigSolveStatus::ok);
     EXPECT_EQ(s.changed_at, 0U) << seed;
-    AcceptanceInput q;
-    q.solution = &s;
-    q.nominal = &nominal;
+    AcceptanceInput q{.solution = &s, .nominal = &nominal};
     EXPECT_NE(check_acceptance(q, {}), Gate::rig_changed) << seed;
   }
 }

@@ -6,6 +6,7 @@
 #include "core/calibration/detail/depth.hpp"
 #include "core/calibration/health.hpp"
 #include "core/math/so3.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -13,17 +14,9 @@ namespace {
 constexpr double kBaseline = 0.75, kFocal = 1247;
 
 RigCalibration rig_with(double baseline, double focal, int width, int height) {
-  RigCalibration rig;
-  rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = rig.intrinsics[k];
-    c.width = width, c.height = height, c.fx = c.fy = focal, c.cx = 0.5 * (width - 1),
-    c.cy = 0.5 * (height - 1);
-  }
-  rig.T_camera_left[1].t = Vec3(-baseline, 0, 0);
-  rig.baseline = baseline;
-  return rig;
+  return test::parallel_rig(test::pinhole(width, height, focal), baseline);
 }
+
 RigCalibration wide_rig() { return rig_with(kBaseline, kFocal, 1024, 768); }
 
 void turn(RigCalibration* rig, const Vec3& angle) {

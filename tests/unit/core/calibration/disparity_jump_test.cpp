@@ -11,9 +11,11 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kBaseline = 0.54;  // m, KITTI's
+// The baseline is KITTI's, in m.
+constexpr double kBaseline = 0.54;
 constexpr Pinhole kPinhole{718, 718, 607, 185};
-constexpr double kNoise = 0.2;  // px, of a coordinate
+// Noise of a coordinate, in px.
+constexpr double kNoise = 0.2;
 constexpr std::size_t kTracks = 150;
 
 Transform rig(double yaw_deg) {
@@ -35,11 +37,10 @@ class Street {
     move();
     for (const Point& p : points_) {
       const Vec3 r = T_right_left * p.at;
-      StereoObservation s;
-      s.left = pixel(p.at, noise);
-      s.right = pixel(r, noise);
-      s.sigma_px = kNoise;
-      s.track = p.track;
+      StereoObservation s{.left = pixel(p.at, noise),
+                          .right = pixel(r, noise),
+                          .sigma_px = kNoise,
+                          .track = p.track};
       seen.push_back(s);
     }
     return detector_.next(frame_++, seen, step_);

@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <memory>
 
 #include "core/calibration/rig_solver.hpp"
 #include "core/math/random.hpp"
@@ -20,8 +19,7 @@ namespace vergence::test {
 [[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive,
                                            const std::array<Pinhole, 2>& lenses,
                                            const std::array<double, 4>& sigma) {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = rig.intrinsics[k];
     c.width = drive.width, c.height = drive.height;
@@ -34,13 +32,15 @@ namespace vergence::test {
 }
 /// Rig with exact intrinsics.
 [[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive) {
-  constexpr double kExact = 1e-6;  // px; zero would say that nothing is known of them
+  // A sigma of zero px would mean that the intrinsics are unknown.
+  constexpr double kExact = 1e-6;
   return rig_of(drive, {drive.left, drive.right}, {kExact, kExact, kExact, kExact});
 }
 
 /// Another camera that sees every track, with the left one's lens and a third of a pixel of noise.
 struct FurtherCamera {
-  std::size_t number = 2;  // 1: the drive's right camera then is camera 2
+  // With number 1 the drive's right camera becomes camera 2.
+  std::size_t number = 2;
   Transform T_camera_left;
 };
 
@@ -59,8 +59,10 @@ struct FurtherCamera {
 /// Errors of the logged poses and transforms, from which a solve starts; tracks have errors of
 /// their own.
 struct LogStart {
-  double pose_rad = 0, pose_m = 0;  // of every frame's pose but the first, each axis, sigma
-  double rig_rad = 0, rig_m = 0;    // of every frame's T_camera_left
+  // Sigma of each axis of every frame's pose except the first.
+  double pose_rad = 0, pose_m = 0;
+  // Sigma of each axis of every frame's T_camera_left.
+  double rig_rad = 0, rig_m = 0;
 };
 
 /// The next `frames` frames of a drive as the estimator would log them; how far they drive, m.
@@ -92,10 +94,8 @@ inline double log_drive(FeatureDrive& drive, int frames, const LogStart& start,
     f.stereo = static_cast<int>(drive.tracks().size());
     log.begin(f);
     for (const FeatureTrack& t : drive.tracks()) {
-      calibration::LoggedObservation s;
-      s.track = t.id;
-      s.cameras = t.seen;
-      s.sigma = static_cast<float>(t.sigma_px);
+      calibration::LoggedObservation s{
+          .track = t.id, .cameras = t.seen, .sigma = static_cast<float>(t.sigma_px)};
       s.raw[0] = t.left.cast<float>();
       s.raw[right] = t.right.cast<float>();
       if (further != nullptr) {

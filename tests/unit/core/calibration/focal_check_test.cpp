@@ -9,11 +9,7 @@
 namespace vergence::test {
 namespace {
 
-using calibration::CalibrationOptions;
-using calibration::check_focal_length;
-using calibration::RigSolution;
-using calibration::RigSolveRequest;
-using calibration::RigSolveStatus;
+using namespace calibration;
 
 /// The rig of a drive with a focal length that is `factor` of the true one.
 RigCalibration given_rig(const FeatureDriveOptions& drive, double factor) {
@@ -27,14 +23,11 @@ RigCalibration given_rig(const FeatureDriveOptions& drive, double factor) {
 
 /// As the drive goes: with the lenses free, and from there with the focal lengths.
 RigSolution measure(const FeatureDriveOptions& drive_options, const RigCalibration& given) {
-  CalibrationOptions o;
-  o.max_frames = 60;
+  CalibrationOptions o{.max_frames = 60};
   SolverInArena s(o);
   FeatureDrive drive(drive_options);
   log_drive(drive, 60, {2e-3, 0.02, 5e-3, 0.02}, s.solver.log());
-  RigSolveRequest request;
-  request.rig = given;
-  request.given = &given;
+  RigSolveRequest request{.rig = given, .given = &given};
   const RigSolution lenses = s.solver.solve(request);
   EXPECT_EQ(lenses.status, RigSolveStatus::ok);
   request.measure_focal_lengths = true;
@@ -70,8 +63,7 @@ TEST(FocalCheck, wrongFocalLengthIsContradictedAndMeasured) {
 }
 
 RigSolution found(RigSolveStatus status, double fx, double sigma) {
-  RigSolution s;
-  s.status = status;
+  RigSolution s{.status = status};
   s.rig.intrinsics[0].fx = fx;
   s.rig.intrinsics[0].sigma[0] = sigma;
   return s;

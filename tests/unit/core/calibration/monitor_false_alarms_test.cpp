@@ -14,7 +14,8 @@ namespace {
 using calibration::MonitorResult;
 using calibration::detail::ChangeDetector;
 
-constexpr int kHour = 108000;  // frames at 30 Hz
+// An hour has this many frames at 30 Hz.
+constexpr int kHour = 108000;
 
 FeatureDriveOptions street(double speed) {
   FeatureDriveOptions o;
@@ -92,7 +93,8 @@ TEST(MonitorFalseAlarms, hundredHoursHaveAtMostFourAlarms) {
     const std::size_t i = static_cast<std::size_t>(hour) % kSpeeds.size();
     Vec5 z;
     for (int k = 0; k < 5; ++k) z[k] = random.normal();
-    const Vec5 error = references[i].root * z;  // every hour another calibration
+    // Every hour uses another calibration.
+    const Vec5 error = references[i].root * z;
     windows->reset(options, references[i].covariance);
     double most = 0;
     int standing_over = 0;

@@ -46,7 +46,7 @@ class ModeDrive {
       track_ = kTrackKeeps * track_ + std::sqrt(1 - kTrackKeeps * kTrackKeeps) * draw();
       const double lasting = (spread_life_ - spread_now_) * (1 - kTrackKeeps) / (2 * kTrackKeeps);
       noise_ = std::sqrt(lasting) * track_ + std::sqrt(spread_now_ - lasting) * draw();
-    }  // else the images repeat themselves, and so do their errors
+    }
     calibration::detail::Evidence& e = f.evidence.evidence;
     set_gradient(&e, noise_ + std::sqrt(e.n) * (bias_of_ * bias_), reference_error);
     return f;
@@ -57,7 +57,8 @@ class ModeDrive {
   // lack, found by the comparison with tracks.
   static constexpr double kLarger = 1.1;
   static constexpr double kTrackKeeps = 0.9;
-  static constexpr double kBiasKeeps = 0.99667;  // 10 s at 30 Hz
+  // The correlation time is 10 s at 30 Hz.
+  static constexpr double kBiasKeeps = 0.99667;
 
   [[nodiscard]] Vec5 draw() {
     Vec5 y;
@@ -107,7 +108,8 @@ class ModeDrive {
     using namespace calibration::detail;
     o.white_px = o.constant_px = o.walk_px = 1e-5;
     o.outliers = o.movers = 0;
-    o.bias_s = 1;  // many draws of the field
+    // A short time constant gives many draws of the field.
+    o.bias_s = 1;
     Mat5 sum = Mat5::Zero();
     int n = 0;
     watch(o, 2500, [&](const auto&, const auto& stereo) {
@@ -124,7 +126,8 @@ class ModeDrive {
   std::size_t at_ = 0;
   std::uint64_t number_ = 0;
   double spread_now_ = 0, spread_life_ = 0;
-  Mat5 bias_of_ = Mat5::Zero();  // px a mode, whitened
+  // Bias of each whitened mode, in px.
+  Mat5 bias_of_ = Mat5::Zero();
   Vec5 track_, bias_, noise_ = Vec5::Zero();
 };
 

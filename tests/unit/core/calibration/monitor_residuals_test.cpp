@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "tests/unit/core/calibration/feature_log.hpp"
 #include "tests/unit/core/calibration/monitor_trial.hpp"
 
 namespace vergence::test {
@@ -14,12 +15,6 @@ using calibration::MonitorFrame;
 
 Reference reference_of(const FeatureDriveOptions& o, const Transform& T) {
   return {EpipolarGeometry(T), o.left, o.right};
-}
-
-FeatureDriveOptions exact_street() {
-  FeatureDriveOptions o;
-  o.white_px = o.constant_px = o.walk_px = o.bias_px = o.outliers = o.movers = 0;
-  return o;
 }
 
 struct Sums {
@@ -38,7 +33,8 @@ Sums watch(const FeatureDriveOptions& o, const Transform& T_reference, int frame
     (void)trial.step();
     const MonitorFrame& f = trial.frame();
     const StereoResiduals a = looks->stereo(reference, f, 30, true);
-    if (i < 30 || !a.usable) continue;  // tracks of the first frames are not of full age
+    // Tracks of the first frames have not reached their full age.
+    if (i < 30 || !a.usable) continue;
     ++sums.frames;
     sums.stereo.add(a.evidence);
     sums.spread_now += a.spread_now;
@@ -58,7 +54,7 @@ TEST(MonitorLooks, gradientsPointToTheTruthInEveryParameter) {
     SCOPED_TRACE(i);
     Vec5 theta = Vec5::Zero();
     theta[i] = 1e-4;
-    FeatureDriveOptions o = exact_street();
+    FeatureDriveOptions o = exact_drive();
     const Transform T_reference = o.T_right_left;
     o.T_right_left = moved_on_sphere(T_reference, theta);
     const Sums sums = watch(o, T_reference, 120);
@@ -68,7 +64,7 @@ TEST(MonitorLooks, gradientsPointToTheTruthInEveryParameter) {
 }
 
 TEST(MonitorLooks, spreadIsTheLifeOfATrackForLastingErrors) {
-  FeatureDriveOptions o = exact_street();
+  FeatureDriveOptions o = exact_drive();
   o.white_px = 0.5;
   o.sigma_px = 0.5;
   const Sums white = watch(o, o.T_right_left, 400);

@@ -11,8 +11,10 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr double kLambda = 3;          // px² of a unit of information: what noise is inflated by
-constexpr double kObservations = 4e4;  // of a block, each of 1 px
+// Inflation of the noise, in px² per unit of information.
+constexpr double kLambda = 3;
+// Observations of a block, each with a sigma of 1 px.
+constexpr double kObservations = 4e4;
 
 /// Blocks of a drive, each with an offset of its own besides the noise of its tracks.
 class Blocks {
@@ -33,10 +35,7 @@ class Blocks {
     const Mat5 L = factor.matrixL();
     const Vec5 g =
         L * (std::sqrt(kLambda) * noise + std::sqrt(kObservations / 5) * rms_px * offset);
-    Evidence e;
-    e.g = g;
-    e.A = A_;
-    e.n = kObservations;
+    Evidence e{.g = g, .A = A_, .n = kObservations};
     return e;
   }
   /// `count` blocks one after the other, each against those before it.

@@ -9,17 +9,17 @@
 #include <string>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/calibration/monitor_trial.hpp"
 
 namespace vergence::test {
 namespace {
 
-using calibration::MonitorOptions;
-using calibration::MonitorResult;
+using namespace calibration;
 using Kind = MonitorResult::Kind;
 
-constexpr int kBefore = 300;  // frames driven before the rig changes: ten seconds
+// The rig changes after ten seconds.
+constexpr int kBefore = 300;
 
 FeatureDriveOptions street(double speed, std::uint64_t seed, int tracks = 220) {
   FeatureDriveOptions o;
@@ -32,7 +32,8 @@ FeatureDriveOptions street(double speed, std::uint64_t seed, int tracks = 220) {
 struct KnockRow {
   const char* name;
   Vec3 rotation_deg, translation_mm;
-  int limit;  // moving frames
+  // Maximum number of moving frames until detection.
+  int limit;
 };
 
 /// A recalibration that starts at the onset must hold next to nothing of the old rig: 10 of the 60
@@ -100,13 +101,15 @@ TEST(Monitor, evidenceStatesTheShiftOfAPitch) {
 }
 
 TEST(Monitor, slowRotationIsDriftBefore0_03Degrees) {
-  for (const double rate : {0.02, -0.02}) {  // ° a minute
+  // The rates are in degrees per minute.
+  for (const double rate : {0.02, -0.02}) {
     FeatureDriveOptions o = street(8, 2);
     o.changes = {{kBefore, Vec3(10 * rate, 0, 0) / kRadian, Vec3::Zero(), 18000}};
     const TrialReference reference = calibrated(o);
     MonitorTrial trial(o, reference.T_right_left, reference.covariance);
     for (int i = 0; i < kBefore; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
-    const auto frames = trial.frames_until(2700);  // 0.03°
+    // The limit corresponds to 0.03°.
+    const auto frames = trial.frames_until(2700);
     ASSERT_TRUE(frames.has_value());
     const auto as_drift = trial.verdict().kind == Kind::drift
                               ? frames
@@ -204,13 +207,9 @@ TEST(Monitor, evaluationAllocatesNothing) {
   FeatureDriveOptions o = street(8, 11);
   o.changes = {{40, Vec3(0, 0.3, 0) / kRadian, Vec3::Zero(), 0}};
   MonitorTrial trial(o);
-  for (int i = 0; i < 80; ++i) (void)trial.step();  // vectors of the trial have grown
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    (void)trial.monitor().update(trial.frame());
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  // The vectors of the trial grow in the first frames.
+  for (int i = 0; i < 80; ++i) (void)trial.step();
+  expect_no_allocations([&] { (void)trial.monitor().update(trial.frame()); });
 }
 
 TEST(Monitor, invalidReferenceOrOptionsAreRefused) {
@@ -219,8 +218,7 @@ TEST(Monitor, invalidReferenceOrOptionsAreRefused) {
   EXPECT_FALSE(trial.monitor().set_reference(Transform{}, k, k, Mat6::Zero()));
   EXPECT_EQ(trial.step().kind, Kind::quiet);
   Arena arena;
-  MonitorOptions bad;
-  bad.threshold = std::numeric_limits<double>::quiet_NaN();
+  MonitorOptions bad{.threshold = std::numeric_limits<double>::quiet_NaN()};
   EXPECT_THROW(calibration::Monitor(bad, arena), std::invalid_argument);
   EXPECT_NO_THROW(calibration::Monitor(MonitorOptions{}, arena));
 }

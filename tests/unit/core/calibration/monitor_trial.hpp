@@ -78,8 +78,8 @@ class MonitorTrial {
   [[nodiscard]] calibration::Monitor& monitor() { return monitor_; }
 
   double gate_px = 20;
-  std::function<void(std::vector<calibration::StereoObservation>&)>
-      spoil;  // what is done to a frame's matches
+  // Changes the matches of a frame before the monitor sees them.
+  std::function<void(std::vector<calibration::StereoObservation>&)> spoil;
 
  private:
   std::unique_ptr<Arena> arena_;

@@ -18,9 +18,11 @@ constexpr std::size_t kPoints = 150;
 /// Disturbance of a drive of 40 frames from frame 20 on.
 struct Case {
   std::string name;
-  double step_m = 0.3;  // forward, a frame, with a nod of 3 mrad
+  // Forward motion per frame, with a nod of 3 mrad.
+  double step_m = 0.3;
   int camera_late = 0, left_late = 0;
-  double knock_rad = 0;  // of pitch
+  // Pitch of the knock.
+  double knock_rad = 0;
   int wanted = 0;
 };
 
@@ -35,10 +37,13 @@ Vec2 pixel(const Vec3& X, Random* random) {
 }
 
 struct Seen {
-  bool before = false;  // a lag, before the fault
-  int lag = 0;          // in the last frame of the fault
+  // True if a lag was reported before the fault.
+  bool before = false;
+  // Lag in the last frame of the fault.
+  int lag = 0;
   bool in_step_during = false;
-  int in_step_after = 0;  // frames after the fault's end, until the cameras are seen in step
+  // Number of frames after the fault's end until the cameras are in sync again.
+  int in_step_after = 0;
 };
 
 /// Twenty frames before the fault, twenty with it, and twenty after it.

@@ -10,8 +10,7 @@ namespace {
 /// Three cameras; of the second's transform and lens and the third's transform all is known,
 /// everything going with everything.
 RigCalibration known_rig() {
-  RigCalibration rig;
-  rig.cameras = 3;
+  RigCalibration rig{.cameras = 3};
   for (std::size_t k = 0; k < 3; ++k) rig.intrinsics[k].fx = rig.intrinsics[k].fy = 1000;
   rig.T_camera_left[1].t = {-0.75, 0, 0};
   rig.T_camera_left[2].t = {0, -0.5, 0};
@@ -27,8 +26,7 @@ RigCalibration known_rig() {
 }
 
 TEST(Posterior, driftAddsTheRandomWalkOfItsTime) {
-  CalibrationOptions options;
-  options.extrinsic_random_walk_mrad_per_sqrt_h = 0.4;
+  CalibrationOptions options{.extrinsic_random_walk_mrad_per_sqrt_h = 0.4};
   const RigCalibration before = known_rig();
   for (const double hours : {1.0, 4.0}) {
     RigCalibration rig = before;
@@ -39,8 +37,8 @@ TEST(Posterior, driftAddsTheRandomWalkOfItsTime) {
     };
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(added(extrinsic_row(1) + i), walk, 1e-9 * walk) << i;
-      EXPECT_NEAR(added(extrinsic_row(1) + 3 + i), walk * 0.75 * 0.75, 1e-9 * walk)
-          << i;  // t turns by as much
+      // The translation rotates by the same angle.
+      EXPECT_NEAR(added(extrinsic_row(1) + 3 + i), walk * 0.75 * 0.75, 1e-9 * walk) << i;
       EXPECT_NEAR(added(extrinsic_row(2) + 3 + i), walk * 0.5 * 0.5, 1e-9 * walk) << i;
     }
     for (int i = 0; i < kIntrinsicsSize - 1; ++i) EXPECT_GT(added(intrinsic_row(1) + i), 0) << i;

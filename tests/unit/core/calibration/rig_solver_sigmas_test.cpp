@@ -9,15 +9,13 @@
 namespace vergence::test {
 namespace {
 
-using calibration::CalibrationOptions;
-using calibration::RigSolution;
-using calibration::RigSolveStatus;
+using namespace calibration;
 
-constexpr int kDrives = 50, kFrames = 150;  // 5 s at 30 Hz
+// The frames are 5 s at 30 Hz.
+constexpr int kDrives = 50, kFrames = 150;
 
 CalibrationOptions held() {
-  CalibrationOptions o;
-  o.intrinsics = calibration::IntrinsicsEstimation::fixed;
+  CalibrationOptions o{.intrinsics = calibration::IntrinsicsEstimation::fixed};
   // Nor are lengths off by what lenses usually are.
   o.focal_sigma_percent = o.principal_point_sigma_px = 0;
   return o;
@@ -32,9 +30,12 @@ constexpr double kMinLength = 0.4 / 3.5, kMaxLength = 1.6;
 // drives being few.
 TEST(RigSolverSigmas, sigmasMatchErrorsOverFiftyDrives) {
   SolverInArena s(held());
-  double nees = 0;    // mean of eᵀ C⁻¹ e over its dimension
-  double within = 0;  // share of single errors within two sigmas
-  double length = 0;  // mean squared error of the length driven over its sigma
+  // Mean of eᵀ C⁻¹ e over its dimension.
+  double nees = 0;
+  // Share of single errors within two sigmas.
+  double within = 0;
+  // Mean squared error of the path length over its sigma.
+  double length = 0;
   for (int i = 0; i < kDrives; ++i) {
     FeatureDriveOptions o;
     o.seed = 100 + static_cast<std::uint64_t>(i);

@@ -2,33 +2,40 @@
 
 #include <gtest/gtest.h>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/calibration/feature_log.hpp"
 
 namespace vergence::test {
 namespace {
 
-using calibration::CalibrationOptions;
-using calibration::RigSolution;
-using calibration::RigSolveStatus;
+using namespace calibration;
 
-constexpr LogStart kRough{2e-3, 0.02, 5e-3,
-                          0.02};  // what cameras posed each for itself are off, and more
+// Independently posed cameras have smaller errors than these.
+constexpr LogStart kRough{2e-3, 0.02, 5e-3, 0.02};
 
 CalibrationOptions held() {
-  CalibrationOptions o;
-  o.max_frames = 60;
-  o.intrinsics = calibration::IntrinsicsEstimation::fixed;
-  return o;
+  return {.max_frames = 60, .intrinsics = calibration::IntrinsicsEstimation::fixed};
 }
 
-/// 40 frames from the same rough start.
+/// A solver whose log holds the first frames of a drive from the same rough start.
+struct Logged : SolverInArena {
+  explicit Logged(const FeatureDriveOptions& street, int frames = 40,
+                  const CalibrationOptions& o = held(), const FurtherCamera* further = nullptr)
+      : SolverInArena(o, further != nullptr ? 3 : 2) {
+    FeatureDrive drive(street);
+    log_drive(drive, frames, kRough, solver.log(), further);
+  }
+  /// Changes every frame of the log from `first` on.
+  template <class Change>
+  Logged& each_frame(const Change& change, std::size_t first = 0) {
+    for (std::size_t i = first; i < solver.log().size(); ++i) change(solver.log().frame(i));
+    return *this;
+  }
+};
+
 RigSolution solve(const FeatureDriveOptions& drive_options, const CalibrationOptions& o,
                   const RigCalibration& rig) {
-  SolverInArena s(o);
-  FeatureDrive drive(drive_options);
-  log_drive(drive, 40, kRough, s.solver.log());
-  return s.solver.solve(rig);
+  return Logged(drive_options, 40, o).solver.solve(rig);
 }
 
 TEST(RigSolver, exactTracksGiveTheExactTransform) {
@@ -135,14 +142,9 @@ TEST(RigSolver, scaleSigmaIsIndependentOfTheWorldOrigin) {
   const FeatureDriveOptions drive;
   double sigma[2];
   for (const std::size_t i : {0U, 1U}) {
-    SolverInArena s(held_by_tracks());
-    FeatureDrive d(drive);
-    log_drive(d, 40, kRough, s.solver.log());
+    Logged s(drive, 40, held_by_tracks());
     const Transform moved{exp_so3({0.1, 0.7, -0.2}), {30, -5, -20}};
-    for (std::size_t f = 0; f < s.solver.log().size() && i == 1; ++f) {
-      Transform& T = s.solver.log().frame(f).T_left_world;
-      T = T * moved;
-    }
+    if (i == 1) s.each_frame([&](auto& f) { f.T_left_world = f.T_left_world * moved; });
     const RigSolution solution = s.solver.solve(rig_of(drive));
     ASSERT_EQ(solution.status, RigSolveStatus::ok);
     sigma[i] = solution.rig.scale_sigma;
@@ -158,11 +160,11 @@ TEST(RigSolver, scaleSigmaIsOfTheNewestConnectedFrames) {
   const FeatureDriveOptions drive;
   double sigma[2];
   for (const std::size_t pieces : {1U, 2U}) {
-    SolverInArena s(held_by_tracks());
-    FeatureDrive d(drive);
-    log_drive(d, 40, kRough, s.solver.log());
-    for (std::size_t f = 20; f < 40 && pieces == 2; ++f)
-      for (auto& seen : s.solver.log().frame(f).observations) seen.track += 1'000'000;
+    Logged s(drive, 40, held_by_tracks());
+    const auto renumber = [](auto& frame) {
+      for (auto& seen : frame.observations) seen.track += 1'000'000;
+    };
+    if (pieces == 2) s.each_frame(renumber, 20);
     const RigSolution solution = s.solver.solve(rig_of(drive));
     ASSERT_EQ(solution.status, RigSolveStatus::ok);
     sigma[pieces - 1] = solution.rig.scale_sigma;
@@ -178,13 +180,11 @@ TEST(RigSolver, solveIsIndependentOfThePreviousOne) {
     o.T_right_left = {exp_so3({-0.01, 0.004, 0.002}), {-0.6, 0.03, 0.01}};
     return o;
   }();
-  SolverInArena used(held()), fresh(held());
-  FeatureDrive a(first), b(other), c(other);
-  log_drive(a, 50, kRough, used.solver.log());
+  Logged used(first, 50), fresh(other, 30);
   (void)used.solver.solve(rig_of(first));
   used.solver.log().clear();
-  log_drive(b, 30, kRough, used.solver.log());
-  log_drive(c, 30, kRough, fresh.solver.log());
+  FeatureDrive again(other);
+  log_drive(again, 30, kRough, used.solver.log());
   const RigSolution s = used.solver.solve(rig_of(other)), t = fresh.solver.solve(rig_of(other));
   ASSERT_EQ(s.status, RigSolveStatus::ok);
   EXPECT_EQ(s.rig.T_camera_left[1].R, t.rig.T_camera_left[1].R);
@@ -192,45 +192,22 @@ TEST(RigSolver, solveIsIndependentOfThePreviousOne) {
   EXPECT_EQ(s.rig.sigma_total[1], t.rig.sigma_total[1]);
 }
 
-TEST(RigSolver, lagOfTheRightCameraIsFound) {
-  FeatureDriveOptions drive;
+TEST(RigSolver, lagOfTheSecondOrThirdCameraIsFound) {
   // Standing starts and stops: at one speed a lag is a transform like any other.
-  drive.drive_s = 4;
-  drive.stop_s = 0.2;
-  drive.speed = 4;
-  drive.lags = {{0, 1}};
-  CalibrationOptions o = held();
-  o.max_frames = 110;
-  SolverInArena s(o);
-  FeatureDrive d(drive);
-  log_drive(d, 110, kRough, s.solver.log());
-  const RigSolution solution = s.solver.solve(rig_of(drive));
-  ASSERT_EQ(solution.status, RigSolveStatus::ok);
-  EXPECT_EQ(solution.lag_frames, 1);
-  drive.lags.clear();
-  SolverInArena cameras_in_sync(o);
-  FeatureDrive e(drive);
-  log_drive(e, 110, kRough, cameras_in_sync.solver.log());
-  EXPECT_EQ(cameras_in_sync.solver.solve(rig_of(drive)).lag_frames, 0);
-}
-
-TEST(RigSolver, lagOfTheThirdCameraIsFound) {
   FeatureDriveOptions drive;
-  drive.drive_s = 4;
+  drive.speed = drive.drive_s = 4;
   drive.stop_s = 0.2;
-  drive.speed = 4;
   const FurtherCamera second{1, {exp_so3({-6e-3, 4e-3, 2e-3}), {-0.4, -0.05, 0.01}}};
   CalibrationOptions o = held();
   o.max_frames = 110;
-  for (const int lag : {0, 1}) {
-    drive.lags = {{0, 1.0 * lag}};
-    SolverInArena s(o, 3);
-    FeatureDrive d(drive);
-    log_drive(d, 110, kRough, s.solver.log(), &second);
-    const RigSolution solution = s.solver.solve(rig_of(drive, second));
-    ASSERT_EQ(solution.status, RigSolveStatus::ok) << lag;
-    EXPECT_EQ(solution.lag_frames, lag);
-  }
+  for (const bool three : {false, true})
+    for (const int lag : {0, 1}) {
+      drive.lags = {{0, 1.0 * lag}};
+      Logged s(drive, 110, o, three ? &second : nullptr);
+      const RigSolution solution = s.solver.solve(three ? rig_of(drive, second) : rig_of(drive));
+      ASSERT_EQ(solution.status, RigSolveStatus::ok) << three << ' ' << lag;
+      EXPECT_EQ(solution.lag_frames, lag) << three;
+    }
 }
 
 // Where camera 2 has no pose yet it lies where the left one is: such a frame is none to begin with,
@@ -238,15 +215,12 @@ TEST(RigSolver, lagOfTheThirdCameraIsFound) {
 TEST(RigSolver, frameWithoutEveryPoseIsNoCandidate) {
   const FeatureDriveOptions drive = exact_drive();
   const FurtherCamera second{2, {exp_so3({-6e-3, 4e-3, 2e-3}), {-0.4, -0.05, 0.01}}};
-  SolverInArena s(held(), 3);
-  FeatureDrive d(drive);
-  log_drive(d, 60, kRough, s.solver.log(), &second);
+  Logged s(drive, 60, held(), &second);
   auto& unplaced = s.solver.log().frame(30);
   unplaced.T_camera_left[2] = Transform{};
   unplaced.reprojection_px = 0.1;
   EXPECT_EQ(s.solver.solve(rig_of(drive, second)).status, RigSolveStatus::ok);
-  for (std::size_t i = 0; i < s.solver.log().size(); ++i)
-    s.solver.log().frame(i).T_camera_left[2] = Transform{};
+  s.each_frame([](auto& f) { f.T_camera_left[2] = Transform{}; });
   EXPECT_EQ(s.solver.solve(rig_of(drive, second)).status, RigSolveStatus::no_candidate);
 }
 
@@ -256,45 +230,34 @@ TEST(RigSolver, insufficientTracksGiveTheirStatus) {
   SolverInArena empty(held());
   EXPECT_EQ(empty.solver.solve(rig).status, RigSolveStatus::no_candidate);
 
-  SolverInArena linked(held());
-  FeatureDrive a(drive);
-  log_drive(a, 30, kRough, linked.solver.log());
-  for (std::size_t i = 0; i < linked.solver.log().size(); ++i)
-    linked.solver.log().frame(i).unlinked = false;
+  Logged linked(drive, 30);
+  linked.each_frame([](auto& f) { f.unlinked = false; });
   EXPECT_EQ(linked.solver.solve(rig).status, RigSolveStatus::no_candidate)
       << "no frame measured the cameras each for itself";
 
-  SolverInArena one_eyed(held());
-  FeatureDrive b(drive);
-  log_drive(b, 30, kRough, one_eyed.solver.log());
-  for (std::size_t i = 0; i < one_eyed.solver.log().size(); ++i)
-    for (auto& s : one_eyed.solver.log().frame(i).observations) s.cameras = 1;
+  Logged one_eyed(drive, 30);
+  one_eyed.each_frame([](auto& f) {
+    for (auto& s : f.observations) s.cameras = 1;
+  });
   EXPECT_EQ(one_eyed.solver.solve(rig).status, RigSolveStatus::too_few_tracks);
 
-  SolverInArena garbage(held());
-  FeatureDrive c(drive);
-  log_drive(c, 30, kRough, garbage.solver.log());
+  Logged garbage(drive, 30);
   Random random(3);
-  for (std::size_t i = 0; i < garbage.solver.log().size(); ++i)
-    for (auto& s : garbage.solver.log().frame(i).observations)
+  garbage.each_frame([&](auto& f) {
+    for (auto& s : f.observations)
       for (auto& p : s.raw)
         p = Eigen::Vector2f(static_cast<float>(random.uniform(0, 1023)),
                             static_cast<float>(random.uniform(0, 767)));
+  });
   const RigSolution g = garbage.solver.solve(rig);
   EXPECT_NE(g.status, RigSolveStatus::ok) << g.tracks << " tracks";
 }
 
 TEST(RigSolver, solveUsesTheArenaAndNoHeap) {
   const FeatureDriveOptions drive;
-  SolverInArena s(held());
-  FeatureDrive d(drive);
-  log_drive(d, 30, kRough, s.solver.log());
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    EXPECT_EQ(s.solver.solve(rig_of(drive)).status, RigSolveStatus::ok);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  Logged s(drive, 30);
+  expect_no_allocations(
+      [&] { EXPECT_EQ(s.solver.solve(rig_of(drive)).status, RigSolveStatus::ok); });
 }
 
 }  // namespace

@@ -12,17 +12,11 @@
 namespace vergence::test {
 namespace {
 
-using calibration::CalibrationOptions;
-using calibration::LoggedFrame;
-using calibration::LoggedObservation;
-using calibration::RigSolution;
-using calibration::RigSolveStatus;
-using calibration::SegmentSolver;
-using calibration::TrackLog;
+using namespace calibration;
 
 constexpr std::size_t kStretch = 30, kFeatures = 300, kLogged = 40;
-constexpr std::array<double, 4> kNotGiven = {
-    0, 0, 0, 0};  // sigmas of a lens: priors as the options have them
+// Sigmas of zero select the priors of the options.
+constexpr std::array<double, 4> kNotGiven = {0, 0, 0, 0};
 
 /// A drive whose estimator's log is shown to the stretches after every few frames, as an
 /// application does.
@@ -36,9 +30,9 @@ struct Driven {
   std::vector<RigSolution> solved;
 
   static CalibrationOptions small(double extrinsic_random_walk_mrad_per_sqrt_h) {
-    CalibrationOptions o;
-    o.max_frames = static_cast<int>(kStretch);
-    o.extrinsic_random_walk_mrad_per_sqrt_h = extrinsic_random_walk_mrad_per_sqrt_h;
+    CalibrationOptions o{
+        .max_frames = static_cast<int>(kStretch),
+        .extrinsic_random_walk_mrad_per_sqrt_h = extrinsic_random_walk_mrad_per_sqrt_h};
     return o;
   }
   Driven(const FeatureDriveOptions& o, SegmentSolver::Kind kind, const RigCalibration& given,
@@ -69,9 +63,13 @@ FeatureDriveOptions little_noise() {
   return o;
 }
 
-TEST(SegmentSolver, independentSegmentsFindTheTransform) {
+/// A drive and its rig, of whose lenses no sigma is given.
+struct Segments : testing::Test {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+};
+
+TEST_F(Segments, independentSegmentsFindTheTransform) {
   Driven d(o, SegmentSolver::Kind::alone, given, rough(given));
   d.go(90);
   ASSERT_EQ(d.solved.size(), 3U);
@@ -92,9 +90,7 @@ TEST(SegmentSolver, independentSegmentsFindTheTransform) {
       << "disjoint tracks";
 }
 
-TEST(SegmentSolver, joinedSegmentsReduceTheSigmas) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, joinedSegmentsReduceTheSigmas) {
   Driven joined(o, SegmentSolver::Kind::joined, given, rough(given)),
       alone(o, SegmentSolver::Kind::alone, given, rough(given));
   joined.go(90);
@@ -120,12 +116,11 @@ TEST(SegmentSolver, joinedSegmentsReduceTheSigmas) {
   EXPECT_NE(joined.solved[1].rig.T_camera_left[1].t, alone.solved[1].rig.T_camera_left[1].t);
 }
 
-TEST(SegmentSolver, wrongPrincipalPointIsEstimated) {
-  const FeatureDriveOptions o = little_noise();
+TEST_F(Segments, wrongPrincipalPointIsEstimated) {
   Pinhole wrong = o.right;
   wrong.cx -= 5;
-  const RigCalibration given = rig_of(o, {o.left, wrong}, kNotGiven);
-  Driven d(o, SegmentSolver::Kind::joined, given, given);
+  const RigCalibration off = rig_of(o, {o.left, wrong}, kNotGiven);
+  Driven d(o, SegmentSolver::Kind::joined, off, off);
   d.go(90);
   ASSERT_EQ(d.solved.size(), 3U);
   const RigSolution& s = d.solved.back();
@@ -138,9 +133,7 @@ TEST(SegmentSolver, wrongPrincipalPointIsEstimated) {
   EXPECT_LT(std::abs(lens.cx - o.right.cx), 2.5) << "and most of the five pixels are found";
 }
 
-TEST(SegmentSolver, repeatedFramesAreTakenOnce) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, repeatedFramesAreTakenOnce) {
   Driven d(o, SegmentSolver::Kind::alone, given, given);
   log_drive(d.drive, 20, {}, d.log);
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(d.stretches.add(d.log).has_value());
@@ -151,10 +144,9 @@ TEST(SegmentSolver, repeatedFramesAreTakenOnce) {
   EXPECT_EQ(d.stretches.frames(), 30U);
 }
 
-TEST(SegmentSolver, lastSegmentIsSolvedFromTheMinimumOn) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
-  for (const int frames : {24, 25}) {  // CalibrationOptions::min_frames is 25
+TEST_F(Segments, lastSegmentIsSolvedFromTheMinimumOn) {
+  // CalibrationOptions::min_frames is 25.
+  for (const int frames : {24, 25}) {
     Driven d(o, SegmentSolver::Kind::joined, given, given);
     log_drive(d.drive, frames, {}, d.log);
     EXPECT_FALSE(d.stretches.add(d.log).has_value());
@@ -170,9 +162,7 @@ TEST(SegmentSolver, lastSegmentIsSolvedFromTheMinimumOn) {
 
 // An angle of the walk of an hour, 0.3 mrad, is many times what 30 frames leave open: after a day
 // what was known hardly counts.
-TEST(SegmentSolver, oldPriorHasLessWeight) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, oldPriorHasLessWeight) {
   double sigma[2];
   for (const bool later : {false, true}) {
     Driven d(o, SegmentSolver::Kind::joined, given, given);
@@ -188,9 +178,7 @@ TEST(SegmentSolver, oldPriorHasLessWeight) {
 }
 
 // The prior is widened once for the time that has passed, whether or not a solve failed meanwhile.
-TEST(SegmentSolver, failedSegmentLeavesTheNextUnchanged) {
-  const FeatureDriveOptions o = little_noise();
-  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+TEST_F(Segments, failedSegmentLeavesTheNextUnchanged) {
   RigSolution third[2];
   for (const bool tried : {false, true}) {
     Driven d(o, SegmentSolver::Kind::joined, given, given, 10);

@@ -22,9 +22,7 @@ struct Log {
     f.stereo = 7;
     log.begin(f);
     for (std::uint32_t i = 0; i < observations; ++i) {
-      LoggedObservation s;
-      s.track = static_cast<std::uint32_t>(100 * number) + i;
-      s.cameras = 0b11;
+      LoggedObservation s{.track = static_cast<std::uint32_t>(100 * number) + i, .cameras = 0b11};
       log.push(s);
     }
   }
@@ -87,7 +85,8 @@ TEST(TrackLog, appendedFramesKeepTheirObservations) {
 
 TEST(TrackLog, framesBeforeANumberAreDropped) {
   Log l(4, 2);
-  for (std::uint64_t n = 1; n <= 6; ++n) l.frame(n, 1);  // 3 to 6, the ring has turned
+  // The ring has wrapped and holds frames 3 to 6.
+  for (std::uint64_t n = 1; n <= 6; ++n) l.frame(n, 1);
   l.log.drop_before(3);
   EXPECT_EQ(l.log.size(), 4U);
   l.log.drop_before(5);
@@ -142,7 +141,8 @@ TEST(TrackLog, scaledWorldKeepsItsDirections) {
 
 TEST(TrackLog, copyHasItsOwnNewestFrames) {
   Log from(5, 4);
-  for (std::uint64_t n = 1; n <= 7; ++n) from.frame(n, 4);  // 3 to 7
+  // The log holds frames 3 to 7.
+  for (std::uint64_t n = 1; n <= 7; ++n) from.frame(n, 4);
   Log all(5, 4), fewer(5, 4), small(2, 3);
   fewer.frame(99, 1);
   all.log.copy(from.log, from.log.size());

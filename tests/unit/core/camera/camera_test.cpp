@@ -17,21 +17,13 @@ namespace {
 struct Model {
   const char* name;
   Intrinsics k;
-  double widest;  // rad from the axis up to which this lens is looked at
+  // Largest angle from the axis, in rad, at which this lens is tested.
+  double widest;
 };
 
 Intrinsics intrinsics(CameraModelKind kind, int width, int height, const std::array<double, 4>& k,
                       const std::array<double, 5>& d) {
-  Intrinsics i;
-  i.kind = kind;
-  i.width = width;
-  i.height = height;
-  i.fx = k[0];
-  i.fy = k[1];
-  i.cx = k[2];
-  i.cy = k[3];
-  i.distortion = d;
-  return i;
+  return {kind, width, height, k[0], k[1], k[2], k[3], d};
 }
 
 /// Real lenses of both kinds and one without distortion.

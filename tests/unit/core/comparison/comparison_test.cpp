@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 
 namespace vergence {
 namespace {
@@ -37,17 +37,12 @@ struct Bench {
   explicit Bench(ComparisonOptions o = with_mount()) : options(o), comparison(o, arena) {}
 
   static ComparisonOptions with_mount() {
-    ComparisonOptions o;
-    o.T_ins_left = mount_of({1.2, 0.4, -0.3}, {1 * kDegree, -2 * kDegree, 3 * kDegree});
-    return o;
+    return {.T_ins_left = mount_of({1.2, 0.4, -0.3}, {1 * kDegree, -2 * kDegree, 3 * kDegree})};
   }
   [[nodiscard]] Transform T_enu_left(double t) const { return T_enu_ins(t) * options.T_ins_left; }
 
   [[nodiscard]] InsSample sample(double t, const Vec3& shift = Vec3::Zero()) const {
-    InsSample s;
-    s.stamp = at(t);
-    s.fix = FixStatus::fix_3d;
-    s.attitude_valid = true;
+    InsSample s{.stamp = at(t), .fix = FixStatus::fix_3d, .attitude_valid = true};
     const Transform T = T_enu_ins(t);
     s.position = plane.to_geodetic(T.t + shift);
     const Eigen::Quaterniond q = quaternion(plane.rotation_from(s.position).transpose() * T.R);
@@ -58,10 +53,9 @@ struct Bench {
   }
   /// The odometry without any error: world is the left camera at t = 0.
   [[nodiscard]] PoseSample pose(double t, double scale = 1.0) const {
-    PoseSample p;
-    p.stamp = at(t);
-    p.status = PoseStatus::ok;
-    p.T_world_left = T_enu_left(0).inverse() * T_enu_left(t);
+    PoseSample p{.stamp = at(t),
+                 .status = PoseStatus::ok,
+                 .T_world_left = T_enu_left(0).inverse() * T_enu_left(t)};
     p.T_world_left.t *= scale;
     return p;
   }
@@ -70,7 +64,8 @@ struct Bench {
     while (comparison.next(&c)) out.push_back(c);
   }
 
-  using EditSample = std::function<bool(double, InsSample*)>;  // false: not sent
+  // Returns false if the sample is not sent.
+  using EditSample = std::function<bool(double, InsSample*)>;
   using EditPose = std::function<void(double, PoseSample*)>;
   /// INS at 120 Hz, poses at 20 Hz, the pose a little before the INS samples around it.
   void drive(double from, double to, const EditSample& edit_sample = {},
@@ -89,6 +84,17 @@ struct Bench {
       take();
     }
   }
+  /// The INS at 120 Hz with the sample of each instant from `sample_at`, and poses at 40 Hz, each
+  /// given `late_s` after its stamp.
+  template <class SampleAt>
+  void drive_by_samples(double seconds, double late_s, const SampleAt& sample_at) {
+    for (int i = 0; i <= static_cast<int>(std::lround(seconds * 120)); ++i) {
+      const double t = i / 120.0;
+      comparison.add(sample_at(i, t));
+      if (t >= late_s && i % 3 == 1) comparison.add(pose(t - late_s));
+      take();
+    }
+  }
   void finish() {
     comparison.finish();
     take();
@@ -97,10 +103,12 @@ struct Bench {
 
 TEST(MountOf, cameraAxesBecomeVehicleAxes) {
   const Transform T = mount_of({1, 2, 3}, Vec3::Zero());
-  EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);  // seen ahead is ahead
-  EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(),
-            1e-15);  // seen on the right is on the right
-  EXPECT_LT((T * Vec3(0, 5, 0) - Vec3(1, 2, -2)).norm(), 1e-15);  // seen below is below
+  // A point seen ahead is ahead.
+  EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);
+  // A point seen on the right is on the right.
+  EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(), 1e-15);
+  // A point seen below is below.
+  EXPECT_LT((T * Vec3(0, 5, 0) - Vec3(1, 2, -2)).norm(), 1e-15);
   // A rig turned to the left by yaw sees ahead of it what lies ahead and left of the INS.
   EXPECT_LT(
       (mount_of(Vec3::Zero(), {0, 0, std::numbers::pi / 2}) * Vec3(0, 0, 1) - Vec3(0, 1, 0)).norm(),
@@ -149,7 +157,8 @@ TEST(Comparison, shortDriveIsAlignedAtItsEnd) {
 
 TEST(Comparison, errorIsTheDriftSinceTheAlignment) {
   Bench b;
-  const Vec3 drift(0.5, -0.25, 0.125);  // m in the world's axes, from 50 s on
+  // Drift in the world's axes from 50 s on, in m.
+  const Vec3 drift(0.5, -0.25, 0.125);
   b.drive(0, 60, {}, [&](double t, PoseSample* p) {
     if (t > 50) {
       p->T_world_left.t += drift;
@@ -162,13 +171,15 @@ TEST(Comparison, errorIsTheDriftSinceTheAlignment) {
   // The world's y axis points down but for the mounting and the slope at the start; the view is
   // level but for them.
   EXPECT_NEAR(c.error_yaw, 0.01, 0.001);
-  EXPECT_EQ(b.comparison.alignment().revision, 1U);  // frozen
+  // The alignment is frozen.
+  EXPECT_EQ(b.comparison.alignment().revision, 1U);
 }
 
 TEST(Comparison, posesDuringInsOutageAreNotCompared) {
   struct Away {
     const char* what;
-    double from, to;  // s: without a reading, or a fix
+    // Interval without a sample or without a fix, in s.
+    double from, to;
     InsMatch match;
     bool no_fix = false;
   };
@@ -222,9 +233,11 @@ TEST(Comparison, fixWithoutHeightCountsForEastAndNorthOnly) {
 
 TEST(Comparison, poseIsReleasedAfterTheMaximumWait) {
   Bench b;
-  for (int i = 0; i < 20; ++i) b.comparison.add(b.pose(0.05 * i));  // no INS at all
+  // No INS sample ever arrives.
+  for (int i = 0; i < 20; ++i) b.comparison.add(b.pose(0.05 * i));
   b.take();
-  EXPECT_EQ(b.out.size(), 9U);  // those that lie more than 0.5 s before the newest, 0.95 s
+  // The newest pose is at 0.95 s; released are those more than 0.5 s older.
+  EXPECT_EQ(b.out.size(), 9U);
   EXPECT_EQ(b.out.front().ins, InsMatch::none);
 }
 
@@ -243,12 +256,8 @@ TEST(Comparison, fullQueueReleasesAndCountsTheOldest) {
 TEST(Comparison, jumpOf100MetresIsCountedNotInterpolated) {
   Bench b;
   const Vec3 jump(0, 100, 0);
-  for (int i = 0; i <= 40 * 120; ++i) {
-    const double t = i / 120.0;
-    b.comparison.add(b.sample(t, t > 30.0 ? jump : Vec3::Zero()));
-    if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
-    b.take();
-  }
+  b.drive_by_samples(40, 0.004,
+                     [&](int, double t) { return b.sample(t, t > 30.0 ? jump : Vec3::Zero()); });
   EXPECT_EQ(b.comparison.counters().jumps, 1U);
   int jumped = 0;
   for (const ComparedPose& c : b.out) jumped += c.ins == InsMatch::jump ? 1 : 0;
@@ -262,14 +271,11 @@ TEST(Comparison, jumpOf100MetresIsCountedNotInterpolated) {
 void expect_placed_behind_a_leap(int last_before, int without_fix) {
   Bench b;
   const Vec3 jump(30, 100, 0);
-  for (int i = 0; i <= 40 * 120; ++i) {
-    const double t = i / 120.0;
+  b.drive_by_samples(40, 0.004, [&](int i, double t) {
     InsSample s = b.sample(t, i > last_before ? jump : Vec3::Zero());
     if (i > last_before && i <= last_before + without_fix) s.fix = FixStatus::none;
-    b.comparison.add(s);
-    if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
-    b.take();
-  }
+    return s;
+  });
   EXPECT_EQ(b.comparison.counters().jumps, 1U);
   ASSERT_TRUE(b.out.back().compared);
   EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
@@ -292,14 +298,10 @@ TEST(Comparison, severalJumpsBeforeAPoseAreAllCounted) {
   const Vec3 first(30, 100, 0), second(-60, -100, 0);
   for (const Vec3& between : {first, second}) {
     Bench b;
-    for (int i = 0; i <= 60 * 120; ++i) {
-      const double t = i / 120.0;
-      Vec3 shift = Vec3::Zero();
-      if (t > 9.9 && t < 10.6) shift = t < 10.3 ? first : between;
-      b.comparison.add(b.sample(t, shift));
-      if (t > 1 && i % 3 == 1) b.comparison.add(b.pose(t - 1.004));
-      b.take();
-    }
+    b.drive_by_samples(60, 1.004, [&](int, double t) {
+      if (t <= 9.9 || t >= 10.6) return b.sample(t);
+      return b.sample(t, t < 10.3 ? first : between);
+    });
     EXPECT_EQ(b.comparison.counters().jumps, between == first ? 2U : 3U);
     ASSERT_TRUE(b.out.back().compared);
     EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
@@ -376,7 +378,8 @@ TEST(Comparison, standstillKeepsTheLastCourse) {
   for (const ComparedPose& c : b.out) {
     const double t = (c.pose.stamp - at(0)).to_seconds();
     if (t < 0.9) {
-      EXPECT_NE(c.ins, InsMatch::ok) << t;  // no heading was ever known
+      // No heading was known yet.
+      EXPECT_NE(c.ins, InsMatch::ok) << t;
     } else if (t > 1.1) {
       EXPECT_EQ(c.ins, InsMatch::ok) << t;
     }
@@ -402,8 +405,9 @@ TEST(Comparison, scaleErrorAboveTwoPercentIsReported) {
 TEST(Comparison, invalidSamplesAreRefusedAndCounted) {
   Bench b;
   b.comparison.add(b.sample(1.0));
-  b.comparison.add(b.sample(1.0));  // the same stamp
-  b.comparison.add(b.sample(0.5));  // older
+  // The second sample has the same stamp, the third is older.
+  b.comparison.add(b.sample(1.0));
+  b.comparison.add(b.sample(0.5));
   EXPECT_EQ(b.comparison.counters().ins_refused, 2U);
   InsSample s = b.sample(1.1);
   std::swap(s.position.latitude_deg, s.position.longitude_deg);
@@ -442,10 +446,8 @@ TEST(Comparison, insClockSetBackIsAcceptedAfterASecond) {
 
 TEST(Comparison, hourAt120HzAllocatesNothing) {
   Bench b;
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::uint64_t out = 0;
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     ComparedPose c;
     for (int i = 0; i < 3600 * 120; ++i) {
       const double t = i / 120.0;
@@ -455,8 +457,7 @@ TEST(Comparison, hourAt120HzAllocatesNothing) {
     }
     b.comparison.finish();
     while (b.comparison.next(&c)) ++out;
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   EXPECT_EQ(out, 108000U);
   EXPECT_GT(b.comparison.counters().compared, 107000U);
 }

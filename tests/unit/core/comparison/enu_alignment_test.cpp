@@ -11,7 +11,8 @@ namespace vergence {
 namespace {
 
 const Duration kCorrelation = Duration::seconds(10);
-const Mat3 kCameraInEnu = (Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();  // looks east
+// The camera looks east.
+const Mat3 kCameraInEnu = (Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();
 
 Transform truth() { return {exp_so3({0.02, -0.03, 2.5}) * kCameraInEnu, {30, -40, 5}}; }
 
@@ -21,9 +22,8 @@ std::vector<EnuAlignmentPair> drive(double length, double bend, int count,
   std::vector<EnuAlignmentPair> pairs;
   for (int i = 0; i < count; ++i) {
     const double s = length * i / (count - 1);
-    EnuAlignmentPair p;
-    p.stamp = Stamp{} + Duration::seconds(s / 10.0);
-    p.p_world_left = {bend * s * s / length, -0.01 * s, s};
+    EnuAlignmentPair p{.stamp = Stamp{} + Duration::seconds(s / 10.0),
+                       .p_world_left = {bend * s * s / length, -0.01 * s, s}};
     p.p_enu_left = truth() * p.p_world_left;
     p.R_enu_world = truth().R;
     p.position_sigma = sigma[0];
@@ -84,8 +84,10 @@ TEST(FitEnuAlignment, tiltAndPositionsAreWeightedBySigma) {
     EXPECT_EQ(fit_enu_alignment(pairs, kCorrelation, &alignment), EnuAlignmentStatus::ok);
     return rotation_error(alignment);
   };
-  EXPECT_LT(pitched(1.0), 0.02 * wrong);   // The attitude has no weight.
-  EXPECT_GT(pitched(1e-5), 0.98 * wrong);  // The attitude has all the weight.
+  // The attitude has no weight.
+  EXPECT_LT(pitched(1.0), 0.02 * wrong);
+  // The attitude has all the weight.
+  EXPECT_GT(pitched(1e-5), 0.98 * wrong);
   // Two independent heights over 100 m (10 s, correlation 10 s) hold the pitch to σ_h √12 / (L √2).
   const double sigma_pitch = 5.0 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
   const double tilt = 0.1, expected = wrong / (1.0 + tilt * tilt / (sigma_pitch * sigma_pitch));
@@ -100,7 +102,8 @@ TEST(FitEnuAlignment, headingSigmaFollowsFromPositionSigma) {
             EnuAlignmentStatus::ok);
   const double expected = 2.5 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
   EXPECT_NEAR(alignment.rotation_sigma.z(), expected, 0.02 * expected);
-  EXPECT_GT(alignment.rotation_sigma.z(), 0.017);  // a degree or more
+  // The heading is uncertain by a degree or more.
+  EXPECT_GT(alignment.rotation_sigma.z(), 0.017);
   EXPECT_NEAR(alignment.position_sigma.x(), 2.5 / std::sqrt(2.0), 0.01);
 }
 
@@ -112,7 +115,8 @@ TEST(FitEnuAlignment, sigmasMatchErrorsOfNoisyDrives) {
   Vec3 nees = Vec3::Zero();
   for (int run = 0; run < runs; ++run) {
     auto pairs = drive(100, 0.3, 60, {2.5, 5.0, 0.0087});
-    const Vec3 tilt(0.0087 * random.normal(), 0.0087 * random.normal(), 0);  // one error a drive
+    // The tilt error is constant during a drive.
+    const Vec3 tilt(0.0087 * random.normal(), 0.0087 * random.normal(), 0);
     for (EnuAlignmentPair& p : pairs) {
       p.p_enu_left += Vec3(2.5 * random.normal(), 2.5 * random.normal(), 5.0 * random.normal());
       p.R_enu_world = exp_so3(tilt) * p.R_enu_world;
@@ -143,12 +147,12 @@ TEST(FitEnuAlignment, residualsBeyondTheSigmasWidenTheResult) {
 }
 
 TEST(FitEnuAlignment, insufficientPairsGiveTheirStatus) {
-  EnuAlignment alignment;
-  alignment.revision = 7;
+  EnuAlignment alignment{.revision = 7};
   EXPECT_EQ(fit_enu_alignment(drive(100, 0.3, 2), kCorrelation, &alignment),
             EnuAlignmentStatus::too_few);
+  // Half a metre is less than the position sigma of 2.5 m.
   EXPECT_EQ(fit_enu_alignment(drive(0.5, 0.0, 50), kCorrelation, &alignment),
-            EnuAlignmentStatus::not_held);  // half a metre against 2.5 m
+            EnuAlignmentStatus::not_held);
   EXPECT_EQ(fit_enu_alignment(drive(0.0, 0.0, 50), kCorrelation, &alignment),
             EnuAlignmentStatus::not_held);
   auto pairs = drive(100, 0.3, 50);

@@ -15,7 +15,8 @@ namespace {
 
 struct KnownPoint {
   Geodetic origin, point;
-  Vec3 enu;  // m, six decimals
+  // ENU coordinates in m, with six decimals.
+  Vec3 enu;
 };
 
 // Both hemispheres, computed with GeographicLib's CartConvert and checked through earth-centred
@@ -58,7 +59,8 @@ TEST(LocalTangentPlane, rotationFromIsTheCoordinateDerivative) {
 
 TEST(Geodetic, swappedOrNonFiniteIsNotPlausible) {
   EXPECT_TRUE((Geodetic{-27.4975, 153.0137, 60}).plausible());
-  EXPECT_FALSE((Geodetic{153.0137, -27.4975, 60}).plausible());  // swapped
+  // Latitude and longitude are swapped.
+  EXPECT_FALSE((Geodetic{153.0137, -27.4975, 60}).plausible());
   EXPECT_FALSE((Geodetic{std::nan(""), 0, 0}).plausible());
   EXPECT_FALSE((Geodetic{0, std::nan(""), 0}).plausible());
   EXPECT_FALSE((Geodetic{0, 0, std::nan("")}).plausible());
@@ -66,10 +68,11 @@ TEST(Geodetic, swappedOrNonFiniteIsNotPlausible) {
 
 TEST(CompassHeading, headingIsClockwiseFromNorth) {
   constexpr double kPi = std::numbers::pi;
-  EXPECT_NEAR(compass_heading_deg(0), 90, 1e-12);          // east
-  EXPECT_NEAR(compass_heading_deg(kPi / 2), 0, 1e-12);     // north
-  EXPECT_NEAR(compass_heading_deg(-kPi / 2), 180, 1e-12);  // south
-  EXPECT_NEAR(compass_heading_deg(kPi), 270, 1e-12);       // west
+  // The headings are east, north, south and west.
+  EXPECT_NEAR(compass_heading_deg(0), 90, 1e-12);
+  EXPECT_NEAR(compass_heading_deg(kPi / 2), 0, 1e-12);
+  EXPECT_NEAR(compass_heading_deg(-kPi / 2), 180, 1e-12);
+  EXPECT_NEAR(compass_heading_deg(kPi), 270, 1e-12);
   EXPECT_NEAR(compass_heading_deg(5 * kPi / 2 + 0.1), 360 - 0.1 * 180 / kPi, 1e-9);
 }
 
@@ -99,7 +102,8 @@ TEST(LocalTangentPlane, recordedDriveMatchesToTwoMicrometres) {
     ASSERT_EQ(v.size(), 7U);
     const Geodetic place{v[1], v[2], v[3]};
     if (rows == 0) plane = LocalTangentPlane(place);
-    EXPECT_LT((plane.to_enu(place) - Vec3(v[4], v[5], v[6])).norm(), 2e-6) << line;  // six decimals
+    // The file has six decimals.
+    EXPECT_LT((plane.to_enu(place) - Vec3(v[4], v[5], v[6])).norm(), 2e-6) << line;
     ++rows;
   }
   EXPECT_EQ(rows, 3565);

@@ -20,7 +20,8 @@ namespace {
 
 constexpr Stamp kStart{1'000'000'000'000};
 const Vec3 kLever(0.9, 0.375, 0.5);
-const Vec3 kBoresight(0.02, -0.03, 0.05);  // rad
+// Boresight in rad.
+const Vec3 kBoresight(0.02, -0.03, 0.05);
 
 struct Drove {
   std::vector<StampedPose> estimate;
@@ -32,26 +33,27 @@ struct How {
   std::uint64_t seed = 1;
   bool ideal = false;
   bool velocity = true;
-  double late_s = 0;    // of the reference's stamps
-  double rate = 60;     // Hz, of the reference
-  double jitter_s = 0;  // of the reference's stamps, with what they stamp: either way at most
+  // Delay of the reference's stamps.
+  double late_s = 0;
+  // Rate of the reference in Hz.
+  double rate = 60;
+  // Maximum shift of a reference sample and its stamp in either direction.
+  double jitter_s = 0;
 };
 
 /// The left camera as an odometry would have it (in its own world, drifting a little), and the
 /// mock's INS.
 Drove drove(const How& how) {
-  mock::DriveOptions options;
-  options.kind = how.kind;
-  options.seed = how.seed;
+  mock::DriveOptions options{.kind = how.kind, .seed = how.seed};
   const Transform T_body_left = mock::default_T_body_left();
   const Transform T_body_ins = T_body_left * mount_of(kLever, kBoresight).inverse();
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   const mock::RigTruth truth(test::empty_town(), options, rig, T_body_left, T_body_ins, {});
   const double length = truth.drive().duration().to_seconds();
   Drove d;
   Random random(how.seed, 40);
-  constexpr double kFrames = 20;  // Hz
+  // Frame rate in Hz.
+  constexpr double kFrames = 20;
   const Transform T_enu_first = truth.camera_in_enu(0, {});
   Transform T_world_left, before = T_enu_first;
   for (double t = 0; t < length; t += 1 / kFrames) {
@@ -73,8 +75,7 @@ Drove drove(const How& how) {
     const double t = even + how.jitter_s * jitter.uniform(-1, 1);
     const InsSample s = ins.sample(number++, Duration::seconds(t));
     const Mat3 R_enu_local = plane.rotation_from(s.position);
-    MountReference r;
-    r.stamp = kStart + Duration::seconds(t + how.late_s);
+    MountReference r{.stamp = kStart + Duration::seconds(t + how.late_s)};
     r.T_enu_ref.R = R_enu_local * Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1],
                                                      s.q_enu_ins[2])
                                       .toRotationMatrix();
@@ -88,18 +89,18 @@ Drove drove(const How& how) {
 
 Mat3 nominal() { return mount_of(Vec3::Zero(), Vec3::Zero()).R; }
 
+MountStatus estimate(const Drove& d, Mount* m) {
+  return estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, m);
+}
+
 /// Ground truth in Mount's parameters.
 Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().transpose()); }
 
 TEST(Mount, idealReferenceGivesTheExtrinsics) {
   for (const bool velocity : {true, false}) {
-    How how;
-    how.ideal = true;
-    how.velocity = velocity;
-    how.late_s = 0.012;
-    const Drove d = drove(how);
+    const Drove d = drove({.ideal = true, .velocity = velocity, .late_s = 0.012});
     Mount m;
-    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    ASSERT_EQ(estimate(d, &m), MountStatus::ok);
     for (std::size_t k = 0; k < 3; ++k) {
       ASSERT_TRUE(m.rotation[k].observable) << k;
       EXPECT_NEAR(m.rotation[k].value, true_turn()[static_cast<int>(k)], 1e-4);
@@ -119,20 +120,17 @@ TEST(Mount, slowReferenceGivesTheExtrinsics) {
   for (const Slow slow : {Slow{0.5, 0}, Slow{1, 0}, Slow{1.33, 0.01}, Slow{2, 0}, Slow{2, 0.005},
                           Slow{2.5, 0}, Slow{2.67, 0.005}, Slow{3, 0.005}}) {
     SCOPED_TRACE(testing::Message() << slow.rate << " Hz, jitter " << slow.jitter_s);
-    How how;
-    how.ideal = true;
-    how.late_s = 0.012;
-    how.rate = slow.rate;
-    how.jitter_s = slow.jitter_s;
-    const Drove d = drove(how);
+    const Drove d =
+        drove({.ideal = true, .late_s = 0.012, .rate = slow.rate, .jitter_s = slow.jitter_s});
     Mount m;
-    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    ASSERT_EQ(estimate(d, &m), MountStatus::ok);
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       const MountValue &turn = m.rotation[k], &arm = m.lever_arm[k];
       EXPECT_NEAR(turn.value, true_turn()[i], 3 * turn.sigma);
       EXPECT_NEAR(arm.value, kLever[i], 3 * arm.sigma);
-      EXPECT_LT(turn.sigma, 1e-3);  // what poses are interpolated by between frames
+      // Interpolation between frames limits the rotation sigma.
+      EXPECT_LT(turn.sigma, 1e-3);
       EXPECT_LT(arm.sigma, 5e-3);
     }
     EXPECT_NEAR(m.clock_offset.value, 0.012, 3 * m.clock_offset.sigma);
@@ -146,15 +144,13 @@ void sigmas_hold(bool velocity) {
   std::array<std::vector<double>, 7> ratios, sigmas;
   int heights = 0;
   for (int seed = 1; seed <= kDrives; ++seed) {
-    How how;
-    how.kind = seed % 2 == 0 ? mock::DriveKind::loop : mock::DriveKind::figure_eight;
-    how.seed = static_cast<std::uint64_t>(seed);
-    how.velocity = velocity;
-    how.late_s = 0.02;
-    const Drove d = drove(how);
+    const Drove d =
+        drove({.kind = seed % 2 == 0 ? mock::DriveKind::loop : mock::DriveKind::figure_eight,
+               .seed = static_cast<std::uint64_t>(seed),
+               .velocity = velocity,
+               .late_s = 0.02});
     Mount m;
-    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok)
-        << seed;
+    ASSERT_EQ(estimate(d, &m), MountStatus::ok) << seed;
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       sigmas[k].push_back(m.rotation[k].sigma);
@@ -195,12 +191,9 @@ TEST(Mount, sigmasMatchErrorsWithVelocity) { sigmas_hold(true); }
 TEST(Mount, sigmasMatchErrorsByPositionAlone) { sigmas_hold(false); }
 
 TEST(Mount, leverArmIsUnobservableOnAStraight) {
-  How how;
-  how.kind = mock::DriveKind::straight;
-  how.velocity = false;
-  const Drove d = drove(how);
+  const Drove d = drove({.kind = mock::DriveKind::straight, .velocity = false});
   Mount m;
-  ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+  ASSERT_EQ(estimate(d, &m), MountStatus::ok);
   EXPECT_FALSE(m.lever_arm[0].observable) << m.lever_arm[0].sigma;
   EXPECT_FALSE(m.lever_arm[2].observable) << m.lever_arm[2].sigma;
   EXPECT_EQ(m.T_ref_est.t.x(), 0) << "no number";
@@ -219,28 +212,18 @@ void reverse(std::vector<MountReference>* reference) {
 TEST(Mount, unrelatedTrajectoriesDoNotConverge) {
   for (const mock::DriveKind kind : {mock::DriveKind::loop, mock::DriveKind::figure_eight})
     for (const bool velocity : {true, false}) {
-      How how;
-      how.kind = kind;
-      how.velocity = velocity;
-      how.late_s = 1;
-      Mount m;
-      m.moments = 77;
+      How how{.kind = kind, .velocity = velocity, .late_s = 1};
+      Mount m{.moments = 77};
       Drove d = drove(how);
-      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-                MountStatus::not_converged)
-          << "a second late";
+      EXPECT_EQ(estimate(d, &m), MountStatus::not_converged) << "a second late";
       how.late_s = 0;
       d = drove(how);
       reverse(&d.reference);
-      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-                MountStatus::not_converged)
-          << "reversed";
+      EXPECT_EQ(estimate(d, &m), MountStatus::not_converged) << "reversed";
       how.seed = 2;
       how.kind = mock::DriveKind::straight;
       d.reference = drove(how).reference;
-      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-                MountStatus::not_converged)
-          << "another drive";
+      EXPECT_EQ(estimate(d, &m), MountStatus::not_converged) << "another drive";
       EXPECT_EQ(m.moments, 77U);
     }
 }
@@ -248,9 +231,7 @@ TEST(Mount, unrelatedTrajectoriesDoNotConverge) {
 /// The residuals of 15 degrees that a fit may have at most: half their square is the two degrees
 /// that count as seen.
 TEST(Mount, swayingAttitudeDoesNotConverge) {
-  How how;
-  how.ideal = true;
-  how.velocity = false;
+  How how{.ideal = true, .velocity = false};
   const auto swaying = [&](double degrees) {
     Drove d = drove(how);
     for (MountReference& r : d.reference) {
@@ -259,7 +240,7 @@ TEST(Mount, swayingAttitudeDoesNotConverge) {
       r.T_enu_ref.R = exp_so3(Vec3(0, 0, sway)) * r.T_enu_ref.R;
     }
     Mount m;
-    return estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m);
+    return estimate(d, &m);
   };
   EXPECT_EQ(swaying(13), MountStatus::ok);
   EXPECT_EQ(swaying(18), MountStatus::not_converged);
@@ -269,29 +250,22 @@ TEST(Mount, insufficientDataGivesStatusAndKeepsResult) {
   How still;
   still.kind = mock::DriveKind::still;
   Drove d = drove(still);
-  Mount m;
-  m.moments = 77;
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::no_motion);
+  Mount m{.moments = 77};
+  EXPECT_EQ(estimate(d, &m), MountStatus::no_motion);
   d.estimate.resize(10);
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::too_few);
+  EXPECT_EQ(estimate(d, &m), MountStatus::too_few);
   EXPECT_EQ(estimate_ins_extrinsics({}, {}, nominal(), {}, &m), MountStatus::too_few);
   d = drove({});
   for (MountReference& r : d.reference) r.stamp = r.stamp + Duration::seconds(1e6);
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::too_few)
-      << "no time in common";
+  EXPECT_EQ(estimate(d, &m), MountStatus::too_few) << "no time in common";
   // Three readings a second apart, and none for a dozen seconds: eighteen follow on another.
-  How slow;
-  slow.rate = 1;
+  How slow{.rate = 1};
   d = drove(slow);
   std::vector<MountReference> apart;
   for (std::size_t i = 0; i < d.reference.size(); ++i)
     if (i % 15 < 3) apart.push_back(d.reference[i]);
   d.reference = apart;
-  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
-            MountStatus::too_few);
+  EXPECT_EQ(estimate(d, &m), MountStatus::too_few);
   EXPECT_EQ(m.moments, 77U);
 }
 

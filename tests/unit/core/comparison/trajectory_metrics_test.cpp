@@ -61,7 +61,8 @@ TEST(Associate, unmatchedPosesAreCountedByCause) {
   const std::vector<StampedPose> estimate{pose(0.9), pose(1.0), pose(1.1), pose(1.3),
                                           pose(1.5), pose(1.6), pose(1.7)};
   EvaluationOptions options;
-  options.max_gap = Duration::milliseconds(200);  // exactly the first interval: still bridged
+  // The first interval has exactly this length and is still bridged.
+  options.max_gap = Duration::milliseconds(200);
   const MatchedTrajectories m = associate(estimate, reference, options);
   EXPECT_EQ(m.before, 1U);
   EXPECT_EQ(m.after, 1U);
@@ -69,8 +70,8 @@ TEST(Associate, unmatchedPosesAreCountedByCause) {
   ASSERT_EQ(m.reference.size(), 4U);
   EXPECT_DOUBLE_EQ(m.reference[0].T_world_body.t.x(), 1);
   EXPECT_DOUBLE_EQ(m.reference[1].T_world_body.t.x(), 1.5);
-  EXPECT_DOUBLE_EQ(m.reference[2].T_world_body.t.x(),
-                   3);  // A reference at the same stamp counts beside any gap.
+  // A reference with the same stamp matches despite the gap next to it.
+  EXPECT_DOUBLE_EQ(m.reference[2].T_world_body.t.x(), 3);
   EXPECT_DOUBLE_EQ(m.reference[3].T_world_body.t.x(), 4);
 }
 
@@ -78,8 +79,7 @@ TEST(Associate, nearestMatchesUpToTheLimitInclusive) {
   const std::vector<StampedPose> reference{pose(1.0, {1, 0, 0}), pose(1.1, {2, 0, 0})};
   const std::vector<StampedPose> estimate{pose(0.994), pose(0.995), pose(1.004), pose(1.05),
                                           pose(1.097), pose(1.105), pose(1.106)};
-  EvaluationOptions options;
-  options.association = Association::nearest;
+  EvaluationOptions options{.association = Association::nearest};
   const MatchedTrajectories m = associate(estimate, reference, options);
   ASSERT_EQ(m.reference.size(), 4U);
   const double expected[] = {1, 1, 2, 2};
@@ -94,7 +94,8 @@ TEST(Associate, nanosecondsAtADateAreKept) {
   constexpr std::int64_t date = 1403636584763555584;
   std::vector<StampedPose> reference = line(2, 100.0), estimate = line(1, 0.0);
   reference[0].stamp = Stamp(date);
-  reference[1].stamp = Stamp(date + 100);  // less than a double's step at this date
+  // The step is smaller than a double's resolution at this date.
+  reference[1].stamp = Stamp(date + 100);
   estimate[0].stamp = Stamp(date + 25);
   const MatchedTrajectories m = associate(estimate, reference, {});
   ASSERT_EQ(m.reference.size(), 1U);
@@ -154,7 +155,8 @@ TEST(Evaluate, scaledEstimateGivesPathRatioAndScale) {
   EXPECT_NEAR(e.path_ratio, 1.02, kRounding);
   EXPECT_NEAR(e.sim3.scale, 1 / 1.02, kRounding);
   EXPECT_LT(e.ate_sim3.max, 1e-9);
-  EXPECT_GT(e.ate_se3.rmse, 0.1);  // reported, not applied
+  // The scale error is reported and not applied.
+  EXPECT_GT(e.ate_se3.rmse, 0.1);
   // The chord of 0.1 rad on a radius of 10 m, and its climb.
   EXPECT_NEAR(e.path_reference, 99 * std::hypot(20 * std::sin(0.05), 0.05), 1e-9);
 }
@@ -185,11 +187,10 @@ TEST(Evaluate, headingErrorWrapsToTheShorterArc) {
   for (int i = 0; i < 10; ++i) {
     const double yaw = i == 0 ? 0.0 : 3.1;
     reference.push_back(pose(0.1 * i, {1.0 * i, std::sin(i), 0}, {0, 0, yaw}));
-    estimate.push_back(pose(0.1 * i, {1.0 * i, std::sin(i), 0},
-                            {0, 0, i == 0 ? 0.0 : yaw + 0.1}));  // 3.2 is −3.08
+    // A yaw of 3.2 is −3.08.
+    estimate.push_back(pose(0.1 * i, {1.0 * i, std::sin(i), 0}, {0, 0, i == 0 ? 0.0 : yaw + 0.1}));
   }
-  EvaluationOptions options;
-  options.axes = BodyAxes::forward_left_up;
+  EvaluationOptions options{.axes = BodyAxes::forward_left_up};
   EXPECT_NEAR(evaluate(estimate, reference, options).heading_start_aligned.last, 0.1, kRounding);
 }
 
@@ -198,12 +199,14 @@ TEST(Evaluate, knownDriftGivesTheEndErrors) {
   std::vector<StampedPose> estimate = reference;
   for (StampedPose& p : estimate) p.T_world_body.t *= 1.01;
   estimate.back().T_world_body.R = exp_so3({0, 0.02, 0});
-  const Transform elsewhere{exp_so3({0, 0, 1}), {50, 50, 50}};  // start alignment takes it out
+  // The start alignment removes this transform.
+  const Transform elsewhere{exp_so3({0, 0, 1}), {50, 50, 50}};
   const TrajectoryEvaluation e = evaluate(moved(elsewhere, 1.0, estimate), reference, {});
   EXPECT_NEAR(e.end_error_start_aligned, 1.0, 1e-9);
   EXPECT_NEAR(e.end_error_ratio, 0.01, 1e-11);
   EXPECT_NEAR(e.end_rotation_start_aligned, 0.02, 1e-9);
-  EXPECT_NEAR(e.end_error_se3, 0.5, 1e-9);  // centred: half the excess at either end
+  // The alignment is centred and leaves half of the excess at either end.
+  EXPECT_NEAR(e.end_error_se3, 0.5, 1e-9);
   EXPECT_TRUE(e.se3.roll_unobservable);
 }
 
@@ -213,21 +216,22 @@ TEST(SegmentErrors, segmentEndsAtFirstPoseBeyondItsLength) {
   SegmentOptions options{{10, 11, 5}, 1, false};
   const SegmentErrors s = segment_errors(estimate, reference, options);
   ASSERT_EQ(s.per_length.size(), 3U);
-  EXPECT_EQ(s.per_length[0].count, 1U);  // pose 0 to pose 11: pose 10 is at 10 m, not beyond
+  // The segment ends at pose 11, because pose 10 is at 10 m and not beyond.
+  EXPECT_EQ(s.per_length[0].count, 1U);
   EXPECT_NEAR(s.per_length[0].translation, 0.11 / 10, 1e-13);
   EXPECT_EQ(s.per_length[1].count, 0U);
   EXPECT_TRUE(std::isnan(s.per_length[1].translation));
   EXPECT_EQ(s.per_length[2].count, 6U);
   EXPECT_NEAR(s.per_length[2].translation, 0.06 / 5, 1e-13);
   EXPECT_EQ(s.count, 7U);
-  EXPECT_NEAR(s.translation, (0.11 / 10 + 6 * 0.06 / 5) / 7,
-              1e-13);  // over all segments, not over the lengths' means
+  // The mean is over all segments and not over the means of the lengths.
+  EXPECT_NEAR(s.translation, (0.11 / 10 + 6 * 0.06 / 5) / 7, 1e-13);
   EXPECT_NEAR(s.rotation, 0, 1e-13);
 
   EXPECT_NEAR(segment_errors(estimate, reference, options, 1 / 1.01).translation, 0, 1e-13);
   options.step = 4;
-  EXPECT_EQ(segment_errors(estimate, reference, options).per_length[2].count,
-            2U);  // from poses 0 and 4
+  // The segments start at poses 0 and 4.
+  EXPECT_EQ(segment_errors(estimate, reference, options).per_length[2].count, 2U);
 }
 
 TEST(SegmentErrors, rotationErrorIsPerMetre) {
@@ -250,8 +254,7 @@ TEST(Evaluate, shortPathHasNoSegmentErrorInsteadOfZero) {
 
 TEST(Evaluate, scaledSegmentsRemoveTheSim3Scale) {
   const std::vector<StampedPose> reference = helix(300);
-  EvaluationOptions options;
-  options.segments = {{{10, 20}, 1, false}, {{10, 20}, 1, true}};
+  EvaluationOptions options{.segments = {{{10, 20}, 1, false}, {{10, 20}, 1, true}}};
   const TrajectoryEvaluation e = evaluate(moved({}, 1.03, reference), reference, options);
   EXPECT_GT(e.segments[0].translation, 0.02);
   EXPECT_LT(e.segments[1].translation, 1e-10);

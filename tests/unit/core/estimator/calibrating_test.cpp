@@ -1,65 +1,36 @@
 // The estimator and its rig, on a corridor drawn ray by ray.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <optional>
-#include <string>
 #include <vector>
 
-#include "core/estimator/estimator.hpp"
-#include "core/memory/allocation_guard.hpp"
-#include "tests/unit/core/odometry/corridor.hpp"
+#include "tests/unit/core/estimator/corridor_drive.hpp"
 
 namespace vergence {
 namespace {
 
-using odometry::test::Corridor;
 using Kind = EstimatorEvent::Kind;
 
-struct Drive {
-  Corridor corridor;
-  EstimatorOptions options;
-  RigCalibration given, nominal;
-  std::optional<Arena> arena;
-  SequentialRunner runner;
-  ImmediateRunner solver;
-  std::optional<Estimator> estimator;
-  std::vector<PoseSample> samples;
-  std::vector<EstimatorEvent> events;
-  std::vector<CalibrationDecision>
-      decisions;  // those sought; what the drive learns on the way is verifying_test's
-
-  explicit Drive(CalibrationTrust trust) : given(corridor.rig()), nominal(given) {
+/// Decisions are those of requested estimations; verifying_test covers refinements.
+struct Drive : test::CorridorDrive {
+  explicit Drive(CalibrationTrust trust) {
     options.trust = trust;
     options.calibration.intrinsics = calibration::IntrinsicsEstimation::fixed;
-    nominal.T_camera_left[1] = {Mat3::Identity(), {-given.baseline, 0, 0}};
-    if (trust == CalibrationTrust::none)
-      for (Transform& T : given.T_camera_left) T = {};
-    else
-      given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
+    if (trust != CalibrationTrust::none) return;
+    given = corridor.rig();
+    for (Transform& T : given.T_camera_left) T = {};
   }
-  void begin() {
-    arena.emplace();
-    estimator.emplace(options, given, nominal, *arena, runner, solver);
-  }
-  void give(const RigFrame& frame) {
-    samples.push_back(estimator->process(frame));
-    note();
-  }
-  void note() {
-    events.insert(events.end(), estimator->events().begin(), estimator->events().end());
-    for (const CalibrationDecision& decision : estimator->calibrations())
-      if (!decision.is_refinement) decisions.push_back(decision);
-  }
-  void drive(int first, int last) {
-    for (int i = first; i < last; ++i) give(corridor.frame(i));
-  }
+  void drive(int first, int last) { drive(first, last, corridor.rig().T_camera_left); }
   void drive(int first, int last, const std::array<Transform, kMaxCameras>& rig) {
     for (int i = first; i < last; ++i) give(corridor.frame(i, rig));
+    keep_requested();
   }
-  [[nodiscard]] int count(Kind kind) const {
-    return static_cast<int>(std::count_if(
-        events.begin(), events.end(), [kind](const EstimatorEvent& e) { return e.kind == kind; }));
+  void finish() {
+    estimator->finish();
+    note();
+    keep_requested();
+  }
+  void keep_requested() {
+    std::erase_if(decisions, [](const CalibrationDecision& d) { return d.is_refinement; });
   }
   /// State by state, as the events have it.
   [[nodiscard]] std::vector<State> way() const {
@@ -72,16 +43,6 @@ struct Drive {
     }
     return states;
   }
-  [[nodiscard]] std::string story() const {
-    std::string text;
-    for (const EstimatorEvent& e : events)
-      text += std::string(to_string(e.from)) + " → " + std::string(to_string(e.to)) + ": " + e.why +
-              '\n';
-    for (const PoseSample& s : samples)
-      text += std::to_string(s.frame) + ' ' + std::string(to_string(s.status)) + ' ' +
-              std::string(to_string(s.reason)) + '\n';
-    return text;
-  }
 };
 
 TEST(Calibrating, fromScratchReachesStereoOdometry) {
@@ -91,8 +52,8 @@ TEST(Calibrating, fromScratchReachesStereoOdometry) {
   d.drive(0, 100);
   EXPECT_EQ(d.way(), (std::vector{State::initialising, State::parallel_monocular,
                                   State::calibrating, State::stereo_odometry}))
-      << d.story();
-  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+      << d.story;
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story;
   const CalibrationDecision& decision = d.decisions[0];
   EXPECT_TRUE(decision.accepted);
   EXPECT_STREQ(decision.reason, "");
@@ -112,11 +73,11 @@ TEST(Calibrating, fromScratchReachesStereoOdometry) {
     EXPECT_LT(std::abs(shift[i]), 4 * sigma[static_cast<std::size_t>(i + 3)]) << i;
   // A pose on every frame, and ok only with a calibration.
   for (const PoseSample& s : d.samples) {
-    EXPECT_NE(s.status, PoseStatus::lost) << d.story();
-    EXPECT_EQ(s.status == PoseStatus::ok && s.state != State::stereo_odometry, false) << d.story();
+    EXPECT_NE(s.status, PoseStatus::lost) << d.story;
+    EXPECT_EQ(s.status == PoseStatus::ok && s.state != State::stereo_odometry, false) << d.story;
   }
 
-  EXPECT_EQ(d.samples.back().status, PoseStatus::ok) << d.story();
+  EXPECT_EQ(d.samples.back().status, PoseStatus::ok) << d.story;
 }
 
 TEST(Calibrating, adoptionWaitsForSixConfirmingFrames) {
@@ -125,9 +86,9 @@ TEST(Calibrating, adoptionWaitsForSixConfirmingFrames) {
     d.options.calibration.adopt_after = adopt_after;
     d.begin();
     for (int i = 0; i < 60 && d.decisions.empty(); ++i) d.drive(i, i + 1);
-    EXPECT_FALSE(d.decisions.empty()) << d.story();
+    EXPECT_FALSE(d.decisions.empty()) << d.story;
     if (d.decisions.empty()) return std::int64_t{0};
-    EXPECT_TRUE(d.decisions[0].accepted) << d.story();
+    EXPECT_TRUE(d.decisions[0].accepted) << d.story;
     return (d.decisions[0].stamp.ns() - 1'000'000'000) / 50'000'000;
   };
   const std::int64_t four = decided_at(4);
@@ -139,21 +100,22 @@ TEST(Calibrating, adoptionWaitsForSixConfirmingFrames) {
 // epipolar line shows a yaw: frames of both are never one solve, and those after confirm nothing
 // that was found before. 10 mrad are 2.8 px here.
 TEST(Calibrating, yawKnockDuringEstimationRestartsIt) {
-  constexpr int kKnock = 28;  // after the first snapshot, before its solution is judged
+  // The knock is after the first snapshot and before its solution is evaluated.
+  constexpr int kKnock = 28;
   Drive d(CalibrationTrust::none);
   d.begin();
   d.drive(0, kKnock);
   auto knocked = d.corridor.rig().T_camera_left;
   knocked[1].R = exp_so3({0, 0.01, 0}) * knocked[1].R;
   d.drive(kKnock, 75, knocked);
-  EXPECT_EQ(d.count(Kind::rig_changed), 1) << d.story();
-  ASSERT_FALSE(d.decisions.empty()) << d.story();
+  EXPECT_EQ(d.count(Kind::rig_changed), 1) << d.story;
+  ASSERT_FALSE(d.decisions.empty()) << d.story;
   for (const CalibrationDecision& decision : d.decisions) {
     if (!decision.accepted) continue;
     const Mat3 R = decision.calibration.T_camera_left[1].R;
-    EXPECT_LT(log_so3(R * knocked[1].R.transpose()).norm(), 0.003) << d.story();
+    EXPECT_LT(log_so3(R * knocked[1].R.transpose()).norm(), 0.003) << d.story;
   }
-  EXPECT_TRUE(d.decisions.back().accepted) << d.story();
+  EXPECT_TRUE(d.decisions.back().accepted) << d.story;
 }
 
 TEST(Calibrating, requestedCalibrationIsRejectedIfNoBetter) {
@@ -165,15 +127,15 @@ TEST(Calibrating, requestedCalibrationIsRejectedIfNoBetter) {
   d.drive(5, 66);
   EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating,
                                   State::stereo_odometry}))
-      << d.story();
+      << d.story;
   EXPECT_EQ(d.samples[6].state, State::recalibrating);
   EXPECT_EQ(d.samples[6].status, PoseStatus::degraded);
   EXPECT_EQ(d.samples[6].reason, Reason::recalibrating);
-  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story;
   EXPECT_EQ(d.decisions[0].cause, CalibrationCause::requested);
   EXPECT_GT(d.decisions[0].held_out_before_px, 0);
   // The one in use is the true one: a new one cannot fit better than by chance.
-  EXPECT_FALSE(d.decisions[0].accepted) << d.story();
+  EXPECT_FALSE(d.decisions[0].accepted) << d.story;
   EXPECT_EQ(d.estimator->calibration().T_camera_left[1].t, d.corridor.rig().T_camera_left[1].t);
   for (const PoseSample& s : d.samples) EXPECT_NE(s.status, PoseStatus::lost);
 }
@@ -182,20 +144,21 @@ TEST(Calibrating, pitchKnockIsDetectedAndRecalibrated) {
   Drive d(CalibrationTrust::given);
   d.begin();
   std::array<Transform, kMaxCameras> knocked = d.corridor.rig().T_camera_left;
-  knocked[1] = perturbed(knocked[1], {0.012, 0, 0}, Vec3::Zero());  // 3.4 px of row
+  // The pitch moves rows by 3.4 px.
+  knocked[1] = perturbed(knocked[1], {0.012, 0, 0}, Vec3::Zero());
   d.drive(0, 12);
   d.drive(12, 85, knocked);
   EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating,
                                   State::stereo_odometry}))
-      << d.story();
-  EXPECT_EQ(d.count(Kind::rig_changed), 1) << d.story();
-  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+      << d.story;
+  EXPECT_EQ(d.count(Kind::rig_changed), 1) << d.story;
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story;
   EXPECT_TRUE(d.decisions[0].accepted) << d.decisions[0].reason;
   EXPECT_GE(d.decisions[0].onset_frame, 12U);
   EXPECT_LT(d.decisions[0].held_out_after_px, d.decisions[0].held_out_before_px);
   EXPECT_NEAR(log_so3(d.estimator->calibration().T_camera_left[1].R * knocked[1].R.transpose()).x(),
               0.0, 1e-3);
-  for (const PoseSample& s : d.samples) EXPECT_NE(s.status, PoseStatus::lost) << d.story();
+  for (const PoseSample& s : d.samples) EXPECT_NE(s.status, PoseStatus::lost) << d.story;
 }
 
 TEST(Calibrating, offlineKeepsTheSuppliedCalibration) {
@@ -208,7 +171,7 @@ TEST(Calibrating, offlineKeepsTheSuppliedCalibration) {
   d.drive(5, 20, knocked);
   d.estimator->request_recalibration();
   d.drive(20, 25, knocked);
-  EXPECT_EQ(d.count(Kind::rig_changed), 0) << d.story();
+  EXPECT_EQ(d.count(Kind::rig_changed), 0) << d.story;
   EXPECT_EQ(d.estimator->state(), State::stereo_odometry);
   EXPECT_TRUE(d.decisions.empty());
   EXPECT_EQ(d.count(Kind::calibration_verified) + d.count(Kind::calibration_contradicted), 0);
@@ -220,10 +183,9 @@ TEST(Calibrating, finishDecidesAPendingCalibrationOnce) {
   Drive d(CalibrationTrust::none);
   d.begin();
   d.drive(0, 29);
-  EXPECT_TRUE(d.decisions.empty()) << d.story();
-  d.estimator->finish();
-  d.note();
-  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+  EXPECT_TRUE(d.decisions.empty()) << d.story;
+  d.finish();
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story;
   EXPECT_TRUE(d.decisions[0].accepted) << d.decisions[0].reason;
   d.estimator->finish();
   EXPECT_TRUE(d.estimator->calibrations().empty()) << "once";

@@ -5,12 +5,14 @@
 namespace vergence {
 namespace {
 
-constexpr int kEnough = 15;  // motions
+// Number of motions that make the baseline usable.
+constexpr int kEnough = 15;
 
 CovarianceBaseline driven(int motions) {
   CovarianceBaseline usual;
   for (int i = 0; i < motions; ++i) EXPECT_FALSE(usual.unusual(0.010 + 0.002 * (i % 5)));
-  return usual;  // 0.014 on the median
+  // The median is 0.014.
+  return usual;
 }
 
 TEST(CovarianceBaseline, threeTimesTheUsualSigmaIsUnusual) {

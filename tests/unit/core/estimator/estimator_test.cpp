@@ -8,41 +8,26 @@
 #include <vector>
 
 #include "core/math/random.hpp"
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
+#include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence {
 namespace {
 
-using features::test::draw;
-using features::test::Image;
-using features::test::Texture;
+using namespace features::test;
 
 constexpr int kWidth = 320, kHeight = 240;
-constexpr double kDisparity = 12.0;  // px
+// Disparity in px.
+constexpr double kDisparity = 12.0;
 
 RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
-  r.baseline = 0.5;
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = r.intrinsics[k];
-    c.width = kWidth;
-    c.height = kHeight;
-    c.fx = c.fy = 280;
-    c.cx = 160;
-    c.cy = 120;
-  }
-  r.T_camera_left[1].t = Vec3(-0.5, 0, 0);
-  return r;
+  return test::parallel_rig(
+      {.width = kWidth, .height = kHeight, .fx = 280, .fy = 280, .cx = 160, .cy = 120}, 0.5);
 }
 
 /// The calibration is taken as it is: a rig that stands could never confirm it.
-EstimatorOptions believing() {
-  EstimatorOptions o;
-  o.online = false;
-  return o;
-}
+EstimatorOptions believing() { return {.online = false}; }
 
 /// A rig that stands before a wall 12 px of disparity away. Every frame has noise of its own, as a
 /// sensor's would.
@@ -69,10 +54,9 @@ struct Standing {
     }
   }
   [[nodiscard]] RigFrame frame(int i) const {
-    RigFrame f;
-    f.number = static_cast<std::uint64_t>(i);
-    f.stamp = Stamp(1'000'000'000 + 50'000'000LL * i);
-    f.cameras = 2;
+    RigFrame f{.number = static_cast<std::uint64_t>(i),
+               .stamp = Stamp(1'000'000'000 + 50'000'000LL * i),
+               .cameras = 2};
     f.images[0] = left[static_cast<std::size_t>(i % kImages)].view();
     f.images[1] = right[static_cast<std::size_t>(i % kImages)].view();
     return f;
@@ -248,12 +232,9 @@ TEST(Estimator, invalidRigIsRefused) {
 
 TEST(Estimator, processingUsesTheArenaAndNoHeap) {
   Standing s;
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     for (int i = 0; i < 6; ++i) (void)s.give(i);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <optional>
-#include <string>
 
 #include "core/estimator/estimator.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
@@ -11,8 +10,7 @@
 namespace vergence {
 namespace {
 
-using features::test::copy_of;
-using features::test::Image;
+using namespace features::test;
 using odometry::test::Corridor;
 
 /// Camera `frozen` gives its image of frame 30 until frame 46: 0.8 s, 2.4 m.
@@ -21,8 +19,7 @@ class RepeatedImage : public testing::TestWithParam<std::size_t> {};
 TEST_P(RepeatedImage, repeatedImageIsNotTakenForStandstill) {
   constexpr int kFrozen = 30, kGoesOn = 47, kLast = 60;
   Corridor corridor;
-  EstimatorOptions options;
-  options.online = false;
+  EstimatorOptions options{.online = false};
   Arena arena;
   SequentialRunner runner;
   ImmediateRunner solver;

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tests/unit/core/calibration/feature_log.hpp"
 
 namespace vergence {
@@ -14,8 +12,10 @@ using calibration::Gate;
 /// A solve that found the true rig, frames that it does not rest on, and a calibration in use that
 /// is turned from it.
 struct Review {
-  static constexpr std::uint64_t kNewest = 5;  // the last frame of the solve
-  static constexpr double kSigma = 1e-4;       // of the rotation found, rad
+  // Last frame of the solve.
+  static constexpr std::uint64_t kNewest = 5;
+  // Sigma of the estimated rotation in rad.
+  static constexpr double kSigma = 1e-4;
 
   test::FeatureDriveOptions drive;
   Arena arena;
@@ -54,7 +54,8 @@ TEST(SolutionReview, identicalSolutionIsNoBetter) {
 }
 
 TEST(SolutionReview, pitchIsAcceptedByEpipolarLines) {
-  const Review r({1e-3, 0, 0});  // 0.7 px of every row
+  // The pitch moves every row by 0.7 px.
+  const Review r({1e-3, 0, 0});
   EXPECT_TRUE(r.lines_tell());
   EXPECT_EQ(r.gate(), Gate::open);
 }

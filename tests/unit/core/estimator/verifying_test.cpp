@@ -3,13 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
-#include <string>
-#include <vector>
 
-#include "core/estimator/estimator.hpp"
-#include "tests/unit/core/odometry/corridor.hpp"
+#include "tests/unit/core/estimator/corridor_drive.hpp"
 
 namespace vergence {
 namespace {
@@ -18,32 +13,17 @@ using odometry::test::Corridor;
 using Kind = EstimatorEvent::Kind;
 
 /// The corridor's rig, driven with a claim about it.
-struct SuppliedRig {
-  Corridor corridor;
-  EstimatorOptions options;
-  RigCalibration given = corridor.rig(), nominal = given;
-  std::optional<Arena> arena;
-  SequentialRunner runner;
-  ImmediateRunner solver;
-  std::optional<Estimator> estimator;
-  std::vector<PoseSample> samples;
-  std::vector<Kind> kinds;
-  std::vector<std::uint64_t> frames;  // of the events
-  std::vector<CalibrationDecision> decisions;
-  std::string story;
-  int dark_from = -1, dark_to = -1;  // frames without images: from, and the first one after them
+struct SuppliedRig : test::CorridorDrive {
+  // First frame without images and first frame with images again.
+  int dark_from = -1, dark_to = -1;
   // The corridor has an end: after so many frames the same way back, and forth again.
   static constexpr int kTurnAfter = 120;
-  static constexpr Duration kInterval = Duration::milliseconds(50);  // the corridor's
+  // Frame interval of the corridor.
+  static constexpr Duration kInterval = Duration::milliseconds(50);
 
-  SuppliedRig() {
-    nominal.T_camera_left[1] = {Mat3::Identity(), {-given.baseline, 0, 0}};
-    given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
-  }
   /// `knock_at`: from this frame on the rig is turned by `knock`.
   void drive(int last, int knock_at = -1, const Vec3& knock = Vec3::Zero()) {
-    arena.emplace();
-    estimator.emplace(options, given, nominal, *arena, runner, solver);
+    begin();
     for (int i = 0; i < last; ++i) {
       auto T_camera_left = corridor.rig().T_camera_left;
       if (knock_at >= 0 && i >= knock_at) T_camera_left[1].R = exp_so3(knock) * T_camera_left[1].R;
@@ -52,29 +32,8 @@ struct SuppliedRig {
       frame.number = static_cast<std::uint64_t>(i);
       frame.stamp = frame.stamp + kInterval * (i - place);
       if (i >= dark_from && i < dark_to) frame.images = {};
-      samples.push_back(estimator->process(frame));
-      story += std::to_string(i) + ' ' + std::string(to_string(samples.back().status)) + ' ' +
-               std::string(to_string(samples.back().reason)) + '\n';
-      for (const EstimatorEvent& e : estimator->events()) {
-        kinds.push_back(e.kind);
-        frames.push_back(samples.back().frame);
-        story += std::to_string(static_cast<int>(e.kind)) + ' ' + e.why + ' ' +
-                 std::to_string(e.value) + '\n';
-      }
-      for (const CalibrationDecision& d : estimator->calibrations()) {
-        decisions.push_back(d);
-        story += std::string(d.accepted ? "accepted " : "rejected ") + d.reason +
-                 ", depth off by " + std::to_string(d.depth_error_percent) + " %, sigma " +
-                 std::to_string(d.depth_sigma_percent) + " %\n";
-      }
+      give(frame);
     }
-  }
-  /// Frame of the first event of a kind from frame `from` on; −1: there was none.
-  [[nodiscard]] int first(Kind kind, int from = 0) const {
-    for (std::size_t i = 0; i < kinds.size(); ++i)
-      if (kinds[i] == kind && static_cast<int>(frames[i]) >= from)
-        return static_cast<int>(frames[i]);
-    return -1;
   }
 };
 
@@ -142,7 +101,8 @@ TEST(Verifying, yawKnockDuringOutageIsNeverOk) {
 // A full segment's result is the prior of later solves, but must not be after the rig has changed.
 void expect_mended_once(double yaw_rad) {
   SCOPED_TRACE(yaw_rad);
-  constexpr int kKnock = 80;  // after the first full segment
+  // The knock is after the first full segment.
+  constexpr int kKnock = 80;
   const Vec3 knock(0, yaw_rad, 0);
   SuppliedRig c;
   c.options.calibration.max_frames = 60;
@@ -212,7 +172,8 @@ TEST(Verifying, wrongYawIsContradictedAndReplaced) {
 // While the calibration is a claim, epipolar lines cannot say whether a yaw is new; disparities
 // that move all at once can. 10 mrad are 2.8 px here.
 TEST(Verifying, yawKnockBeforeVerificationIsDetected) {
-  constexpr int kKnock = 22;  // after the first snapshot, before it is decided
+  // The knock is after the first snapshot and before its decision.
+  constexpr int kKnock = 22;
   SuppliedRig c;
   c.drive(45, kKnock, {0, 0.01, 0});
   const int noticed = c.first(Kind::rig_changed);

@@ -10,7 +10,8 @@ WindowCorrection of(double moved_m) { return {moved_m, 0.5, 0.02}; }
 
 TEST(WindowCorrection, correctionBeyondSigmaAndShareIsReported) {
   EXPECT_FALSE(of(0.0).motion_unreliable());
-  EXPECT_FALSE(of(0.0249).motion_unreliable());  // 1.2 sigmas, 4.98 %
+  // The correction is 1.2 sigmas and 4.98 % of the motion.
+  EXPECT_FALSE(of(0.0249).motion_unreliable());
   EXPECT_TRUE(of(0.0251).motion_unreliable());
 }
 

@@ -7,16 +7,12 @@
 #include <utility>
 
 #include "core/features/detail/corner_kernel.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
 namespace {
 
-using test::draw;
-using test::Image;
-using test::Texture;
-using test::white_noise;
+using namespace test;
 
 constexpr int kWidth = 333, kHeight = 247;
 
@@ -73,8 +69,7 @@ TEST(Corners, scoresMatchOpenCvOnEveryTarget) {
 TEST(Corners, cornerIsTheStrongestPeakOfItsCell) {
   const Image image = textured();
   const cv::Mat scores = reference_scores(image);
-  CornerOptions options;
-  options.min_distance = 0;
+  CornerOptions options{.min_distance = 0};
   const Found found(image.view(), options);
   ASSERT_GT(found.corners.size(), 40U);
   for (const Corner& c : found.corners.span()) {
@@ -103,10 +98,7 @@ TEST(Corners, cornerIsTheStrongestPeakOfItsCell) {
 
 TEST(Corners, cornersAreSortedApartAndInsideTheBorder) {
   const Image image = white_noise(kWidth, kHeight, 2);
-  CornerOptions options;
-  options.cell = 24;
-  options.border = 19;
-  options.min_distance = 15;
+  CornerOptions options{.cell = 24, .border = 19, .min_distance = 15};
   const Found found(image.view(), options);
   ASSERT_GT(found.corners.size(), 30U);
   std::map<std::pair<int, int>, int> cells;
@@ -167,8 +159,7 @@ TEST(Corners, noByteOutsideTheImageIsRead) {
   for (const auto guard : {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind})
     for (const int border : {0, 5, 16}) {
       const test::GuardedImage image(white_noise(131, 99, 3), guard);
-      CornerOptions options;
-      options.border = border;
+      CornerOptions options{.border = border};
       test::on_every_target(
           [&](const char*) { EXPECT_GT(Found(image.view(), options).corners.size(), 0U); });
     }

@@ -4,26 +4,22 @@
 
 #include <numbers>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
 namespace {
 
-using test::draw;
-using test::Texture;
+using namespace test;
 
 constexpr int kWidth = 120, kHeight = 120;
 
 /// The descriptor at the middle of a picture.
 template <class Value>
-Descriptor of(const Value& value, int levels = 3) {
+Descriptor of(const Value& value) {
   const test::Image image = draw(kWidth, kHeight, value);
-  Arena arena;
-  Pyramid pyramid(kWidth, kHeight, levels, arena);
-  pyramid.build(image.view());
+  const test::Built built(image.view());
   Patch patch{};
-  EXPECT_TRUE(cut_patch(pyramid, {60, 60}, &patch));
+  EXPECT_TRUE(cut_patch(built.pyramid, {60, 60}, &patch));
   return describe(patch);
 }
 

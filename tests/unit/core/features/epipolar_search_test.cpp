@@ -4,28 +4,18 @@
 
 #include <functional>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
 namespace {
 
-using test::Built;
-using test::draw;
-using test::Image;
-using test::Texture;
+using namespace test;
 
 constexpr int kWidth = 480, kHeight = 320;
 using Grey = std::function<double(const Vec2&)>;
 
 Intrinsics lens(bool distorted) {
-  Intrinsics k;
-  k.width = kWidth;
-  k.height = kHeight;
-  k.fx = 400;
-  k.fy = 404;
-  k.cx = 236.4;
-  k.cy = 163.1;
+  Intrinsics k{.width = kWidth, .height = kHeight, .fx = 400, .fy = 404, .cx = 236.4, .cy = 163.1};
   if (distorted) k.distortion = {-0.28, 0.07, 0.0004, -0.0003, 0};
   return k;
 }
@@ -79,11 +69,7 @@ struct Wall {
 Transform beside() { return {Mat3::Identity(), Vec3(-0.5, 0, 0)}; }
 Transform turned() { return {exp_so3(Vec3(0.01, -0.015, 0.02)), Vec3(-0.5, 0.02, 0.03)}; }
 
-EpipolarSearchOptions to_two_metres() {
-  EpipolarSearchOptions o;
-  o.rho_last = 0.5;
-  return o;
-}
+EpipolarSearchOptions to_two_metres() { return {.rho_last = 0.5}; }
 
 TEST(EpipolarSearch, depthIsFoundToAPixelOfItsLevel) {
   for (const bool distorted : {false, true})

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "core/features/corners.hpp"
 #include "core/features/surf.hpp"
@@ -12,9 +11,7 @@
 namespace vergence::features {
 namespace {
 
-using test::draw;
-using test::Image;
-using test::Texture;
+using namespace test;
 
 constexpr int kWidth = 333, kHeight = 247;
 

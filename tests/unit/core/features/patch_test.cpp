@@ -3,19 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <memory>
 #include <numbers>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
 namespace {
 
-using test::Built;
-using test::draw;
-using test::Image;
-using test::Texture;
+using namespace test;
 
 constexpr int kWidth = 180, kHeight = 160;
 // Without noise but rounding to 8 bits (0.29 grey levels). A window's information is some thousand
@@ -73,8 +68,7 @@ TEST(Patch, subpixelAnchorIsKeptOnEveryLevel) {
   for (const Vec2& at : {Vec2(90.3, 79.8), Vec2(89.5, 80.5), Vec2(91, 83), Vec2(92.75, 81.25)}) {
     const Scene s(3, at);
     for (int level = 0; level < s.patch.levels; ++level) {
-      AlignOptions only;
-      only.coarsest = only.finest = level;
+      AlignOptions only{.coarsest = level, .finest = level};
       const AlignResult r = align(s.patch, s.built.pyramid, at, Mat2::Identity(), only);
       ASSERT_EQ(r.status, AlignStatus::ok) << level;
       EXPECT_LT((r.pixel - at).norm(), std::ldexp(kSubPixel, level)) << "level " << level;
@@ -124,8 +118,7 @@ TEST(Patch, sigmaMatchesTheErrorDueToNoise) {
     Random random(static_cast<std::uint64_t>(i) + 900);
     const Image noisy = draw(
         kWidth, kHeight, [&](const Vec2& p) { return s.texture(p) + kNoise * random.normal(); });
-    AlignOptions only;
-    only.coarsest = 0;
+    AlignOptions only{.coarsest = 0};
     const AlignResult r = align_in(noisy, s.patch, s.at, Mat2::Identity(), only);
     ASSERT_EQ(r.status, AlignStatus::ok);
     square += (r.pixel - s.at).squaredNorm() / (kNoise * kNoise);
@@ -160,8 +153,7 @@ TEST(Patch, shiftBeyondTheLimitDiverges) {
   const Scene s(2);
   const Image moved =
       draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(p - Vec2(5, 0)); });
-  AlignOptions options;
-  options.max_shift = 2;
+  AlignOptions options{.max_shift = 2};
   EXPECT_EQ(align_in(moved, s.patch, s.at, Mat2::Identity(), options).status,
             AlignStatus::diverged);
   EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, Mat2::Zero(), {}).status, AlignStatus::diverged);
@@ -213,8 +205,7 @@ TEST(Patch, noByteOutsideTheImageIsRead) {
     const test::GuardedImage guarded(image, guard);
     const Built b(guarded.view(), 2);
     test::on_every_target([&](const char*) {
-      AlignOptions options;
-      options.min_zncc = -1.F;
+      AlignOptions options{.min_zncc = -1.F};
       // Every position along two borders and across all four corners, in odd steps of a pixel.
       for (double along = -2; along < kSide + 2; along += 0.37)
         for (const double stereo : {4.6, 5.5, 6.49, 84.9, 93.2, 94.3, 95.6}) {

@@ -3,15 +3,13 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
 namespace {
 
-using test::Built;
-using test::Image;
-using test::white_noise;
+using namespace test;
 
 int different_pixels(const ImageView& a, const ImageView& b) {
   if (a.width != b.width || a.height != b.height) return -1;
@@ -65,7 +63,8 @@ TEST(Pyramid, smallImageHasFewerLevels) {
   const Image image = white_noise(70, 200, 1);
   const Built b(image.view(), 6);
   EXPECT_EQ(b.pyramid.level(0).data, image.bytes.data());
-  ASSERT_EQ(b.pyramid.levels(), 2);  // 70 → 35 → 18, and no side falls below 32
+  // The widths are 70, 35 and 18 px; no side may be below 32 px.
+  ASSERT_EQ(b.pyramid.levels(), 2);
   EXPECT_EQ(b.pyramid.level(1).width, 35);
 }
 
@@ -73,12 +72,7 @@ TEST(Pyramid, buildUsesTheArenaAndNoHeap) {
   const Image image = white_noise(640, 480, 1);
   Arena arena;
   Pyramid pyramid(640, 480, 4, arena);
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    pyramid.build(image.view());
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  vergence::test::expect_no_allocations([&] { pyramid.build(image.view()); });
 }
 
 }  // namespace

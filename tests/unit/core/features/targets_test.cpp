@@ -6,7 +6,6 @@
 
 #include "core/features/detail/align_kernel.hpp"
 #include "core/features/detail/correlate_kernel.hpp"
-#include "core/features/pyramid.hpp"
 #include "tests/support/simd_targets.hpp"
 #include "tests/unit/core/features/texture.hpp"
 

@@ -83,7 +83,8 @@ class Texture {
 
  private:
   struct Wave {
-    Vec2 k = Vec2::Zero();  // rad/px
+    // Wave vector in rad/px.
+    Vec2 k = Vec2::Zero();
     double phase = 0;
   };
   std::array<Wave, 10> waves_;

@@ -11,7 +11,8 @@
 namespace vergence {
 namespace {
 
-constexpr double kBand = 2.0, kNoise = 0.2;  // px
+// Both are in px.
+constexpr double kBand = 2.0, kNoise = 0.2;
 
 std::vector<float> distances(int fitting, int chance, double width_px) {
   Random random(3);

@@ -55,8 +55,8 @@ TEST(FivePoint, randomMatchesGiveTheTrueMatrix) {
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[kProblems / 2], 1e-12);
   EXPECT_LT(errors[kProblems * 98 / 100], 1e-9);
-  EXPECT_LE(missed, 3);  // two roots of the tenth degree so near to each other that no sign change
-                         // lies between: one in thousands
+  // One problem in thousands has two roots so close that no sign change lies between them.
+  EXPECT_LE(missed, 3);
 }
 
 TEST(FivePoint, everySolutionIsEssentialAndFitsTheMatches) {
@@ -116,12 +116,15 @@ TEST(FivePoint, extremeInputIsFiniteWithoutAllocations) {
     switch (random.below(4)) {
       case 0:
         m.right = m.left;
-        break;  // at infinity, no turn
+        // The points are at infinity without a rotation.
+        break;
       case 1:
-        for (std::size_t i = 0; i < 5; ++i) m.left[i].y() = m.right[i].y() = 0;  // all on one line
+        // All points are on one line.
+        for (std::size_t i = 0; i < 5; ++i) m.left[i].y() = m.right[i].y() = 0;
         break;
       case 2:
-        for (std::size_t i = 0; i < 5; ++i) {  // at infinity, turned
+        // The points are at infinity with a rotation.
+        for (std::size_t i = 0; i < 5; ++i) {
           const Vec3 q = m.T_right_left.R * m.left[i].homogeneous();
           m.right[i] = q.head<2>() / q.z();
         }

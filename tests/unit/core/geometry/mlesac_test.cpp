@@ -2,17 +2,14 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <limits>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/geometry/rig_scene.hpp"
 
 namespace vergence {
 namespace {
 
-using test::make_scene;
-using test::RigScene;
+using namespace test;
 
 constexpr std::size_t kCapacity = 512;
 
@@ -68,11 +65,11 @@ TEST_F(RigMlesacTest, pointsSeenByOneCameraGiveThePose) {
 TEST_F(RigMlesacTest, goodPriorEndsEarlyAndBadOneDoesNoHarm) {
   Random random(10);
   const RigScene scene = make_scene(random, 2, 300, 0.1, 0.3, 0.3, 0.6, &table_);
-  MlesacOptions options;
-  options.max_hypotheses = 1000;
+  MlesacOptions options{.max_hypotheses = 1000};
   const MlesacPose good = mlesac_.solve(table_.view(), options, &scene.T_left_world, random);
   EXPECT_TRUE(good.found);
-  EXPECT_LE(good.samples, 12);  // w ≥ 0.88 → ln 1e-3 / ln(1 − w³) ≤ 6, min_hypotheses 8
+  // With w ≥ 0.88, ln 1e-3 / ln(1 − w³) is at most 6; min_hypotheses is 8.
+  EXPECT_LE(good.samples, 12);
   const Transform far{exp_so3({1, 1, 1}), {50, 0, 0}};
   const MlesacPose bad = mlesac_.solve(table_.view(), options, &far, random);
   EXPECT_LT(rotation_angle(bad.T_left_world.R * scene.T_left_world.R.transpose()), 0.02);
@@ -96,7 +93,8 @@ TEST_F(RigMlesacTest, scoreIsTheTruncatedCost) {
       const double e2 = (du * du + dv * dv) / (o.sigma[i] * o.sigma[i]);
       cost += p.z() > 0 && e2 < options.outlier_cost ? e2 : options.outlier_cost;
     }
-  EXPECT_NEAR(found.score, cost, 1e-3 * cost);  // float: 1e-3 px of 0.6 px, hundreds of terms
+  // The score sums hundreds of terms in float, with 1e-3 px of 0.6 px.
+  EXPECT_NEAR(found.score, cost, 1e-3 * cost);
 }
 
 TEST_F(RigMlesacTest, invalidInputHasNoPose) {
@@ -104,7 +102,8 @@ TEST_F(RigMlesacTest, invalidInputHasNoPose) {
   (void)make_scene(random, 2, 2, 0.0, 0.0, 0.0, 0.3, &table_);
   EXPECT_FALSE(mlesac_.solve(table_.view(), {}, nullptr, random).found);
   const Transform prior;
-  EXPECT_TRUE(mlesac_.solve(table_.view(), {}, &prior, random).found);  // the prior is all there is
+  // The prior is the only hypothesis.
+  EXPECT_TRUE(mlesac_.solve(table_.view(), {}, &prior, random).found);
   table_.clear();
   EXPECT_FALSE(mlesac_.solve(table_.view(), {}, &prior, random).found);
 
@@ -118,8 +117,7 @@ TEST_F(RigMlesacTest, invalidInputHasNoPose) {
   o = table_.view();
   o.cameras = kMaxCameras + 1;
   EXPECT_FALSE(mlesac_.solve(o, {}, nullptr, random).found);
-  MlesacOptions options;
-  options.confidence = 1.0;
+  MlesacOptions options{.confidence = 1.0};
   EXPECT_FALSE(mlesac_.solve(table_.view(), options, nullptr, random).found);
 
   Arena small_arena;
@@ -127,7 +125,8 @@ TEST_F(RigMlesacTest, invalidInputHasNoPose) {
   EXPECT_FALSE(small.solve(table_.view(), {}, nullptr, random).found);
 
   table_.clear();
-  for (int i = 0; i < 50; ++i) {  // all on one line: no sample has a pose
+  // All points are on one line, so no sample has a pose.
+  for (int i = 0; i < 50; ++i) {
     ASSERT_TRUE(table_.push(Vec3(0.1 * i, 0, 10), 0.3));
     table_.see(0, Vec2(318 + 5.2 * i, 243));
   }
@@ -152,8 +151,9 @@ TEST_F(RigMlesacTest, nonFiniteObservationsAreIgnored) {
 TEST(SamplesNeeded, countFollowsTheRansacFormula) {
   EXPECT_EQ(samples_needed(1.0, 3, 0.99, 1000), 1);
   EXPECT_EQ(samples_needed(0.0, 3, 0.99, 1000), 1000);
-  EXPECT_EQ(samples_needed(0.5, 3, 0.99, 1000), 35);   // ln 0.01 / ln 0.875 = 34.5
-  EXPECT_EQ(samples_needed(0.5, 5, 0.99, 1000), 146);  // ln 0.01 / ln(1 − 1/32) = 145.05
+  // The exact values are ln 0.01 / ln 0.875 = 34.5 and ln 0.01 / ln(1 − 1/32) = 145.05.
+  EXPECT_EQ(samples_needed(0.5, 3, 0.99, 1000), 35);
+  EXPECT_EQ(samples_needed(0.5, 5, 0.99, 1000), 146);
   EXPECT_EQ(samples_needed(0.1, 3, 0.99, 200), 200);
 }
 

@@ -11,13 +11,13 @@ namespace vergence::test {
 struct RigScene {
   RigCalibration rig;
   Transform T_left_world;
-  std::vector<bool> good;  // by point: all its observations are the true ones with noise
+  // True for points whose observations are the true ones with noise.
+  std::vector<bool> good;
 };
 
 /// A rig of up to four 640×480 cameras, 0.5 m apart and slightly turned.
 [[nodiscard]] inline RigCalibration make_rig(int cameras) {
-  RigCalibration rig;
-  rig.cameras = cameras;
+  RigCalibration rig{.cameras = cameras};
   for (int k = 0; k < cameras; ++k) {
     Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
     c.width = 640, c.height = 480, c.fx = 520 + k, c.fy = 525 - k, c.cx = 318, c.cy = 243;

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <limits>
 #include <vector>
 
@@ -12,7 +11,8 @@ namespace vergence {
 namespace {
 
 constexpr std::size_t kCapacity = 600;
-constexpr double kPixel = 1.0 / 600;  // a pixel in normalised units
+// One pixel in normalised units.
+constexpr double kPixel = 1.0 / 600;
 constexpr double kBaseline = 0.75;
 
 struct MatchSet {
@@ -91,11 +91,10 @@ TEST_F(StereoMlesacTest, transformIsFoundAmongFortyPercentOutliers) {
                  ? 1
                  : 0;
   }
-  EXPECT_GE(
-      flagged,
-      kRuns - 2);  // 98 % right; a search that ends in a side valley of the cost loses a few more
-  EXPECT_GE(close, kRuns - 3);  // an outlier of large disparity on the right line has a long lever
-                                // on t, and looks like a match
+  // At least 98 % must be right. A search that ends in a side valley of the cost loses more.
+  EXPECT_GE(flagged, kRuns - 2);
+  // An outlier of large disparity on the right line looks like a match and strongly moves t.
+  EXPECT_GE(close, kRuns - 3);
 }
 
 TEST_F(StereoMlesacTest, informationPredictsTheErrorOfMostRuns) {
@@ -107,11 +106,11 @@ TEST_F(StereoMlesacTest, informationPredictsTheErrorOfMostRuns) {
     const StereoEstimate found = mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random);
     ASSERT_TRUE(found.found);
     const Vec5 d = step_between(found.T_right_left, m.T_right_left);
-    within += d.dot(found.information * d) < 15.09 ? 1 : 0;  // χ² of five, 99 %
+    // The bound is the 99 % quantile of χ²(5).
+    within += d.dot(found.information * d) < 15.09 ? 1 : 0;
   }
-  EXPECT_GE(
-      within,
-      kRuns * 9 / 10);  // the truncated cost has side valleys: a sampled search may end in one
+  // A sampled search may end in a side valley of the truncated cost.
+  EXPECT_GE(within, kRuns * 9 / 10);
 }
 
 TEST_F(StereoMlesacTest, farSceneLeavesTheDirectionUncertain) {
@@ -152,8 +151,9 @@ TEST_F(StereoMlesacTest, invalidInputFailsAndNonFiniteIsIgnored) {
   ASSERT_TRUE(found.found);
   EXPECT_EQ(found.inliers, 47);
   EXPECT_EQ(mlesac_.flags()[3] + mlesac_.flags()[4] + mlesac_.flags()[5], 0);
+  // All matches are the same.
   for (auto* v : {&m.left_x, &m.left_y, &m.right_x, &m.right_y})
-    std::fill(v->begin(), v->end(), 0.1);  // all the same match
+    std::fill(v->begin(), v->end(), 0.1);
   EXPECT_FALSE(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).found);
 }
 

@@ -67,7 +67,8 @@ TEST(GeometryTargets, projectionCostIsBitIdentical) {
 TEST(GeometryTargets, sampsonCostIsBitIdentical) {
   Scene<float> s;
   std::vector<float> x1(kPoints), y1(kPoints), x2(kPoints), y2(kPoints);
-  for (std::size_t i = 0; i < kPoints; ++i) {  // normalised coordinates of a step straight ahead
+  // The coordinates are normalised and belong to a step straight ahead.
+  for (std::size_t i = 0; i < kPoints; ++i) {
     x1[i] = s.x[i] / s.z[i];
     y1[i] = s.y[i] / s.z[i];
     x2[i] = s.u[i] / 700;

@@ -11,8 +11,7 @@
 namespace vergence {
 namespace {
 
-using test::random_transform;
-using test::visible_point;
+using namespace test;
 
 struct Problem {
   Transform T_camera_world;
@@ -122,9 +121,11 @@ TEST(ThreePoint, degenerateInputHasNoPose) {
   p.points[2].z() = std::numeric_limits<double>::infinity();
   EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p = good;
-  for (Vec3& x : p.points) x *= 1e200;  // squares overflow
+  // The squares overflow.
+  for (Vec3& x : p.points) x *= 1e200;
   EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
-  p = good;  // a narrow bundle of rays can only reach a large triangle from inside it
+  // A narrow bundle of rays reaches a large triangle only from inside it.
+  p = good;
   p.rays = {Vec3(0, 0, 1), Vec3(1e-3, 0, 1).normalized(), Vec3(0, 1e-3, 1).normalized()};
   p.points = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 1e-9, 0)};
   const ThreePointSolutions s = solve_three_point(p.rays, p.points);
@@ -136,8 +137,8 @@ TEST(ThreePoint, extremeInputIsFinite) {
   Random random(15);
   for (int k = 0; k < 20000; ++k) {
     Problem p = random_problem(random);
-    for (Vec3& x : p.points)
-      x *= std::pow(10.0, random.uniform(-12, 12));  // rays and triangle no longer belong together
+    // Rays and triangle no longer belong together.
+    for (Vec3& x : p.points) x *= std::pow(10.0, random.uniform(-12, 12));
     if (random.below(2) == 0) p.points[1] = p.points[0] + 1e-9 * Vec3::Ones();
     if (random.below(2) == 0) p.rays[2] = (p.rays[0] + 1e-8 * p.rays[1]).normalized();
     const ThreePointSolutions s = solve_three_point(p.rays, p.points);

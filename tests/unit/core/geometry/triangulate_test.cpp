@@ -13,7 +13,8 @@
 namespace vergence {
 namespace {
 
-constexpr double kSigma = 0.3 / 500;  // a third of a pixel at 500 px focal length
+// A third of a pixel at 500 px focal length.
+constexpr double kSigma = 0.3 / 500;
 
 /// Views of one world point from places a metre or so apart, looking roughly the same way.
 std::vector<RayView> views_of(const Vec3& p_first, std::size_t n, double noise, Random& random,
@@ -42,8 +43,8 @@ TEST(Triangulate, exactViewsGiveTheExactPoint) {
     Vec3 p_world;
     const std::vector<RayView> views = views_of(p, 2 + random.below(4), 0.0, random, &p_world);
     const TriangulatedPoint found = triangulate(views);
-    if (found.status == TriangulateStatus::no_parallax)
-      continue;  // two centres nearly in line with the point
+    // Two centres are nearly in line with the point.
+    if (found.status == TriangulateStatus::no_parallax) continue;
     ASSERT_EQ(found.status, TriangulateStatus::ok);
     EXPECT_LT((found.p_world - p_world).norm(), 1e-9 * (1 + p_world.norm()));
     EXPECT_NEAR(found.inverse_depth, 1 / p.z(), 1e-9);
@@ -61,15 +62,18 @@ TEST(Triangulate, covarianceAndChiSquareMatchTheErrors) {
     const TriangulatedPoint found = triangulate(views);
     if (found.status != TriangulateStatus::ok ||
         found.inverse_depth < 20 * found.inverse_depth_sigma) {
-      --k;  // where depth is linear enough for an ellipsoid
+      // Only points whose depth is linear enough for an ellipsoid count.
+      --k;
       continue;
     }
     const Vec3 d = found.p_world - p_world;
     nees += d.dot(found.covariance.inverse() * d) / kRuns;
     chi2 += found.chi2 / kRuns;
   }
-  EXPECT_NEAR(nees, 3.0, 0.25);  // √(2·3/3000) = 0.045, and what is left of curvature
-  EXPECT_NEAR(chi2, 5.0, 0.25);  // 2·4 − 3; √(2·5/3000) = 0.058
+  // The standard error is √(2·3/3000) = 0.045, plus the remaining curvature.
+  EXPECT_NEAR(nees, 3.0, 0.25);
+  // The expectation is 2·4 − 3 with a standard error of √(2·5/3000) = 0.058.
+  EXPECT_NEAR(chi2, 5.0, 0.25);
 }
 
 TEST(Triangulate, pointAtInfinityKeepsItsDirection) {
@@ -79,8 +83,8 @@ TEST(Triangulate, pointAtInfinityKeepsItsDirection) {
   const TriangulatedPoint found = triangulate(views);
   EXPECT_EQ(found.status, TriangulateStatus::no_parallax);
   EXPECT_NEAR(found.inverse_depth, 0.0, 1e-12);
-  EXPECT_NEAR(found.inverse_depth_sigma, std::sqrt(2.0) * kSigma / 0.5,
-              1e-6);  // disparity's sigma over the baseline
+  // The expected sigma is the disparity's sigma over the baseline.
+  EXPECT_NEAR(found.inverse_depth_sigma, std::sqrt(2.0) * kSigma / 0.5, 1e-6);
   EXPECT_LT((found.p_world / found.p_world.z() - Vec3(0.1, -0.05, 1)).norm(), 1e-9);
   EXPECT_GT(found.p_world.z(), 100.0);
 }
@@ -89,12 +93,12 @@ TEST(Triangulate, degenerateViewsGiveTheirStatus) {
   const Transform right{Mat3::Identity(), {-0.5, 0, 0}};
   std::array<RayView, 2> views = {RayView{Transform{}, Vec2(0.0, 0.0), kSigma},
                                   RayView{right, Vec2(0.1, 0.0), kSigma}};
-  EXPECT_EQ(triangulate(views).status,
-            TriangulateStatus::behind);  // the disparity of a swapped pair
+  // The pair has the disparity of swapped images.
+  EXPECT_EQ(triangulate(views).status, TriangulateStatus::behind);
   views[1] = {Transform{}, Vec2(0.0, 0.0), kSigma};
   EXPECT_EQ(triangulate(views).status, TriangulateStatus::no_baseline);
-  views[1] = {
-      {Mat3::Identity(), {0, 0, -1}}, Vec2(0.0, 0.0), kSigma};  // driving straight at the point
+  // The camera drives straight at the point.
+  views[1] = {{Mat3::Identity(), {0, 0, -1}}, Vec2(0.0, 0.0), kSigma};
   EXPECT_EQ(triangulate(views).status, TriangulateStatus::no_baseline);
   views[1] = {right, Vec2(-0.05, 0.0), 0.0};
   EXPECT_EQ(triangulate(views).status, TriangulateStatus::invalid_input);

@@ -14,7 +14,8 @@ Square<N> definite() {
   return M * M.transpose() + Square<N>::Identity();
 }
 
-constexpr double kRounding = 1e-12;  // some hundred ulps of entries below 10, condition below 1e3
+// Some hundred ulps of entries below 10 with a condition below 1e3.
+constexpr double kRounding = 1e-12;
 
 TEST(LinearSolve, choleskySolvesInvertsAndWhitens) {
   const Mat6 A = definite<6>();

@@ -28,7 +28,8 @@ TEST(Random, uniformIsEvenAndBelowOne) {
     least = std::min(least, u);
     most = std::max(most, u);
   }
-  EXPECT_NEAR(sum / kDraws, 0.5, 5 * std::sqrt(1.0 / 12 / kDraws));  // five sigmas of the mean
+  // The tolerance is five sigmas of the mean.
+  EXPECT_NEAR(sum / kDraws, 0.5, 5 * std::sqrt(1.0 / 12 / kDraws));
   EXPECT_LT(least, 1e-3);
   EXPECT_GT(most, 1 - 1e-3);
 }

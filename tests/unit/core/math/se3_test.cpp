@@ -8,7 +8,8 @@
 namespace vergence {
 namespace {
 
-constexpr double kRounding = 1e-14;  // roundings of metres of order ten
+// Rounding of metres of order ten.
+constexpr double kRounding = 1e-14;
 
 Transform some(double k) { return {exp_so3({0.3 * k, -0.7, 0.2 + k}), Vec3(k, 2 - k, 5)}; }
 
@@ -17,8 +18,9 @@ double apart(const Transform& a, const Transform& b) {
 }
 
 TEST(Transform, parallelCamerasShiftThePoint) {
-  const Transform T_right_left{
-      Mat3::Identity(), {-0.75, 0, 0}};  // parallel cameras, the right one 0.75 m to the right
+  const Transform T_right_left{// The cameras are parallel and the right one is 0.75 m to the right.
+                               Mat3::Identity(),
+                               {-0.75, 0, 0}};
   EXPECT_TRUE((T_right_left * Vec3(0.75, 0, 4)).isApprox(Vec3(0, 0, 4)));
   EXPECT_TRUE(T_right_left.centre().isApprox(Vec3(0.75, 0, 0)));
 }
@@ -62,8 +64,8 @@ TEST(Quaternion, quaternionHasPositiveWAndRoundTrips) {
 }
 
 TEST(Interpolate, interpolationFollowsTheShorterArc) {
-  const Transform a{exp_so3({0, 0, 3.0}), {0, 0, 0}},
-      b{exp_so3({0, 0, -3.0}), {2, 4, 6}};  // 0.28 rad across π, not 6 back
+  // The shorter arc is 0.28 rad across π.
+  const Transform a{exp_so3({0, 0, 3.0}), {0, 0, 0}}, b{exp_so3({0, 0, -3.0}), {2, 4, 6}};
   EXPECT_LT(apart(interpolate(a, b, 0), a), kRounding);
   EXPECT_LT(apart(interpolate(a, b, 1), b), kRounding);
   const Transform quarter = interpolate(a, b, 0.25);

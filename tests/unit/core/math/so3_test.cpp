@@ -32,7 +32,8 @@ struct Coefficients {
 };
 Coefficients by_series(double theta) {
   const long double t2 = static_cast<long double>(theta) * theta;
-  long double a = 0, b = 0, c = 0, power = 1, factorial = 1;  // factorial: (2k+1)!
+  // The factorial is that of 2k+1.
+  long double a = 0, b = 0, c = 0, power = 1, factorial = 1;
   for (int k = 0; k < 20; ++k) {
     a += power / factorial;
     b += power / (factorial * (2 * k + 2));

@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <functional>
-#include <memory>
 #include <new>
 #include <thread>
 #include <vector>

@@ -17,7 +17,8 @@ void walk_beside_a_model(Vector& vector, std::uint64_t seed) {
   std::vector<int> model;
   for (int step = 0; step < 5000; ++step) {
     switch (random.below(8)) {
-      default: {  // five of eight: it is full now and then
+      // Five of eight operations push, so the vector is sometimes full.
+      default: {
         const int value = static_cast<int>(random.below(1000));
         const bool room = model.size() < vector.capacity();
         ASSERT_EQ(vector.push(value), room) << "step " << step;

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <set>
-#include <stdexcept>
 #include <vector>
 
 namespace vergence {

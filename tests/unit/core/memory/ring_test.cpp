@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <thread>
@@ -45,7 +43,8 @@ TEST(Ring, operationsMatchALimitedQueue) {
 TEST(Ring, twoThreadsLoseAndReorderNothing) {
   struct Message {
     std::uint64_t number;
-    std::uint64_t complement;  // a torn message would not match
+    // A torn message would not match its complement.
+    std::uint64_t complement;
     std::uint64_t padding[5];
   };
   constexpr std::uint64_t kMessages = 300'000;

@@ -72,7 +72,8 @@ TEST_F(ThreadAllocationsTest, threadIsCountedAgainInTheNextCount) {
   });
   for (const std::uint64_t expected : {2U, 3U}) {
     ThreadAllocations::begin();
-    if (expected == 3U) run_named("vergence-other", 1);  // takes the row that was the worker's
+    // The other thread takes the row that was the worker's.
+    if (expected == 3U) run_named("vergence-other", 1);
     (void)pthread_barrier_wait(&barrier);
     (void)pthread_barrier_wait(&barrier);
     ThreadAllocations::end();
@@ -92,7 +93,8 @@ TEST_F(ThreadAllocationsTest, fullTableCountsTheRestTogether) {
   ThreadAllocations::end();
   const ThreadAllocations::Counts counts = ThreadAllocations::counts();
   EXPECT_EQ(counts.size, ThreadAllocations::kMaxNames);
-  EXPECT_GE(counts.others, 3U);  // 3, and one more if this thread itself has taken a row
+  // There are three, and a fourth if this thread itself has taken a row.
+  EXPECT_GE(counts.others, 3U);
   EXPECT_EQ(count_of(names[0]), 2U);
   EXPECT_EQ(count_of(names.back()), std::nullopt);
 }

@@ -8,6 +8,7 @@
 #include "core/odometry/odometry.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/rig_frame.hpp"
+#include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::odometry::test {
@@ -19,11 +20,7 @@ class Corridor {
  public:
   explicit Corridor(int cameras = 2)
       : images_(static_cast<std::size_t>(cameras), features::test::Image(kWidth, kHeight)) {
-    rig_.cameras = cameras;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
-      Intrinsics& c = rig_.intrinsics[k];
-      c.width = kWidth, c.height = kHeight, c.fx = c.fy = 280, c.cx = 159.5, c.cy = 119.5;
-    }
+    rig_ = vergence::test::parallel_rig(vergence::test::pinhole(kWidth, kHeight, 280), 0, cameras);
     rig_.T_camera_left[1] = {exp_so3({0.004, -0.01, 0.006}), {-0.5, 0.01, -0.008}};
     if (cameras > 2) rig_.T_camera_left[2] = {exp_so3({-0.006, 0.004, 0.002}), {-0.2, -0.05, 0.01}};
     rig_.baseline = rig_.T_camera_left[1].t.norm();
@@ -47,10 +44,9 @@ class Corridor {
   /// Frame i of a drive of its own: seen from where frame `place` of the usual one is.
   [[nodiscard]] RigFrame frame_at(int i, double place,
                                   const std::array<Transform, kMaxCameras>& T_camera_left) {
-    RigFrame f;
-    f.number = static_cast<std::uint64_t>(i);
-    f.stamp = Stamp(1'000'000'000 + 50'000'000LL * i);
-    f.cameras = rig_.cameras;
+    RigFrame f{.number = static_cast<std::uint64_t>(i),
+               .stamp = Stamp(1'000'000'000 + 50'000'000LL * i),
+               .cameras = rig_.cameras};
     for (std::size_t k = 0; k < images_.size(); ++k) {
       Random noise(static_cast<std::uint64_t>(4 * i) + k);
       const Transform T_left_camera = T_camera_left[k].inverse();
@@ -99,7 +95,8 @@ class Corridor {
   }
   /// The panel's grey value is added where the ray (frame: left camera) meets it.
   [[nodiscard]] bool on_panel(const Vec3& from, const Vec3& ray, double* grey) const {
-    constexpr double kDepth = 2.3, kLeft = -0.9, kRight = 0.7;  // m
+    // All three are in m.
+    constexpr double kDepth = 2.3, kLeft = -0.9, kRight = 0.7;
     if (!panel_ || ray.z() <= 0) return false;
     const Vec3 p = from + (kDepth - from.z()) / ray.z() * ray;
     if (p.x() < kLeft || p.x() > kRight) return false;

@@ -126,7 +126,8 @@ TEST(DriftCovariance, covarianceMatchesManyRandomDrives) {
 TEST(MotionCovariance, extrapolatedMotionIsHalfUncertain) {
   const Transform moved{Mat3::Identity(), {0, 0, -3}};
   const Mat6 C = motion_covariance(Mat6::Zero(), moved, 0.5);
-  const double gathered = 0.5 * 0.5 * 0.5;  // m: half of 1 m/s² in half a second
+  // Half of 1 m/s² over half a second, in m.
+  const double gathered = 0.5 * 0.5 * 0.5;
   EXPECT_NEAR(std::sqrt(C(2, 2)), std::hypot(1.5, gathered), 1e-12);
   EXPECT_NEAR(std::sqrt(C(4, 4)), 0.05, 1e-12);
   EXPECT_TRUE(motion_covariance(Mat6::Zero(), moved, 0).isZero());
@@ -159,8 +160,10 @@ TEST(CorrectionCovariance, correctionIsOneSigma) {
 
 TEST(MotionCovariance, translationComesFirst) {
   Mat6 fit = Mat6::Zero();
-  fit(0, 0) = 4;  // rotation about x
-  fit(5, 5) = 1;  // translation along z
+  // The entry is the rotation about x.
+  fit(0, 0) = 4;
+  // The entry is the translation along z.
+  fit(5, 5) = 1;
   const Mat6 C = motion_covariance(fit, {}, 0);
   EXPECT_GT(C(3, 3), 0);
   EXPECT_DOUBLE_EQ(C(3, 3), 4 * C(2, 2));

@@ -1,7 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "core/memory/allocation_guard.hpp"
 #include "core/odometry/front_end.hpp"
+#include "tests/support/no_allocations.hpp"
+#include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::odometry {
@@ -10,26 +11,15 @@ namespace {
 constexpr int kWidth = 320, kHeight = 240;
 
 RigCalibration blank_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) {
-    rig.intrinsics[k].width = kWidth;
-    rig.intrinsics[k].height = kHeight;
-    rig.intrinsics[k].fx = rig.intrinsics[k].fy = 300;
-    rig.intrinsics[k].cx = 160;
-    rig.intrinsics[k].cy = 120;
-  }
-  return rig;
+  return vergence::test::parallel_rig(
+      {.width = kWidth, .height = kHeight, .fx = 300, .fy = 300, .cx = 160, .cy = 120}, 0);
 }
 
 /// 0: corners, 1: SURF-64.
 class FreeMatches : public ::testing::TestWithParam<int> {
  protected:
   [[nodiscard]] static OdometryOptions options() {
-    OdometryOptions o;
-    o.features = 300;
-    o.init_features = GetParam();
-    return o;
+    return {.features = 300, .init_features = GetParam()};
   }
 };
 
@@ -46,18 +36,14 @@ TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
                               right = features::test::draw(
                                   kWidth, kHeight,
                                   [&](const Vec2&p) { return brightness(p - shift); }, 64);
-  RigFrame frame;
-  frame.cameras = 2;
+  RigFrame frame{.cameras = 2};
   frame.images[0] = left.view();
   frame.images[1] = right.view();
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::span<const FreeMatch> matches;
-  {
-    const SealedScope sealed;
+  vergence::test::expect_no_allocations([&] {
     (void)front.begin(frame);
     matches = front.match_free(1);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   ASSERT_GE(matches.size(), 30U);
   std::size_t right_ones = 0;
   // Three sigmas of a corner's place: both are the same pixels but for the rounding of grey values.
@@ -75,8 +61,7 @@ TEST_P(FreeMatches, missingOrFlatImageHasNoMatch) {
   EXPECT_TRUE(front.match_free(1).empty());
   const features::test::Image flat(kWidth, kHeight, 64),
       noise = features::test::white_noise(kWidth, kHeight, 1, 64);
-  RigFrame frame;
-  frame.cameras = 2;
+  RigFrame frame{.cameras = 2};
   frame.images[0] = noise.view();
   (void)front.begin(frame);
   EXPECT_TRUE(front.match_free(1).empty());

@@ -5,7 +5,8 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr double kUsual = 0.05, kGap = 0.6;  // s
+// Both are in s.
+constexpr double kUsual = 0.05, kGap = 0.6;
 
 /// Has seen frames an even `interval` apart, the last one at `last_`.
 class Frames {
@@ -49,7 +50,8 @@ TEST(GapDetector, evenIntervalsAreNoGap) {
 TEST(GapDetector, secondGapInARowRequestsNoRenewal) {
   Frames f;
   (void)f.next(kGap);
-  f.gaps.clear_renewal();  // it was made anew
+  // The map was renewed.
+  f.gaps.clear_renewal();
   EXPECT_EQ(f.next(kGap), kGap);
   EXPECT_FALSE(f.gaps.renewal_due());
 }

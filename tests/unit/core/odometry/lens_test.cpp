@@ -11,14 +11,7 @@ namespace vergence::odometry {
 namespace {
 
 Intrinsics wide_lens(CameraModelKind kind) {
-  Intrinsics k;
-  k.kind = kind;
-  k.width = 752;
-  k.height = 480;
-  k.fx = 458.6;
-  k.fy = 457.3;
-  k.cx = 367.2;
-  k.cy = 248.4;
+  Intrinsics k{kind, 752, 480, 458.6, 457.3, 367.2, 248.4};
   if (kind == CameraModelKind::pinhole_radtan)
     k.distortion = {-0.28, 0.074, 0.0002, 0.00002, 0};
   else
@@ -41,7 +34,8 @@ TEST(UndistortedCamera, idealPixelIsThePinholePixelOfTheRay) {
       ASSERT_TRUE(lens.undistort(raw, &ideal, &magnification));
       ASSERT_TRUE(lens.ideal().unproject(ideal, &ray));
       ASSERT_EQ(lens.raw().project(ray, &back, nullptr), ProjectStatus::ok);
-      EXPECT_LT((back - raw).norm(), 1e-8);  // Newton of unproject() ends there
+      // Newton's method in unproject() ends at this accuracy.
+      EXPECT_LT((back - raw).norm(), 1e-8);
     }
   }
 }
@@ -52,8 +46,8 @@ TEST(UndistortedCamera, derivativesMatchFiniteDifferences) {
     Random random(4);
     for (int i = 0; i < 100; ++i) {
       const Vec2 raw(random.uniform(20, 732), random.uniform(20, 460));
-      constexpr double kStep =
-          1e-3;  // px: the third derivative leaves 1e-6 of that, Newton's end 1e-8 / step
+      // Step in px. The third derivative leaves 1e-6 of it, Newton's end 1e-8 / step.
+      constexpr double kStep = 1e-3;
       Vec3 ray;
       Mat2 J, ideal_by_raw, ray_by_raw;
       ASSERT_TRUE(lens.ray_jacobian(raw, &ray, &J));
@@ -93,8 +87,8 @@ TEST(UndistortedCamera, undistortedLensMovesNothing) {
 
 TEST(UndistortedCamera, pixelBeyondTheFoldIsRefused) {
   Intrinsics k = wide_lens(CameraModelKind::pinhole_radtan);
-  k.distortion = {-0.5, 0, 0, 0,
-                  0};  // folds at r² = 2/3: no ray is seen further out than 0.54 · 458 px
+  // The lens folds at r² = 2/3, so no ray is seen beyond 0.54 · 458 px.
+  k.distortion = {-0.5, 0, 0, 0, 0};
   const UndistortedCamera lens(k);
   Vec2 ideal(1, 2);
   Vec3 ray;

@@ -96,12 +96,14 @@ TEST(Map, dormantPointLivesWhileTheWindowSeesIt) {
   const std::size_t b = f.keyframe();
   both->seen[b].set(0, {10, 20}, 0.1F);
   EXPECT_EQ(early->stage, PointStage::dormant);
-  (void)f.keyframe();  // a leaves
+  // Keyframe a leaves the window.
+  (void)f.keyframe();
   EXPECT_EQ(early->stage, PointStage::free);
   EXPECT_EQ(both->stage, PointStage::dormant);
   EXPECT_EQ(active->stage, PointStage::active) << "what is followed stays, seen or not";
   EXPECT_EQ(candidate->stage, PointStage::candidate);
-  (void)f.keyframe();  // b leaves
+  // Keyframe b leaves the window.
+  (void)f.keyframe();
   EXPECT_EQ(both->stage, PointStage::free);
 }
 

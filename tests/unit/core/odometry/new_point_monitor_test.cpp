@@ -21,7 +21,8 @@ TEST(NewPointMonitor, fewerThanThreeInTenKeptIsLost) {
 
 TEST(NewPointMonitor, fewPointsAreEvaluatedTogether) {
   NewPointMonitor watch;
-  watch.add(40, 0);  // one blurred frame
+  // One frame is blurred.
+  watch.add(40, 0);
   ASSERT_TRUE(watch.lost());
   watch.add(12, 10);
   watch.add(12, 10);

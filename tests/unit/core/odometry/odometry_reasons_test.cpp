@@ -7,16 +7,12 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr int kSettled = 10;  // frames
+// Number of frames before the test begins.
+constexpr int kSettled = 10;
 
 /// An image of nothing known.
 features::test::Image noise(const ImageView& like) {
-  features::test::Image image(like.width, like.height);
-  Random random(5);
-  for (int y = 0; y < like.height; ++y)
-    for (int x = 0; x < like.width; ++x)
-      image.at(x, y) = static_cast<std::uint8_t>(random.below(256));
-  return image;
+  return features::test::white_noise(like.width, like.height, 5);
 }
 
 TEST(OdometryReasons, gapAfterAnUnposedFrameIsReported) {
@@ -28,7 +24,8 @@ TEST(OdometryReasons, gapAfterAnUnposedFrameIsReported) {
   frame.images[0] = frame.images[1] = nothing.view();
   ASSERT_FALSE(f.odometry.process(frame).posed);
 
-  constexpr double kGap = 4;  // s
+  // Gap in s.
+  constexpr double kGap = 4;
   frame = corridor.frame_at(kSettled + 1, kSettled);
   frame.stamp = frame.stamp + Duration::seconds(kGap);
   FrameOutcome out = f.odometry.process(frame);
@@ -67,7 +64,8 @@ TEST(OdometryReasons, failedRebuildIsDegraded) {
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
   for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);
-  RigCalibration rig = corridor.rig();  // of which nothing matches
+  // Nothing matches with this rig.
+  RigCalibration rig = corridor.rig();
   rig.T_camera_left[1].R = exp_so3({0.2, 0, 0}) * rig.T_camera_left[1].R;
   f.odometry.link(rig);
   FrameOutcome out = f.odometry.process(corridor.frame(kSettled));

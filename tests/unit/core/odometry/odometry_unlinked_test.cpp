@@ -13,7 +13,8 @@ using test::Corridor;
 // and shift together to some 0.2 mrad, and that over 12 m of corridor is a few millimetres; up to
 // ten keyframes hand their errors on: 0.6 mrad, 8 mm. Three times that. The cameras' transform of
 // one frame is the difference of two such poses, one drifting with the other.
-constexpr double kTurn = 2e-3, kShift = 0.025;  // rad, m
+// The limits are in rad and m.
+constexpr double kTurn = 2e-3, kShift = 0.025;
 
 struct Drive {
   Corridor corridor;

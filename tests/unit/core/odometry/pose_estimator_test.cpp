@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/math/random.hpp"
+#include "tests/unit/core/geometry/rig_scene.hpp"
 
 namespace vergence::odometry {
 namespace {
@@ -25,17 +26,12 @@ struct Scene {
   Map map;
   Random random{17};
   Transform T_left_world{exp_so3({0.3, -0.2, 0.1}), {1, -2, 3}};
-  std::array<Transform, kMaxCameras> T_camera_left{};  // true; the rig's may be another
+  // The true transforms, which may differ from the rig's.
+  std::array<Transform, kMaxCameras> T_camera_left{};
 
-  explicit Scene(int cameras = 2) : map(10, arena) {
-    rig.cameras = cameras;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
-      Intrinsics& c = rig.intrinsics[k];
-      c.width = 640, c.height = 480, c.fx = 520, c.fy = 525, c.cx = 318, c.cy = 243;
-      if (k > 0)
-        rig.T_camera_left[k] = {exp_so3({0.01, -0.02, 0.005}),
-                                {-0.5 * static_cast<double>(k), 0.01, 0.02}};
-    }
+  explicit Scene(int cameras = 2)
+      : rig(vergence::test::make_rig(cameras)),
+        map(10, arena) {
     T_camera_left = rig.T_camera_left;
     for (int i = 0; i < kPoints; ++i) {
       MapPoint* p = map.make_point();

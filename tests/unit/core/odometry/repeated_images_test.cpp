@@ -4,37 +4,27 @@
 #include <utility>
 
 #include "core/odometry/front_end.hpp"
+#include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::odometry {
 namespace {
 
-using features::test::Image;
-using features::test::white_noise;
+using namespace features::test;
 
 constexpr int kWidth = 320, kHeight = 240;
 
 /// The front end of a pair whose pyramids have one level: images are compared as they are.
 struct Pair {
-  OdometryOptions options;
-  RigCalibration rig = small_rig();
+  OdometryOptions options{.pyramid_levels = 1};
+  RigCalibration rig = vergence::test::parallel_rig(
+      {.width = kWidth, .height = kHeight, .fx = 300, .fy = 300, .cx = 160, .cy = 120}, 0);
   SequentialRunner runner;
   Arena arena;
-  FrontEnd front_end;
+  FrontEnd front_end{options, rig, arena, runner};
 
-  Pair() : options{.pyramid_levels = 1}, front_end(options, rig, arena, runner) {}
-  static RigCalibration small_rig() {
-    RigCalibration rig;
-    rig.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) {
-      Intrinsics& c = rig.intrinsics[k];
-      c.width = kWidth, c.height = kHeight, c.fx = c.fy = 300, c.cx = 160, c.cy = 120;
-    }
-    return rig;
-  }
   [[nodiscard]] ImageCheck give(const Image& left, const Image& right) {
-    RigFrame frame;
-    frame.cameras = 2;
+    RigFrame frame{.cameras = 2};
     frame.images[0] = left.view();
     frame.images[1] = right.view();
     return front_end.begin(frame);

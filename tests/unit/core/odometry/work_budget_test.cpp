@@ -7,7 +7,8 @@ namespace {
 
 constexpr int kKeyframes = 10, kSteps = 5;
 // s: what the clock passes within a test is nothing beside it.
-constexpr double kPoints = 1000, kStep = 40;  // a step of one keyframe: the window takes 2000
+// kStep is the time of one step of one keyframe, so the window takes 2000 s.
+constexpr double kPoints = 1000, kStep = 40;
 
 /// Plan of a frame that has `usable_s` seconds from now, with the costs above known.
 FrameWorkload effort_in(double usable_s) {
@@ -35,14 +36,16 @@ TEST(WorkBudget, pointsAreReducedFirst) {
 }
 
 TEST(WorkBudget, windowIsReducedSecond) {
-  const FrameWorkload e = effort_in(250 + 1401);  // a quarter of the points, seven keyframes
+  // The time is enough for a quarter of the points and seven keyframes.
+  const FrameWorkload e = effort_in(250 + 1401);
   EXPECT_EQ(e.points_percent, 25);
   EXPECT_EQ(e.window_keyframes, 7);
   EXPECT_EQ(e.window_steps, FrameWorkload::kAll);
 }
 
 TEST(WorkBudget, solverStepsAreReducedThird) {
-  const FrameWorkload e = effort_in(250 + 321);  // two steps of four keyframes
+  // The time is enough for two steps of four keyframes.
+  const FrameWorkload e = effort_in(250 + 321);
   EXPECT_EQ(e.points_percent, 25);
   EXPECT_EQ(e.window_keyframes, 4);
   EXPECT_EQ(e.window_steps, 2);
@@ -60,7 +63,8 @@ TEST(WorkBudget, aQuarterOfThePointsAlwaysRemains) {
 TEST(WorkBudget, singleCostlyFrameIsForgotten) {
   WorkBudget budget;
   budget.add_points_time(1e9, {});
-  for (int i = 0; i < 40; ++i) budget.add_points_time(1e3, {});  // 0.8 to the 40th is 1.3e-4
+  // 0.8 to the 40th is 1.3e-4.
+  for (int i = 0; i < 40; ++i) budget.add_points_time(1e3, {});
   budget.begin(Duration::seconds(200));
   EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
 }

@@ -28,17 +28,12 @@ int by_definition(const std::vector<std::uint8_t>& raw, int stride, int width, i
 
 TEST(Bayer, greyMatchesTheDefinitionAtEverySize) {
   Random random(3);
-  for (const auto& [width, height] : {std::pair{2, 2},
-                                      {3, 2},
-                                      {2, 5},
-                                      {17, 9},
-                                      {640, 4},
-                                      {1021, 3},
-                                      {1022, 3},
-                                      {1023, 3},
-                                      {1024, 3},
-                                      {2044, 3},
-                                      {2045, 3}}) {
+  struct Size {
+    int width, height;
+  };
+  for (const auto& [width, height] :
+       {Size{2, 2}, Size{3, 2}, Size{2, 5}, Size{17, 9}, Size{640, 4}, Size{1021, 3}, Size{1022, 3},
+        Size{1023, 3}, Size{1024, 3}, Size{2044, 3}, Size{2045, 3}}) {
     const int in_stride = width + 3, out_stride = width + 5;
     std::vector<std::uint8_t> raw(static_cast<std::size_t>(in_stride * height));
     for (auto& v : raw) v = static_cast<std::uint8_t>(random.below(256));

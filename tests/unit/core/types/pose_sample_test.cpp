@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "core/types/calibration.hpp"
-#include "core/types/image.hpp"
 
 namespace vergence {
 namespace {

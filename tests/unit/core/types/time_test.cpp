@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <concepts>
-#include <limits>
 
 namespace vergence {
 namespace {

@@ -63,7 +63,8 @@ TEST(AcquiredQueue, fullQueueDropsOnlyReadingsLive) {
   const std::uint64_t dropped = queue.dropped_readings();
   EXPECT_EQ(dropped, 300U - queue.high_water());
   std::thread producer([&] {
-    queue.push(DeviceEvent{});  // waits for room
+    // The call waits for room.
+    queue.push(DeviceEvent{});
     queue.finish();
   });
   std::size_t readings = 0, events = 0;

@@ -6,9 +6,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,12 +20,7 @@
 namespace vergence {
 namespace {
 
-using test::count;
-using test::frame_of;
-using test::reading_of;
-using test::same;
-using test::WatchedCamera;
-using test::worst_acquisition;
+using namespace test;
 
 constexpr Stamp kStart{1'577'836'800'000'000'000};
 
@@ -41,16 +34,12 @@ struct BenchOptions {
 /// A mock rig with tiny pictures in an almost empty town, and the source on top of it.
 struct Bench {
   explicit Bench(const std::vector<std::string>& faults, const BenchOptions& b = {}) {
-    mock::MockRigOptions o;
-    o.duration = Duration::seconds(b.seconds);
-    o.reports_read = true;
+    mock::MockRigOptions o{.duration = Duration::seconds(b.seconds), .reports_read = true};
     rig = std::make_unique<mock::MockRig>(test::small_truth(faults), o);
     for (int k = 0; k < 2; ++k)
       EXPECT_EQ(rig->camera(k).configure(test::small_camera(), nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
-    TriggerConfiguration pulses;
-    pulses.rate_hz = 20;
-    pulses.vary = b.vary;
+    TriggerConfiguration pulses{.rate_hz = 20, .vary = b.vary};
     EXPECT_EQ(rig->trigger().configure(pulses, nullptr), DeviceStatus::ok);
     Acquisition::Options options;
     options.sync.interval = Duration::milliseconds(50);
@@ -97,8 +86,10 @@ struct Bench {
 
   std::unique_ptr<mock::MockRig> rig;
   std::vector<std::unique_ptr<WatchedCamera>> watched;
-  std::vector<Duration> times;                  // of all pulses
-  std::vector<std::array<int, 2>> pulses_of{};  // of every set that came, by camera; −1: none
+  // Times of all pulses.
+  std::vector<Duration> times;
+  // Pulse of every received set per camera; −1 if there is none.
+  std::vector<std::array<int, 2>> pulses_of{};
   std::unique_ptr<Acquisition> source;
 };
 
@@ -175,7 +166,8 @@ TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
   options.sync.mode = SyncMode::approximate_time;
   Acquisition source({&left, &right}, nullptr, &board, options);
   ASSERT_FALSE(source.start());
-  constexpr int kTwiceAgain = 3;  // starts
+  // Number of starts.
+  constexpr int kTwiceAgain = 3;
   while (left.starts < kTwiceAgain || right.starts < kTwiceAgain || board.starts < kTwiceAgain) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     source.wake();
@@ -189,9 +181,7 @@ TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
 }
 
 TEST(Acquisition, cameraSilentDuringPulsesIsRestarted) {
-  BenchOptions o;
-  o.mode = SyncMode::board;
-  o.seconds = 18;
+  BenchOptions o{.mode = SyncMode::board, .seconds = 18};
   Bench b({}, o);
   b.watched[1]->hangs_from = b.rig->start() + Duration::seconds(4);
   const std::vector<Acquired> items = b.drive();
@@ -254,9 +244,11 @@ TEST(Acquisition, pulsesVerifyEveryPairWithinASecond) {
 struct LossCase {
   const char* name;
   std::vector<std::string> faults;
-  int acquisitions;  // verified, in all
+  // Number of verified pairings in total.
+  int acquisitions;
   DeviceEvent::Kind kind;
-  int items;  // of that kind
+  // Number of events of this kind.
+  int items;
 };
 class AcquisitionByPulses : public ::testing::TestWithParam<LossCase> {};
 

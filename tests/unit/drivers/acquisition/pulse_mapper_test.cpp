@@ -11,19 +11,14 @@ namespace {
 constexpr Duration kInterval = Duration::milliseconds(50);
 const HostStamp kHost(70'000'000'000);
 
-ClockMapperOptions exact() {
-  ClockMapperOptions o;
-  o.min_delay = Duration::milliseconds(1);
-  return o;
-}
+ClockMapperOptions exact() { return {.min_delay = Duration::milliseconds(1)}; }
 
 TEST(PulseMapper, mappedPulseIsUnchanged) {
   PulseMapper mapper(exact());
-  Pulse p;
-  p.arrival = kHost;
-  p.mapped = true;
-  p.host = HostStamp(1234);
-  p.host_error = Duration::nanoseconds(5);
+  Pulse p{.arrival = kHost,
+          .mapped = true,
+          .host = HostStamp(1234),
+          .host_error = Duration::nanoseconds(5)};
   const PulseMapper::Report report = mapper.add(p);
   EXPECT_EQ(report.pulse.host, HostStamp(1234));
   EXPECT_EQ(report.pulse.host_error, Duration::nanoseconds(5));

@@ -91,12 +91,14 @@ DeviceStatus ask(FrameQueue* queue, Duration most, Frame* out) {
 }
 
 constexpr Duration kSilence = Duration::milliseconds(100);
-constexpr Duration kAnswer = Duration::seconds(10);  // of a busy machine
+// Limit for a busy machine.
+constexpr Duration kAnswer = Duration::seconds(10);
 
 TEST_F(Queue, silentDeviceIsGoneUntilRestarted) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence);
-  queue.count_underrun();  // one image
+  // One image arrives.
+  queue.count_underrun();
   EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::disconnected);
   EXPECT_GT(out.arrival - begun, kSilence);
   EXPECT_EQ(queue.state(), FrameQueue::State::gone);

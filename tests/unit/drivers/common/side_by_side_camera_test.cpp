@@ -6,21 +6,21 @@
 #include <cstdint>
 #include <deque>
 #include <set>
-#include <thread>
-#include <vector>
 
 #include "tests/support/idle_camera.hpp"
 
 namespace vergence {
 namespace {
 
-constexpr int kWidth = 8, kHeight = 2;  // of one image
+// Size of one image.
+constexpr int kWidth = 8, kHeight = 2;
 
 /// A camera that gives what the test puts into it.
 class ScriptedCamera final : public test::IdleCamera {
  public:
   struct Script {
-    std::deque<DeviceStatus> answers;  // of wait(), then `timeout`
+    // Results of wait(), followed by `timeout`.
+    std::deque<DeviceStatus> answers;
     std::set<FrameSlot> held;
     int starts = 0;
     DeviceStatus on_start = DeviceStatus::ok;

@@ -28,7 +28,8 @@ std::vector<CameraConfiguration> nonsense(const CameraConfiguration& good) {
   all[1].height = -480;
   all[2].rate_hz = 0;
   all[3].exposure = -good.exposure;
-  all[4].exposure = Duration::seconds(2 / good.rate_hz);  // longer than the time between two
+  // The exposure exceeds the frame interval.
+  all[4].exposure = Duration::seconds(2 / good.rate_hz);
   all[5].width = 1'000'003;
   return all;
 }
@@ -37,7 +38,8 @@ class CameraConformance : public ::testing::Test {
  protected:
   /// Null: the test was skipped.
   ConformanceRig* make(std::uint64_t seed) {
-    rig_.reset();  // before the next one: there may be one such camera only
+    // Only one such camera may exist at a time.
+    rig_.reset();
     std::string why = "this machine has no such rig";
     rig_ = make_conformance_rig(seed, &why);
     why_ = why;
@@ -60,7 +62,8 @@ TEST_F(CameraConformance, randomCallsKeepTheContract) {
       return list[random.below(static_cast<std::uint32_t>(list.size()))];
     };
     ShadowCamera camera(rig_.get());
-    int unplugs = 1;  // each takes seconds, because cameras are given time to answer
+    // An unplug takes seconds, because cameras are given time to answer.
+    int unplugs = 1;
     for (int step = 0; step < steps && !HasFailure(); ++step) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", step " + std::to_string(step));
       const std::uint32_t rule = random.below(100);
@@ -96,13 +99,15 @@ TEST_F(CameraConformance, invalidConfigurationChangesNothing) {
   ShadowCamera camera(rig_.get());
   const auto possible = rig_->possible();
   for (const CameraConfiguration& c : nonsense(possible.front())) camera.refuse(c);
-  camera.start();  // still not configured
+  // The camera is still not configured.
+  camera.start();
   camera.configure(possible.front());
   for (const CameraConfiguration& c : nonsense(possible.front())) camera.refuse(c);
   for (const CameraConfiguration& c : rig_->impossible()) camera.refuse(c);
   camera.start();
   camera.expect_frames(3);
-  camera.configure(possible.back());  // busy
+  // The streaming camera is busy.
+  camera.configure(possible.back());
   camera.expect_frames(3);
   camera.check_statistics();
 }
@@ -137,7 +142,8 @@ TEST_F(CameraConformance, exposuresThatNeverArriveAreCounted) {
   camera.expect_frames(5);
   const std::uint64_t gaps = camera.gaps();
   const CameraStatistics before = rig_->camera().statistics();
-  if (!rig_->lose(4)) return;  // nothing on this rig loses frames
+  // This rig cannot lose frames.
+  if (!rig_->lose(4)) return;
   camera.expect_frames(12);
   const CameraStatistics after = rig_->camera().statistics();
   EXPECT_EQ(camera.gaps() - gaps, 4 + after.underruns - before.underruns);
@@ -146,7 +152,8 @@ TEST_F(CameraConformance, exposuresThatNeverArriveAreCounted) {
 
 /// Frames until one has that setting; false: none of the next had.
 bool reaches(ConformanceRig& rig, const CameraConfiguration& c, const ExposureSetting& setting) {
-  constexpr int kFrames = 12;  // an exposure under way, buffers in the camera and on the way
+  // Limit for an exposure in progress and for buffers in the camera and in transit.
+  constexpr int kFrames = 12;
   for (int i = 0; i < kFrames; ++i) {
     if (c.trigger == CameraTrigger::software) (void)rig.camera().trigger_once();
     Frame frame;
@@ -254,8 +261,8 @@ TEST_F(CameraConformance, threeThreadsMayShareACamera) {
   EXPECT_LT(std::chrono::steady_clock::now() - stopped, std::chrono::seconds(2))
       << "stop() did not wake wait()";
   {
-    const std::lock_guard lock(
-        mutex);  // the releaser's last round may have been before the last frame
+    // The releaser's last round may have been before the last frame.
+    const std::lock_guard lock(mutex);
   }
   releaser.join();
   for (const FrameSlot slot : back) camera.release(slot);

@@ -53,9 +53,8 @@ class GigeConformance final : public ConformanceRig {
     return true;
   }
   void replug() override { simulator_.replug(); }
-  Duration gone_within() const override {
-    return Duration::seconds(25);
-  }  // two unanswered calls and the longest pause
+  // The limit covers two unanswered calls and the longest pause.
+  Duration gone_within() const override { return Duration::seconds(25); }
   bool lose(int exposures) override {
     simulator_.lose_frames(exposures);
     return true;
@@ -63,16 +62,14 @@ class GigeConformance final : public ConformanceRig {
 
  private:
   static GigeCameraOptions options(std::uint64_t seed) {
-    GigeCameraOptions o;
-    o.address = GigeCamera::address(static_cast<int>(seed));
-    o.serial = "CONF-" + std::to_string(seed);
-    o.sensor_width = kWidth;
-    o.sensor_height = kHeight;
-    o.first_block = 65'520;
-    o.extended_ids = seed % 2 == 0;
-    o.discoverable = false;
-    o.seed = seed;
-    return o;
+    return {.address = GigeCamera::address(static_cast<int>(seed)),
+            .serial = "CONF-" + std::to_string(seed),
+            .sensor_width = kWidth,
+            .sensor_height = kHeight,
+            .first_block = 65'520,
+            .extended_ids = seed % 2 == 0,
+            .discoverable = false,
+            .seed = seed};
   }
   GigeCamera simulator_;
   std::unique_ptr<CameraDevice> camera_;

@@ -8,9 +8,7 @@ namespace {
 class MockConformance final : public ConformanceRig {
  public:
   explicit MockConformance(std::uint64_t seed) {
-    mock::MockRigOptions o;
-    o.real_time = true;
-    o.seed = seed;
+    mock::MockRigOptions o{.real_time = true, .seed = seed};
     rig_ = std::make_unique<mock::MockRig>(small_truth({}, 1, mock::DriveKind::loop), o);
   }
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -139,8 +138,7 @@ TYPED_TEST_P(SerialConformance, stopsAndStartsAgain) {
 }
 
 TYPED_TEST_P(SerialConformance, reconnectsAfterUnplugPoweredOrNot) {
-  SimulatedLineOptions line;
-  line.outages = {{at_s(10), at_s(13), true}, {at_s(18), at_s(20), false}};
+  SimulatedLineOptions line{.outages = {{at_s(10), at_s(13), true}, {at_s(18), at_s(20), false}}};
   this->begin(line);
   const auto all = this->take_to_the_end();
   EXPECT_EQ(this->disconnects, 2);
@@ -148,8 +146,7 @@ TYPED_TEST_P(SerialConformance, reconnectsAfterUnplugPoweredOrNot) {
 }
 
 TYPED_TEST_P(SerialConformance, startsAfterAStopDuringAnOutage) {
-  SimulatedLineOptions line;
-  line.outages = {{at_s(10), at_s(13), true}};
+  SimulatedLineOptions line{.outages = {{at_s(10), at_s(13), true}}};
   this->begin(line, {}, 120);
   typename TypeParam::Item last;
   ASSERT_EQ(end_of(this->rig->device(), &last), DeviceStatus::disconnected);
@@ -168,8 +165,7 @@ TYPED_TEST_P(SerialConformance, noiseOrSilenceIsADisconnect) {
 }
 
 TYPED_TEST_P(SerialConformance, flippedBitsLoseOnlyTheirMessages) {
-  SimulatedLineOptions line;
-  line.corrupt = 2e-4;
+  SimulatedLineOptions line{.corrupt = 2e-4};
   this->begin(line);
   const auto all = this->take_to_the_end();
   EXPECT_EQ(this->disconnects, 0);

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <time.h>
 
-#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -12,10 +11,10 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr Duration kSlack =
-    Duration::milliseconds(500);  // a busy machine's, beyond any limit that is asked for
-constexpr Duration kFirst = Duration::milliseconds(
-    4000);  // from start() to a frame at the latest: links are probed, sensors settle
+// Slack for a busy machine beyond any requested limit.
+constexpr Duration kSlack = Duration::milliseconds(500);
+// Maximum time from start() to the first frame: links are probed and sensors settle.
+constexpr Duration kFirst = Duration::milliseconds(4000);
 
 HostStamp now() noexcept {
   timespec t{};
@@ -95,7 +94,8 @@ void ShadowCamera::start() {
     EXPECT_EQ(status, DeviceStatus::bad_configuration);
     return;
   }
-  if (state_ == State::gone) return;  // only unplug_and_replug() asks for it back
+  // Only unplug_and_replug() reconnects the camera.
+  if (state_ == State::gone) return;
   ASSERT_EQ(status, DeviceStatus::ok) << camera_.last_error();
   if (state_ == State::streaming) return;
   state_ = State::streaming;
@@ -224,7 +224,8 @@ bool ShadowCamera::unplug_and_replug() {
   const auto soon = [this] {
     return steady_clock::now() + std::chrono::nanoseconds(rig_->gone_within().ns());
   };
-  for (const auto deadline = soon(); state_ != State::gone;) {  // what was under way still comes
+  // Frames in transit still arrive.
+  for (const auto deadline = soon(); state_ != State::gone;) {
     if (steady_clock::now() > deadline) {
       ADD_FAILURE() << "unplugged, and not gone";
       return true;

@@ -48,9 +48,8 @@ class ShadowCamera {
   /// Statistics against the model.
   void check_statistics();
 
-  [[nodiscard]] std::uint64_t gaps() const noexcept {
-    return gaps_;
-  }  // exposures missing between handed out frames, this start
+  // Number of exposures missing between delivered frames since this start.
+  [[nodiscard]] std::uint64_t gaps() const noexcept { return gaps_; }
 
  private:
   struct Held {
@@ -70,7 +69,8 @@ class ShadowCamera {
   std::vector<Held> held_;
   std::uint64_t delivered_ = 0, torn_ = 0, starts_ = 0;
   CameraStatistics last_{}, at_start_{};
-  bool any_ = false;  // frame since start
+  // True after the first frame since start().
+  bool any_ = false;
   Frame newest_{};
   std::uint64_t gaps_ = 0;
 };

@@ -24,7 +24,8 @@ class V4l2Rig final : public ConformanceRig {
       c.trigger = CameraTrigger::free;
       test::give<v4l2::Options>(&c, "control_timestamp_source", "Start of Exposure");
     }
-    all[1].pixel_format = "YUYV";  // turned to grey, so the slots are a pool's
+    // Images are converted to grey, so the slots are a pool's.
+    all[1].pixel_format = "YUYV";
     all[2].width = 640;
     all[2].height = 360;
     test::give<v4l2::Options>(&all[2], "buffers", "8");

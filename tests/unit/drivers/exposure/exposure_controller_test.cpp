@@ -61,7 +61,8 @@ class Street {
 };
 
 struct Stretch {
-  int changes = 0, last_change = -1;  // frame of this stretch
+  // Number of changes and frame of the last one within this stretch.
+  int changes = 0, last_change = -1;
 };
 
 Stretch drive(Street& street, ExposureController& controller, const ExposureOptions& o,
@@ -98,8 +99,8 @@ TEST_P(ExposureControl, settlesAfterEveryChangeOfLight) {
   for (const double light : {1.0, 1.0 / 6, 1.0, 0.3, 8.0, 0.25}) {
     const Stretch s = drive(street, controller, o, light, frames);
     EXPECT_LE(s.changes, max_changes) << "light " << light;
-    EXPECT_LT(s.last_change, frames - 60)
-        << "light " << light;  // the last 60 frames nothing moves: no limit cycle
+    // A change within the last 60 frames would be a limit cycle.
+    EXPECT_LT(s.last_change, frames - 60) << "light " << light;
     const Brightness b = street.last();
     const double off =
         std::min(std::log2(o.target / b.mean), std::log2(kSaturated / std::max(1.0, b.bright)));

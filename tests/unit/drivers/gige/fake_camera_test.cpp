@@ -1,8 +1,6 @@
 #include <arv.h>
 #include <gtest/gtest.h>
 
-#include <memory>
-
 #include "drivers/gige/detail/glib.hpp"
 #include "drivers/gige/gige.hpp"
 #include "tests/support/camera_options.hpp"
@@ -25,7 +23,8 @@ TEST(GigeFakeCamera, configuresAndStreams) {
   ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   Frame frame;
-  for (std::uint64_t n = 0; n < 150; ++n) {  // its ids wrap after 135
+  // The ids wrap after 135.
+  for (std::uint64_t n = 0; n < 150; ++n) {
     ASSERT_EQ(camera->wait(Duration::seconds(2), &frame), DeviceStatus::ok)
         << n << camera->last_error();
     EXPECT_EQ(frame.status, FrameStatus::complete);

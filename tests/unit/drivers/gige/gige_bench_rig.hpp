@@ -4,12 +4,10 @@
 #include <chrono>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "drivers/gige/gige.hpp"
 #include "tests/support/gige_camera.hpp"
-#include "tests/support/gvsp_sender.hpp"
 
 namespace vergence::test {
 
@@ -73,7 +71,8 @@ struct GigeBench {
 
   std::unique_ptr<GigeCamera> simulator;
   std::unique_ptr<CameraDevice> camera;
-  std::vector<std::uint64_t> numbers;  // of the complete frames taken
+  // Numbers of the complete frames.
+  std::vector<std::uint64_t> numbers;
 };
 
 }  // namespace vergence::test

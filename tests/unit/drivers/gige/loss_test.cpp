@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <set>
 
 #include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"
@@ -22,7 +21,8 @@ void expect_equal_accounts(const GigeBench& b, std::size_t taken) {
 
 CameraConfiguration many_packets(const GigeBench& b, const char* resend) {
   CameraConfiguration c = b.wish();
-  test::give<gige::Options>(&c, "packet_size", "600");  // 137 packets a frame
+  // A frame has 137 packets.
+  test::give<gige::Options>(&c, "packet_size", "600");
   test::give<gige::Options>(&c, "resend", resend);
   return c;
 }
@@ -46,13 +46,13 @@ TEST(GigeLoss, damagedFramesAreIncompleteOthersWhole) {
 
 TEST(GigeLoss, everyRandomPacketLossIsCounted) {
   for (const std::uint64_t seed : {1, 2}) {
-    GigeCameraOptions o;
-    o.seed = seed;
+    GigeCameraOptions o{.seed = seed};
     GigeBench b(o);
     b.configure(many_packets(b, "off"));
     b.start();
     std::size_t taken = b.take(3).size();
-    b.simulator->set_loss(0.01);  // a quarter of the frames comes through
+    // A quarter of the frames arrives complete.
+    b.simulator->set_loss(0.01);
     taken += b.take(12).size();
     b.simulator->set_loss(0);
     taken += b.take(3).size();
@@ -67,7 +67,8 @@ TEST(GigeLoss, resendRecoversHalfAPercentLoss) {
   b.configure(many_packets(b, "auto"));
   b.start();
   std::size_t taken = b.take(3).size();
-  b.simulator->set_loss(0.005);  // half of the frames lose a packet
+  // Half of the frames lose a packet.
+  b.simulator->set_loss(0.005);
   taken += b.take(100).size();
   b.simulator->set_loss(0);
   taken += b.take(3).size() + b.drain().size();

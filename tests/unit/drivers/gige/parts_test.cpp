@@ -1,15 +1,12 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
-#include <string>
 #include <vector>
 
 #include "drivers/gige/detail/frame_receiver.hpp"
 #include "drivers/gige/detail/grey.hpp"
 #include "drivers/gige/detail/link.hpp"
 #include "drivers/gige/detail/slot_returns.hpp"
-#include "drivers/gige/gige.hpp"
 
 namespace vergence::gige {
 namespace {
@@ -80,8 +77,8 @@ TEST(GigeGrey, cheapestFormatIsChosen) {
 }
 
 TEST(GigeGrey, wordsKeepTheirHighestEightBits) {
-  const std::vector<std::uint8_t> words{0xFF, 0x0F, 0x10, 0x00,
-                                        0x00, 0x08, 0xEF, 0x0A};  // 4095, 16, 2048, 2799
+  // The words are 4095, 16, 2048 and 2799.
+  const std::vector<std::uint8_t> words{0xFF, 0x0F, 0x10, 0x00, 0x00, 0x08, 0xEF, 0x0A};
   std::vector<std::uint8_t> out(2 * 64, 7);
   to_grey(*choose_format({"Mono12"}, ""), words.data(), 2, 2, out.data(), 64);
   EXPECT_EQ(out[0], 255);

@@ -40,7 +40,8 @@ TEST(GnssDecoder, sentencesOfOneTimeAreOneReading) {
   EXPECT_NEAR(s.position.latitude_deg, -27.4975, 1e-12);
   EXPECT_NEAR(s.position.height_m, 60, 1e-12);
   EXPECT_FALSE(s.attitude_valid);
-  EXPECT_FALSE(s.velocity_valid);  // no vertical speed
+  // The sentences have no vertical speed.
+  EXPECT_FALSE(s.velocity_valid);
   EXPECT_EQ(s.heading_source, HeadingSource::course);
   EXPECT_NEAR(s.yaw_enu, 0, 1e-12);
   EXPECT_NEAR(s.velocity_enu[0], 5.144444, 1e-6);
@@ -110,7 +111,8 @@ TEST(GnssDecoder, timeContinuesAcrossMidnight) {
   const auto b = read(&d, gga("000000.00"), HostStamp(1'500'000'000));
   ASSERT_EQ(a.size() + b.size(), 2U);
   EXPECT_EQ(b[0].measured - a[0].measured, Duration::milliseconds(500));
-  EXPECT_FALSE(b[0].quality.utc_valid);  // no date was ever sent
+  // No date was ever sent.
+  EXPECT_FALSE(b[0].quality.utc_valid);
 }
 
 // Arrivals 30 to 90 ms late at 10 Hz: the stamps settle at the least delay, which `processing`
@@ -133,7 +135,8 @@ TEST(GnssDecoder, stampsAreThoseOfTheFix) {
     ASSERT_EQ(all[0].measured.ns(), utc0 + since);
     if (i > 100) worst = std::max(worst, std::abs((all[0].host - truth).to_seconds()));
   }
-  EXPECT_LT(worst, 2e-3);  // the least delay of 61 evenly spread ones comes once in 61 readings
+  // The minimum of 61 evenly spread delays comes once in 61 samples.
+  EXPECT_LT(worst, 2e-3);
   EXPECT_EQ(d.counters().malformed, 0U);
 }
 

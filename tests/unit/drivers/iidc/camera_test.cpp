@@ -46,7 +46,8 @@ TEST_F(IidcCamera, framesCarryCounterStampAndPixels) {
 TEST_F(IidcCamera, stampsContinueAcrossTheBusClockWrap) {
   c.start();
   DeviceStamp last{};
-  for (int i = 0; i < 60; ++i) {  // 100 s … 160 s of the camera's clock
+  // The camera's clock runs from 100 s to 160 s.
+  for (int i = 0; i < 60; ++i) {
     c.bus->expose(1, Duration::seconds(1.0));
     const Frame f = c.take_and_release();
     if (i > 0) {
@@ -60,10 +61,10 @@ TEST_F(IidcCamera, shortFrameIsIncompleteAndKeepsItsNumber) {
   c.start();
   c.bus->expose(1);
   c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes -= 512; });
-  c.bus->expose_tampered(
-      [](auto*, std::size_t* bytes) { *bytes = 0; });  // the empty packet that ends a frame
-  c.bus->expose_tampered(
-      [](auto*, std::size_t* bytes) { *bytes = 4; });  // nothing to tell its number from
+  // An empty packet ends a frame.
+  c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes = 0; });
+  // Four bytes contain no frame number.
+  c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes = 4; });
   c.bus->expose(1);
   EXPECT_EQ(c.take_and_release().counter, 0U);
   const Frame torn = c.take_and_release();

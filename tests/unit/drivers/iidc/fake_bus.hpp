@@ -1,5 +1,4 @@
 #pragma once
-#include <array>
 #include <functional>
 #include <map>
 #include <set>
@@ -23,7 +22,8 @@ namespace vergence::test {
 /// virtual: host and camera clock begin at kStart and 100 s, and expose() moves both.
 class FakeBus final : public iidc::CameraBus {
  public:
-  static constexpr std::int64_t kStart = 5'000'000'000'000;  // ns, host
+  // Host time in ns.
+  static constexpr std::int64_t kStart = 5'000'000'000'000;
   static constexpr std::int64_t kCameraStart = 100'000'000'000;
 
   explicit FakeBus(bool isochronous = false, bool beta = false);
@@ -43,11 +43,14 @@ class FakeBus final : public iidc::CameraBus {
   void replug();
 
   // ---- faults of the registers ----
-  std::map<std::uint64_t, std::uint32_t>
-      stuck;  // address → bits that always read 1; the model need not know it
-  std::map<std::uint64_t, std::uint32_t> masked;  // address → the only bits that can read 1
-  std::set<std::uint64_t> refused;                // addresses the camera does not know
-  DeviceStatus all_accesses = DeviceStatus::ok;   // not ok: what every access says
+  // Address and bits that always read 1; the model need not know the register.
+  std::map<std::uint64_t, std::uint32_t> stuck;
+  // Address and the only bits that can read 1.
+  std::map<std::uint64_t, std::uint32_t> masked;
+  // Addresses that the camera refuses.
+  std::set<std::uint64_t> refused;
+  // Status of every access unless it is ok.
+  DeviceStatus all_accesses = DeviceStatus::ok;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> written;
   DeviceStatus start_status = DeviceStatus::ok;
 

@@ -33,13 +33,15 @@ TEST(FirewireNodes, camerasAreRecognisedByTheirRom) {
   const test::TemporaryFolder folder;
   EXPECT_FALSE(has_firewire(folder.path()));
   EXPECT_TRUE(list_firewire_cameras(folder.path()).empty());
-  add_node(folder.path(), "card0", "fw0", {0x04040000, 0x31333934, 0, 0, 1, 0});  // the card itself
+  // The node is the card itself.
+  add_node(folder.path(), "card0", "fw0", {0x04040000, 0x31333934, 0, 0, 1, 0});
   add_node(folder.path(), "card0", "fw2", model_rom(1));
   add_node(folder.path(), "card0", "fw1", model_rom(0));
   add_node(folder.path(), "card1", "fw4", model_rom(2));
-  add_node(folder.path(), "card0", "fw1.0", model_rom(0));  // a unit, not a node
-  add_node(folder.path(), "card0", "fw3",
-           std::vector<std::uint32_t>{});  // a node that did not tell
+  // The entry is a unit and not a node.
+  add_node(folder.path(), "card0", "fw1.0", model_rom(0));
+  // The node has not reported its ROM.
+  add_node(folder.path(), "card0", "fw3", std::vector<std::uint32_t>{});
   EXPECT_TRUE(has_firewire(folder.path()));
   const auto nodes = list_firewire_cameras(folder.path());
   ASSERT_EQ(nodes.size(), 3U);

@@ -10,13 +10,11 @@ namespace vergence::iidc {
 namespace {
 
 CameraPlan plan() {
-  CameraPlan p;
-  p.shape = {640 * 8, 640 * 8, 640, BusSpeed::s400, 4};
-  p.info = FrameInfoLayout::of(0x8000'0041);
-  p.exposure = Duration::milliseconds(2);
-  p.rate_hz = 10;
-  p.trigger = CameraTrigger::free;
-  return p;
+  return {.trigger = CameraTrigger::free,
+          .rate_hz = 10,
+          .exposure = Duration::milliseconds(2),
+          .shape = {640 * 8, 640 * 8, 640, BusSpeed::s400, 4},
+          .info = FrameInfoLayout::of(0x8000'0041)};
 }
 
 /// A picture of noise with number and stamp.
@@ -38,10 +36,9 @@ TEST(FrameReader, noiseIsNotTakenForTheNextFrame) {
   reader.begin(plan(), true, &clock);
   for (std::uint32_t n = 0; n < 20'000; ++n) {
     const auto pixels = image(n, 1'000'000'000 + n * std::int64_t{100'000'000}, &random);
-    Arrival a;
-    a.data = pixels.data();
-    a.bytes = pixels.size();
-    a.at = HostStamp(n * std::int64_t{100'000'000});
+    Arrival a{.data = pixels.data(),
+              .bytes = pixels.size(),
+              .at = HostStamp(n * std::int64_t{100'000'000})};
     const ReadFrame f = reader.read(a);
     ASSERT_TRUE(f.taken);
     ASSERT_EQ(f.status, FrameStatus::complete) << n;
@@ -63,10 +60,9 @@ TEST(FrameReader, anyBytesGiveAResult) {
       std::vector<std::uint8_t> bytes(random.below(3) == 0 ? random.below(60) : 640 * 8);
       for (auto& b : bytes)
         b = static_cast<std::uint8_t>(random.below(4) == 0 ? random.below(256) : 0);
-      Arrival a;
-      a.data = bytes.data();
-      a.bytes = bytes.size();
-      a.at = HostStamp(n * std::int64_t{10'000'000});
+      Arrival a{.data = bytes.data(),
+                .bytes = bytes.size(),
+                .at = HostStamp(n * std::int64_t{10'000'000})};
       const ReadFrame f = reader.read(a);
       if (!f.taken) continue;
       ASSERT_TRUE(!any || f.counter > last);
@@ -84,11 +80,10 @@ TEST(FrameReader, busStampsShowGapsWithoutEmbeddedData) {
   const std::vector<std::uint8_t> pixels(640 * 8);
   std::uint64_t missing = 0, last = 0;
   for (const int k : {0, 1, 2, 5, 6, 8}) {
-    Arrival a;
-    a.data = pixels.data();
-    a.bytes = pixels.size();
-    a.has_bus_stamp = true;
-    a.bus_stamp = HostStamp(k * std::int64_t{100'000'000} + k % 2 * 125'000);
+    Arrival a{.data = pixels.data(),
+              .bytes = pixels.size(),
+              .has_bus_stamp = true,
+              .bus_stamp = HostStamp(k * std::int64_t{100'000'000} + k % 2 * 125'000)};
     a.at = a.bus_stamp + Duration::milliseconds(80);
     const ReadFrame f = reader.read(a);
     missing += f.missing;

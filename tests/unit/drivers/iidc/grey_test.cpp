@@ -4,8 +4,6 @@
 
 #include <vector>
 
-#include "core/math/random.hpp"
-
 namespace vergence::iidc {
 namespace {
 

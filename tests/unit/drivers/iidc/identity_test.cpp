@@ -11,7 +11,8 @@ TEST(Identity, guidIsGivenInHexOrAsSerialNumber) {
   EXPECT_TRUE(names_camera("", kGuid));
   EXPECT_TRUE(names_camera("00b09d0100a12345", kGuid));
   EXPECT_TRUE(names_camera("0x00B09D0100A12345", kGuid));
-  EXPECT_TRUE(names_camera("10560325", kGuid));  // 0x00A12345
+  // The serial number is 0x00A12345.
+  EXPECT_TRUE(names_camera("10560325", kGuid));
   EXPECT_TRUE(names_camera("F3-77", kGuid, "F3-77"));
   EXPECT_FALSE(names_camera("10560326", kGuid));
   EXPECT_FALSE(names_camera("F3-77", kGuid));

@@ -23,7 +23,8 @@ inline double mean_of(const ImageView& v) {
 
 struct Seen {
   Frame frame;
-  double mean = 0;  // grey
+  // Mean grey value.
+  double mean = 0;
 };
 
 /// A drive in virtual time with tiny pictures of an almost empty town, and all that its cameras,
@@ -60,7 +61,8 @@ struct MockBench {
 
   std::unique_ptr<MockRig> rig;
   std::array<std::vector<Seen>, 2> frames;
-  std::array<int, 2> gone{};  // times that a camera was, and came back
+  // Number of disconnects followed by a reconnect, per camera.
+  std::array<int, 2> gone{};
   std::array<CameraStatistics, 2> statistics;
   std::vector<InsReading> readings;
   std::vector<Pulse> pulses;

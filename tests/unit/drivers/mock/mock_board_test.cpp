@@ -7,11 +7,7 @@ namespace {
 constexpr Duration kExposure = Duration::milliseconds(8);
 constexpr Duration kPeriod = Duration::milliseconds(50);
 
-MockRigOptions four_seconds() {
-  MockRigOptions o;
-  o.duration = Duration::seconds(4);
-  return o;
-}
+MockRigOptions four_seconds() { return {.duration = Duration::seconds(4)}; }
 
 TEST(MockBoard, variedIntervalsFollowTheProtocol) {
   TriggerConfiguration c{kRate};

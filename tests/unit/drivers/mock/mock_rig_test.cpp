@@ -9,9 +9,7 @@ namespace {
 
 MockBench drive_with(const std::vector<std::string>& faults, double seconds = 3,
                      bool ideal = false) {
-  MockRigOptions o;
-  o.duration = Duration::seconds(seconds);
-  o.ideal_ins = ideal;
+  MockRigOptions o{.ideal_ins = ideal, .duration = Duration::seconds(seconds)};
   MockBench b(faults, o);
   b.drive();
   return b;
@@ -115,7 +113,8 @@ TEST(MockRig, swappedCablesExchangeTheImagesOnly) {
   for (std::size_t i = 0; i < 61; ++i) {
     const bool exchanged = i >= 20, covered = i >= 40 && i < 50;
     EXPECT_EQ(swapped.frames[0][i].mean, good.frames[exchanged ? 1 : 0][i].mean) << i;
-    if (covered)  // the lens of camera 0, at the end of the other's cable
+    // Camera 0's lens is covered, and its image comes through the other cable.
+    if (covered)
       EXPECT_LT(swapped.frames[1][i].mean, 1) << i;
     else
       EXPECT_EQ(swapped.frames[1][i].mean, good.frames[exchanged ? 0 : 1][i].mean) << i;

@@ -57,8 +57,8 @@ class SerialLine : public ::testing::Test {
 
 TEST_F(SerialLine, everyByteIsCarriedBothWays) {
   Bytes all(256);
-  for (std::size_t i = 0; i < all.size(); ++i)
-    all[i] = static_cast<std::uint8_t>(i);  // XON, XOFF, CR, NUL and FF among them
+  // XON, XOFF, CR, NUL and FF are among the bytes.
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);
   send(all);
   Bytes got;
   const HostStamp before = line().now();
@@ -127,8 +127,8 @@ TEST_F(SerialLine, hangUpDisconnectsAtOnce) {
 TEST_F(SerialLine, discardedInputIsNotRead) {
   send({1, 2, 3});
   std::array<std::uint8_t, 8> some{};
-  ASSERT_EQ(line().read(std::span(some).first(1), kLong).status,
-            DeviceStatus::ok);  // the others are there, too
+  // The remaining bytes have arrived, too.
+  ASSERT_EQ(line().read(std::span(some).first(1), kLong).status, DeviceStatus::ok);
   line().discard_input();
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
 }
@@ -169,7 +169,8 @@ TEST(ConverterNumber, sharedNumberIsNeverUsedAgain) {
   const auto one = usb_port("/dev/ttyV0", "0001"), other = usb_port("/dev/ttyV1", "0001");
   ConverterNumber shared;
   shared.opened({one, other}, "0001");
-  shared.opened({one}, "0001");  // after the hub began anew it was there first
+  // After the hub restarted this port was listed first.
+  shared.opened({one}, "0001");
   EXPECT_EQ(shared.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
 
   ConverterNumber alone;
@@ -198,7 +199,8 @@ TEST(SerialPort, failedOpenGivesItsReason) {
   EXPECT_EQ(SerialPort("/dev/null").open({0, 1}, &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::unsupported);
   EXPECT_FALSE(read_latency_timer_ms("/dev/null").has_value());
-  (void)list_serial_ports();  // whatever is there: it does not throw
+  // The call must not throw, whatever is connected.
+  (void)list_serial_ports();
 }
 
 }  // namespace

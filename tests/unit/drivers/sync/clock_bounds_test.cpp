@@ -12,12 +12,14 @@
 namespace vergence {
 namespace {
 
-constexpr double kJitter = 2e6;  // ns, mean
+// Mean jitter in ns.
+constexpr double kJitter = 2e6;
 
 struct Line {
   double drift = 50e-6;
   std::int64_t offset = 987'654'321'012;
-  std::int64_t floor_there = 300'000, floor_back = 300'000;  // ns
+  // Minimum delays in ns.
+  std::int64_t floor_there = 300'000, floor_back = 300'000;
   Random random;
 
   explicit Line(std::uint64_t seed) : random(seed) {}
@@ -92,8 +94,8 @@ TEST(ClockBounds, boundsHoldFromTheFirstStampForAnyDelay) {
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     Line line(seed);
     line.drift = line.random.uniform(-100e-6, 100e-6);
-    line.floor_there =
-        line.random.below(3'000'000);  // unlike: nobody can see it, the bound allows for it
+    // The delays differ, which cannot be observed; the bound allows for it.
+    line.floor_there = line.random.below(3'000'000);
     line.floor_back = line.random.below(3'000'000);
     ClockMapper arrivals(options_of(line, false)), pings(options_of(line, true));
     std::int64_t t = 1'000'000'000;
@@ -152,8 +154,7 @@ TEST(ClockBounds, changingDriftIsFollowed) {
 TEST(ClockBounds, tenYearsStayExactToTheNanosecond) {
   constexpr std::int64_t kTenYears = 315'576'000'000'000'000;
   for (const std::int64_t offset : {kTenYears, -kTenYears}) {
-    ClockMapperOptions o;
-    o.resolution = Duration::nanoseconds(1);
+    ClockMapperOptions o{.resolution = Duration::nanoseconds(1)};
     ClockMapper one(o), two(o);
     // No jitter, no drift: what is off is arithmetic. A minute of a stamp a second, then one every
     // 20 days or in the next second.

@@ -10,12 +10,7 @@
 namespace vergence {
 namespace {
 
-using testing::kRigInterval;
-using testing::rig_frame;
-using testing::rig_options;
-using testing::rig_time;
-using testing::RigSets;
-using testing::sets_of;
+using namespace testing;
 
 struct CommonClock : ::testing::TestWithParam<SyncMode> {};
 
@@ -23,7 +18,8 @@ TEST_P(CommonClock, pairsAreFormedByItsStampsAlone) {
   RigSynchronizer sync(rig_options(GetParam()));
   RigSets out;
   Random random(3);
-  for (int n = 0; n < 6000; ++n) {  // four minutes: the bus's clock wraps once
+  // During four minutes the bus's clock wraps once.
+  for (int n = 0; n < 6000; ++n) {
     const DeviceStamp t(50'000'000'000 + (kRigInterval * n).ns());
     // Counters mean nothing, and the host's stamps are off by nearly half an interval.
     for (int k = 0; k < 2; ++k) {

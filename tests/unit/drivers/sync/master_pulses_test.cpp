@@ -9,10 +9,9 @@ constexpr Duration kInterval = Duration::milliseconds(50);
 
 /// Camera 0's frame of this counter, exposed at this pulse of an even train by its own clock.
 SyncFrame frame(std::uint64_t counter, std::int64_t pulse) {
-  SyncFrame f;
-  f.counter = counter;
-  f.exposure_start = DeviceStamp(0) + kInterval * pulse;
-  f.exposure = Duration::milliseconds(8);
+  SyncFrame f{.counter = counter,
+              .exposure_start = DeviceStamp(0) + kInterval * pulse,
+              .exposure = Duration::milliseconds(8)};
   f.middle = {HostStamp(9'000'000'000) + kInterval * pulse + f.exposure / 2,
               Duration::microseconds(40)};
   return f;

@@ -9,10 +9,7 @@
 namespace vergence {
 namespace {
 
-using testing::board;
-using testing::PulseRig;
-using testing::PulseRigOptions;
-using testing::PulseRigTruth;
+using namespace testing;
 
 PulseRigTruth run(const PulseRigOptions& o, double seconds, SyncCounters* counters = nullptr,
                   SyncOptions sync = board()) {
@@ -53,8 +50,7 @@ TEST(PulseAdversary, unusualStartsAndDelaysShiftNoPair) {
        })
     for (std::uint64_t seed = 1; seed <= oddity.seeds; ++seed) {
       SCOPED_TRACE(oddity.name);
-      PulseRigOptions o;
-      o.seed = seed;
+      PulseRigOptions o{.seed = seed};
       oddity.set(&o);
       SyncOptions sync = board();
       if (oddity.hold > Duration{}) sync.hold = oddity.hold;
@@ -66,8 +62,7 @@ TEST(PulseAdversary, unusualStartsAndDelaysShiftNoPair) {
 }
 
 TEST(PulseAdversary, missingReportsCostNoPair) {
-  PulseRigOptions o;
-  o.unreported = 0.05;
+  PulseRigOptions o{.unreported = 0.05};
   SyncCounters c;
   const PulseRigTruth t = run(o, 60, &c);
   expect_mostly_complete(t, 0.95);
@@ -81,9 +76,7 @@ TEST(PulseAdversary, clockJumpReacquiresOnlyItsCamera) {
   for (const double seconds : {0.003, 1.0 / 30, 2.0 / 30, -1.0 / 30, 5.0, -5.0, 4294.967296}) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
       SCOPED_TRACE(std::to_string(seconds) + " s, seed " + std::to_string(seed));
-      PulseRigOptions o;
-      o.seed = seed;
-      o.jumps = {{1, 5, seconds}};
+      PulseRigOptions o{.seed = seed, .jumps = {{1, 5, seconds}}};
       SyncCounters c;
       const PulseRigTruth t = run(o, 10, &c);
       EXPECT_EQ(c.contradictions[0], 0U);
@@ -97,9 +90,7 @@ TEST(PulseAdversary, clockJumpReacquiresOnlyItsCamera) {
 }
 
 TEST(PulseAdversary, evenIntervalsVerifyOnlyByAPause) {
-  PulseRigOptions o;
-  o.vary = Duration{};
-  o.stale_first = true;
+  PulseRigOptions o{.vary = Duration{}, .stale_first = true};
   {
     PulseRig rig(o, board());
     rig.pauses(false);
@@ -119,11 +110,7 @@ TEST(PulseAdversary, evenIntervalsVerifyOnlyByAPause) {
 
 TEST(PulseAdversary, hostStampsAreVerifiedByAPause) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    PulseRigOptions o;
-    o.seed = seed;
-    o.stamp_noise_us = 1500;
-    o.lost = 0.002;
-    o.missed = 0.002;
+    PulseRigOptions o{.seed = seed, .lost = 0.002, .missed = 0.002, .stamp_noise_us = 1500};
     SyncOptions sync = board();
     for (SyncCameraOptions& c : sync.camera) c.jitter = Duration::microseconds(1600);
     PulseRig rig(o, sync);
@@ -160,10 +147,7 @@ TEST(PulsePairing, tenHoursGiveNoWrongPairAndCountLosses) { testing::expect_ten_
 TEST(PulsePairing, isVerifiedWithinASecondAfterReconnect) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed)
     for (const double rate : {20.0, 30.0}) {
-      PulseRigOptions o;
-      o.rate_hz = rate;
-      o.gone = {{1, 5, 7}, {0, 15.02, 16}};
-      o.reboots = {10.01};
+      PulseRigOptions o{.rate_hz = rate, .gone = {{1, 5, 7}, {0, 15.02, 16}}, .reboots = {10.01}};
       expect_proven_within_a_second(o, seed, 20, 3);
     }
 }
@@ -171,8 +155,7 @@ TEST(PulsePairing, isVerifiedWithinASecondAfterReconnect) {
 TEST(PulsePairing, isVerifiedWithinASecondAfterBriefLoss) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed)
     for (const double seconds : {0.05, 0.1, 0.2, 0.3}) {
-      PulseRigOptions o;
-      o.rate_hz = 20;
+      PulseRigOptions o{.rate_hz = 20};
       const double at = 3 + 0.0137 * static_cast<double>(seed);
       o.gone = {{0, at, at + seconds}, {1, at, at + seconds}};
       expect_proven_within_a_second(o, seed, 8, 2);

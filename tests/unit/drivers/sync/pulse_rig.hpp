@@ -20,33 +20,44 @@ struct PulseRigOptions {
   Duration vary = Duration::milliseconds(1);
   int cameras = 2;
   std::uint64_t seed = 1;
-  double lost = 0, missed = 0, unreported = 0, duplicated = 0;  // probabilities a frame or pulse
-  double bursts = 0;  // probability a pulse that the board's line stalls for 60 ms
+  // Probabilities per frame or pulse.
+  double lost = 0, missed = 0, unreported = 0, duplicated = 0;
+  // Probability per pulse that the board's line stalls for 60 ms.
+  double bursts = 0;
   Duration report_delay = Duration::milliseconds(3), frame_delay = Duration::milliseconds(25);
-  double report_jitter_ms = 1, frame_jitter_ms = 2;  // means, exponential
-  double stamp_noise_us = 3;                         // of the cameras' stamps, uniform, each way
-  std::array<Duration, kMaxCameras> lag{};           // more of the transport's delay, for ever
-  bool stale_first = false;         // an image of before sits in each camera's buffer at its start
-  bool first_dropped = false;       // each camera ignores its first trigger
-  std::uint64_t counter_start = 0;  // of a camera's count
+  // Means of exponential jitter.
+  double report_jitter_ms = 1, frame_jitter_ms = 2;
+  // Uniform noise of the cameras' stamps in either direction.
+  double stamp_noise_us = 3;
+  // Additional constant delay of the transport.
+  std::array<Duration, kMaxCameras> lag{};
+  // Each camera's buffer holds an old image at its start.
+  bool stale_first = false;
+  // Each camera ignores its first trigger.
+  bool first_dropped = false;
+  // First value of a camera's counter.
+  std::uint64_t counter_start = 0;
   Duration exposure = Duration::milliseconds(8);
   std::array<Duration, kMaxCameras> delay{
       Duration::microseconds(40), Duration::microseconds(70), {}, {}};
-  Duration host_noise = Duration::microseconds(20);  // of the pulses' mapped edges
+  // Noise of the pulses' mapped edges.
+  Duration host_noise = Duration::microseconds(20);
   // Events, seconds since the start.
   struct Gone {
     int camera = 0;
     double from = 0, until = 0;
   };
   std::vector<Gone> gone{};
-  std::vector<double> reboots{};  // the board begins again; no pulses for 0.7 s
+  // Times at which the board restarts; there are no pulses for 0.7 s.
+  std::vector<double> reboots{};
   struct Jump {
     int camera = 0;
     double at = 0, seconds = 0;
   };
-  std::vector<Jump> jumps{};  // a camera's clock is set
-  double quiet = 4;  // s around those, in which nothing is lost or missed: nobody can tell what was
-                     // lost with a camera that went
+  // Times at which a camera's clock is set.
+  std::vector<Jump> jumps{};
+  // Time around events, in s, without losses: losses of a disconnected camera are unknown.
+  double quiet = 4;
 };
 
 /// Actions of the rig by name.
@@ -54,10 +65,12 @@ struct PulseRigTruth {
   std::uint64_t pulses = 0;
   std::array<std::uint64_t, kMaxCameras> exposed{}, lost{}, missed{}, duplicated{};
   std::uint64_t sets = 0, complete = 0, wrong = 0, ambiguous = 0, unreported = 0;
-  std::uint64_t broken = 0;        // promises to the user: a slot twice or never, an order, a flag
-  std::uint64_t outside = 0;       // stamps farther from the truth than their bound
-  double worst_acquisition_s = 0;  // from the first pulse after a start, reconnect or reboot to the
-                                   // first image of a set that is verified
+  // Number of contract violations: a slot returned twice or never, a wrong order or flag.
+  std::uint64_t broken = 0;
+  // Number of stamps farther from the truth than their bound.
+  std::uint64_t outside = 0;
+  // Time from the first pulse after a start, reconnect or reboot to the first verified set.
+  double worst_acquisition_s = 0;
 };
 
 class PulseRig {
@@ -105,7 +118,8 @@ class PulseRig {
   [[nodiscard]] int asked() const { return asked_; }
 
  private:
-  static constexpr double kStart = 1000;  // s of the host's clock
+  // Start in s of the host's clock.
+  static constexpr double kStart = 1000;
   struct Camera {
     std::int64_t offset = 0;
     double drift = 0;
@@ -348,7 +362,8 @@ class PulseRig {
   std::uint64_t last_number_ = 0;
   std::uint64_t made_ = 0;
   std::array<Camera, kMaxCameras> cameras_{};
-  std::array<double, kMaxCameras> waiting_since_{};  // 0: since the next pulse, -1: for nothing
+  // 0 waits for the next pulse, -1 waits for nothing.
+  std::array<double, kMaxCameras> waiting_since_{};
   std::priority_queue<Event> events_;
   std::int64_t board_offset_ = 0, last_report_ = 0, stalled_until_ = 0;
   double board_drift_ = 0, last_s_ = -1;

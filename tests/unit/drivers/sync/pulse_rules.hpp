@@ -9,19 +9,12 @@
 /// Properties for every seed: a few in the ordinary tests, many in the slow ones.
 namespace vergence::testing {
 
-inline SyncOptions board() {
-  SyncOptions o;
-  o.mode = SyncMode::board;
-  return o;
-}
+inline SyncOptions board() { return {.mode = SyncMode::board}; }
 
 /// Ten hours at 30 Hz: 0.1 % of the frames lost, 0.05 % of the triggers missed, five reconnects,
 /// three reboots.
 inline PulseRigOptions ten_hours(std::uint64_t seed) {
-  PulseRigOptions o;
-  o.seed = seed;
-  o.lost = 1e-3;
-  o.missed = 5e-4;
+  PulseRigOptions o{.seed = seed, .lost = 1e-3, .missed = 5e-4};
   Random random(seed, 3);
   for (int i = 0; i < 5; ++i) {
     const double at = 600 + 7000.0 * i + random.uniform(0, 3000);

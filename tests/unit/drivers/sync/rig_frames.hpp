@@ -40,25 +40,19 @@ struct RigSets {
 
 inline SyncFrame rig_frame(int camera, int pulse, std::uint64_t counter, HostStamp start,
                            DeviceStamp by_camera, Duration delay = Duration::milliseconds(30)) {
-  SyncFrame f;
-  f.camera = camera;
-  f.slot = static_cast<FrameSlot>(pulse);
-  f.counter = counter;
-  f.exposure_start = by_camera;
-  f.exposure = kExposure;
-  f.middle = {start + kExposure / 2, Duration::microseconds(300)};
-  f.arrival = start + delay + Duration::microseconds(100 * camera);
+  SyncFrame f{.camera = camera,
+              .slot = static_cast<FrameSlot>(pulse),
+              .counter = counter,
+              .middle = {start + kExposure / 2, Duration::microseconds(300)},
+              .arrival = start + delay + Duration::microseconds(100 * camera),
+              .exposure_start = by_camera,
+              .exposure = kExposure};
   return f;
 }
 
 inline HostStamp rig_time(int pulse) { return HostStamp(77'000'000'000) + kRigInterval * pulse; }
 
-inline SyncOptions rig_options(SyncMode mode) {
-  SyncOptions o;
-  o.mode = mode;
-  o.interval = kRigInterval;
-  return o;
-}
+inline SyncOptions rig_options(SyncMode mode) { return {.interval = kRigInterval, .mode = mode}; }
 
 /// Sets from this many pulses that expose both cameras, stamped by their own clocks; to the
 /// end.

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +9,7 @@
 #include "drivers/sync/rig_synchronizer.hpp"
 #include "drivers/sync/sync_out_pulses.hpp"
 #include "firmware_iface/trigger/trigger.h"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/drivers/sync/rig_frames.hpp"
 
 /// The modes with other pulses than a board's: the INS's, those of one camera that triggers the
@@ -18,10 +17,7 @@
 namespace vergence {
 namespace {
 
-using testing::kRigInterval;
-using testing::rig_frame;
-using testing::rig_options;
-using testing::RigSets;
+using namespace testing;
 
 // ---- the INS's SyncOut ----
 
@@ -41,15 +37,16 @@ TEST(RigModes, syncOutIsVerifiedByAnInitialPause) {
       EXPECT_FALSE(asked);
       asked = true;
       while (sample % 4 != 0) ++sample;
-      t = t + Duration::microseconds(313'700);  // GoToConfig, GoToMeasurement
+      // The pause is GoToConfig and GoToMeasurement.
+      t = t + Duration::microseconds(313'700);
       pulses.restart();
     }
     const bool pulsed = sample % 4 == 0;
-    InsReading r;
-    r.measured = DeviceStamp(t.ns() + 123'456'789);
-    r.arrival = t + Duration::milliseconds(4);
+    InsReading r{.measured = DeviceStamp(t.ns() + 123'456'789),
+                 .arrival = t + Duration::milliseconds(4)};
     r.quality.sync_out = pulsed;
-    if (sample % 97 != 0 || sample < 8) {  // some readings are lost
+    // Some samples are lost.
+    if (sample % 97 != 0 || sample < 8) {
       if (const auto p = pulses.reading(r, {t, Duration::microseconds(200)})) {
         EXPECT_TRUE(pulsed) << sample;
         sync.pulse(*p);
@@ -112,7 +109,8 @@ struct MasterRig {
     time = time + Duration::microseconds(233'400);
     sync.absent(0);
     sync.restarted(0);
-    counters[0] = static_cast<std::uint64_t>(-1);  // the pulse under way counts it to 0
+    // The pulse in progress increments the counter to 0.
+    counters[0] = static_cast<std::uint64_t>(-1);
     out.drain(&sync);
   }
 
@@ -170,14 +168,12 @@ TEST(RigModes, masterRestartVerifiesItsSlaves) {
 // ---- what all with pulses share ----
 
 Pulse pulse_at(std::uint64_t number, HostStamp at) {
-  Pulse p;
-  p.number = number;
-  p.edge = DeviceStamp(at.ns() - 70'000'000'000);
-  p.arrival = at + Duration::milliseconds(2);
-  p.mapped = true;
-  p.host = at;
-  p.host_error = Duration::microseconds(15);
-  return p;
+  return {.number = number,
+          .edge = DeviceStamp(at.ns() - 70'000'000'000),
+          .arrival = at + Duration::milliseconds(2),
+          .mapped = true,
+          .host = at,
+          .host_error = Duration::microseconds(15)};
 }
 
 /// Varied by a millisecond, as the board does it.
@@ -249,11 +245,9 @@ TEST(RigModes, synchronisationAllocatesNothing) {
     GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   RigSynchronizer sync(rig_options(SyncMode::board));
   ClockMapper clock{ClockMapperOptions{}};
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   HostStamp t(80'000'000'000);
   std::uint64_t sets = 0;
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     for (std::uint64_t n = 0; n < 500; ++n) {
       clock.ping(t, DeviceStamp(t.ns() + 1000), DeviceStamp(t.ns() + 2000),
                  t + Duration::microseconds(3));
@@ -268,8 +262,7 @@ TEST(RigModes, synchronisationAllocatesNothing) {
       (void)sync.wants_pause();
       t = t + varied(n);
     }
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   EXPECT_GT(sets, 400U);
 }
 

@@ -16,11 +16,7 @@ namespace {
 constexpr Duration kInterval = Duration::milliseconds(50);
 
 SyncOptions options(int cameras = 2) {
-  SyncOptions o;
-  o.cameras = cameras;
-  o.interval = kInterval;
-  o.hold = kInterval * 2;
-  return o;
+  return {.cameras = cameras, .interval = kInterval, .hold = kInterval * 2};
 }
 
 HostStamp middle_of(std::uint64_t pulse) {
@@ -28,13 +24,12 @@ HostStamp middle_of(std::uint64_t pulse) {
 }
 
 SyncFrame frame(int camera, std::uint64_t counter, std::uint64_t pulse, FrameSlot slot = 0) {
-  SyncFrame f;
-  f.camera = camera;
-  f.slot = slot;
-  f.counter = counter;
-  f.middle = {middle_of(pulse) + Duration::microseconds(30 * camera), Duration::microseconds(100)};
-  f.arrival = middle_of(pulse) + Duration::milliseconds(10 + camera);
-  return f;
+  return {.camera = camera,
+          .slot = slot,
+          .counter = counter,
+          .middle = {middle_of(pulse) + Duration::microseconds(30 * camera),
+                     Duration::microseconds(100)},
+          .arrival = middle_of(pulse) + Duration::milliseconds(10 + camera)};
 }
 
 std::vector<SyncedSet> drain(RigSynchronizer* sync) {
@@ -130,13 +125,16 @@ TEST(RigSynchronizer, matchesAModelUnderRandomLossAndDelay) {
       std::uint64_t& pulse = at[k];
       std::uint64_t number = pulse;
       switch (random.below(20)) {
-        case 0:  // some are lost
+        // Some frames are lost.
+        case 0:
           pulse += 1 + random.below(3);
           continue;
-        case 1:  // one again, not older than what is remembered
+        // A frame is repeated that is not older than what is remembered.
+        case 1:
           if (pulse > 0) number = pulse - 1 - std::min<std::uint64_t>(pulse - 1, random.below(6));
           break;
-        default:  // no camera runs ahead of another by more than the transport's depth
+        // No camera runs ahead of another by more than the transport's depth.
+        default:
           if (pulse > *std::min_element(at.begin(), at.end()) + 6) continue;
           ++pulse;
       }
@@ -188,7 +186,8 @@ TEST(RigSynchronizer, disagreeingStampsUnverifyASet) {
   ASSERT_EQ(sets.size(), 1U);
   EXPECT_EQ(sets[0].proof, SyncProof::counted);
   (void)offer(&sync, frame(0, 1, 1));
-  sets = offer(&sync, frame(1, 1, 2));  // the same counter, exposed a pulse later
+  // The counter is the same, but the exposure is one pulse later.
+  sets = offer(&sync, frame(1, 1, 2));
   ASSERT_EQ(sets.size(), 1U);
   EXPECT_TRUE(sets[0].complete);
   EXPECT_EQ(sets[0].proof, SyncProof::ambiguous);
@@ -203,12 +202,14 @@ TEST(RigSynchronizer, wrongStartIsCorrected) {
   RigSynchronizer sync(o);
   (void)offer(&sync, frame(0, 0, 0));
   SyncFrame misled = frame(1, 0, 1);
-  misled.middle.host = middle_of(0);  // the first stamps of a clock that is not known yet
+  // The stamp is the first of a clock that is not known yet.
+  misled.middle.host = middle_of(0);
   (void)offer(&sync, misled);
   int ambiguous = 0, counted = 0;
   for (std::uint64_t n = 1; n < 40; ++n) {
     auto sets = offer(&sync, frame(0, n, n));
-    SyncFrame other = frame(1, n, n + 1);  // of the next pulse, in truth
+    // The frame is truly of the next pulse.
+    SyncFrame other = frame(1, n, n + 1);
     other.arrival = frame(0, n, n).arrival;
     EXPECT_NE(sync.offer(other), SyncResult::late);
     for (const SyncedSet& set : drain(&sync)) sets.push_back(set);
@@ -252,8 +253,8 @@ TEST(RigSynchronizer, freeRunningImagesArePairedByTime) {
   // The counters mean nothing: camera 1 has counted 1000 exposures more, and jitters by up to 2.5
   // ms.
   for (std::uint64_t n = 0; n < 200; ++n) {
-    const double at = n < 15 ? 50.0 * static_cast<double>(n)
-                             : 50.0 * static_cast<double>(n) + 5013;  // five seconds of rest
+    // The cameras rest for five seconds.
+    const double at = n < 15 ? 50.0 * static_cast<double>(n) : 50.0 * static_cast<double>(n) + 5013;
     take(timed(0, n, at));
     if (n != 7) take(timed(1, n + 1000, at + random.uniform(-2.5, 2.5)));
   }

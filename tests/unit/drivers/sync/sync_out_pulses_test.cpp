@@ -10,9 +10,12 @@
 namespace vergence {
 namespace {
 
-constexpr std::int64_t kBegin = 1'000'000'000, kTenHours = 36'000'000'000'000;  // ns
-constexpr std::int64_t kSample = 10'000'000;                                    // ns
-constexpr std::int64_t kOffset = 5;  // ns, the host's clock before the device's
+// Times in ns.
+constexpr std::int64_t kBegin = 1'000'000'000, kTenHours = 36'000'000'000'000;
+// Sample interval in ns.
+constexpr std::int64_t kSample = 10'000'000;
+// Offset of the host's clock before the device's, in ns.
+constexpr std::int64_t kOffset = 5;
 
 /// Result of ten hours.
 struct Account {
@@ -29,14 +32,14 @@ struct Account {
 };
 
 std::optional<Pulse> read(SyncOutPulses* pulses, std::int64_t sample) {
-  InsReading r;
-  r.measured = DeviceStamp(sample);
+  InsReading r{.measured = DeviceStamp(sample)};
   r.quality.sync_out = true;
   return pulses->reading(r, {HostStamp(sample + kOffset), Duration::microseconds(9)});
 }
 
 TEST(SyncOutPulses, marksMatchThePulsesForHours) {
-  constexpr std::int64_t kPulse = 37'500'000;  // 400 Hz / 15: 26.66… Hz
+  // The rate is 400 Hz / 15, about 26.67 Hz.
+  constexpr std::int64_t kPulse = 37'500'000;
   for (const double rate : {26.6667, 26.6666}) {
     SyncOutPulses pulses(Duration::seconds(1 / rate));
     Account account;
@@ -49,7 +52,8 @@ TEST(SyncOutPulses, marksMatchThePulsesForHours) {
 }
 
 TEST(SyncOutPulses, intervalOffTheDeviceGridIsKept) {
-  constexpr std::int64_t kPulse = 37'600'000;  // 0.27 % beside 400 Hz / 15
+  // The interval is 0.27 % off 400 Hz / 15.
+  constexpr std::int64_t kPulse = 37'600'000;
   SyncOutPulses pulses(Duration::nanoseconds(kPulse));
   Account account;
   for (std::int64_t n = 0; n < 10'000; ++n) {

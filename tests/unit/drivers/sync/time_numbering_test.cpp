@@ -5,13 +5,12 @@
 namespace vergence {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;  // ns
+// One millisecond in ns.
+constexpr std::int64_t kMs = 1'000'000;
 
 SyncOptions options(SyncMode mode) {
-  SyncOptions o;
-  o.mode = mode;
-  o.interval = Duration::milliseconds(50);
-  o.tolerance = Duration::milliseconds(2);
+  SyncOptions o{
+      .interval = Duration::milliseconds(50), .mode = mode, .tolerance = Duration::milliseconds(2)};
   return o;
 }
 
@@ -52,9 +51,8 @@ TEST(TimeNumbering, frameOfAMissingSetGetsItsNumber) {
 TEST(TimeNumbering, busClockWrapIsUnwrapped) {
   const TimeNumbering numbering(options(SyncMode::ieee1394_cycle_time));
   OpenSets sets;
-  SyncFrame frame;
-  frame.exposure = Duration::milliseconds(10);
-  frame.exposure_start = DeviceStamp(127'990 * kMs);
+  SyncFrame frame{.exposure_start = DeviceStamp(127'990 * kMs),
+                  .exposure = Duration::milliseconds(10)};
   EXPECT_EQ(numbering.time_of(frame, sets), 127'995 * kMs);
   open(&sets, 0, 127'995 * kMs);
   frame.exposure_start = DeviceStamp(40 * kMs);

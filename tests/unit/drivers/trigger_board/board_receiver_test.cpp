@@ -93,7 +93,8 @@ TEST_F(Receiving, wrongTickRecoversAfterSetup) {
   EXPECT_EQ(receiver.finding(), Finding::none);
 }
 
-constexpr std::int64_t kZero = 5'000'000'000;  // host time of tick 0, ns
+// Host time of tick 0 in ns.
+constexpr std::int64_t kZero = 5'000'000'000;
 
 HostStamp host(std::int64_t us) { return HostStamp(kZero + us * 1000); }
 TriggerPong pong(std::uint32_t token, std::uint64_t received, std::uint64_t sent) {

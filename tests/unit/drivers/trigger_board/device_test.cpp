@@ -2,18 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
 namespace {
 
-using test::at_s;
-using test::board_for;
-using test::BoardRig;
-using test::closed;
-using test::direct_line;
-using test::opened;
-using test::thirty_hertz;
+using namespace test;
 
 /// Numbers without a hole, in order, stamps that ascend.
 void expect_gapless(const std::vector<Pulse>& all) {
@@ -77,9 +72,10 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
   const auto all = rig.drive(requested);
   ASSERT_GT(all.size(), 500U);
   expect_gapless(all);
+  // The tolerance is one tick.
   const auto near_us = [](Duration d, std::int64_t us) {
     return std::abs(d.ns() - us * 1000) <= 1000;
-  };  // a tick
+  };
   for (const Pulse& p : all) {
     ASSERT_TRUE(p.exposure[0].seen);
     ASSERT_TRUE(near_us(p.exposure[0].start, 35) && near_us(p.exposure[0].end, 8035)) << p.number;
@@ -115,8 +111,8 @@ TEST(Board, pauseIsAGapWithoutLoss) {
 
 TEST(Board, rebootGivesANewBootAndResumes) {
   test::BoardSimulatorOptions board = board_for(Duration::seconds(40));
-  for (int i = 0; i < 20; ++i)
-    board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
+  // The restart hits any byte of any frame.
+  for (int i = 0; i < 20; ++i) board.reboots.push_back(at_s(10 + i + 0.000'137 * i));
   BoardRig rig(board, direct_line());
   const auto all = rig.drive();
   EXPECT_EQ(rig.disconnects, 0) << "it answers all the while";
@@ -201,13 +197,13 @@ TEST(Board, stoppedBoardIsStartedAgain) {
 }
 
 TEST(Board, otherBoardOnThePortIsRefused) {
-  test::SimulatedLineOptions line;
-  line.outages = {{at_s(10), at_s(11)}, {at_s(20), at_s(21)}};
+  test::SimulatedLineOptions line{.outages = {{at_s(10), at_s(11)}, {at_s(20), at_s(21)}}};
   BoardRig rig(board_for(Duration::seconds(60)), line, {},
                [&](HostStamp at, std::vector<std::uint8_t>* bytes) {
                  TriggerFrame f = opened(*bytes);
                  if (at <= at_s(10) || at >= at_s(20) || f.type != trigger_info) return;
-                 f.payload[27] ^= 1U;  // of the serial number
+                 // The byte is part of the serial number.
+                 f.payload[27] ^= 1U;
                  *bytes = closed(f);
                });
   const auto all = rig.drive();
@@ -252,7 +248,7 @@ TEST(Configuration, invalidValueIsRefusedWithItsKey) {
     TriggerConfiguration requested = thirty_hertz();
     r.change(&requested);
     EXPECT_EQ(rig.device->configure(requested, nullptr), r.status);
-    EXPECT_NE(rig.device->last_error().find(r.key), std::string::npos) << rig.device->last_error();
+    EXPECT_TRUE(mentions(rig.device->last_error(), r.key));
     EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration);
     if (r.options.pps != Edge::none || r.options.ins != Edge::none) continue;
     EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)

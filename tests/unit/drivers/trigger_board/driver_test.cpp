@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/serial/serial.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
@@ -10,14 +11,16 @@ namespace {
 struct Machine {
   struct Port {
     SerialPortInfo info;
-    std::shared_ptr<test::DeviceModel> device;  // null: it does not open
+    // Null if the port does not open.
+    std::shared_ptr<test::DeviceModel> device;
   };
   std::vector<Port> ports;
 
   void add_board(const char* port, std::uint8_t last_of_serial) {
     test::BoardSimulatorOptions o;
     o.serial[11] = last_of_serial;
-    o.baud = 115200;  // a board's own USB takes every rate; this one the first
+    // A board's own USB supports every rate; this one supports the first only.
+    o.baud = 115200;
     ports.push_back({{port, "", 0x0483, 0x5740, "", {}},
                      std::make_shared<test::BoardSimulator>(test::PulseSource{}, o)});
   }
@@ -73,13 +76,13 @@ TEST(Driver, opensByPortSerialNumberOrTheOnlyBoard) {
   m.add_board("/dev/ttyACM1", 0xBB);
   EXPECT_EQ(driver.open("", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::bad_configuration) << "which of the two nobody has said";
-  EXPECT_NE(driver.last_error().find("trigger.port"), std::string::npos);
+  EXPECT_TRUE(test::mentions(driver.last_error(), "trigger.port"));
   const auto one = driver.open("30002b000b513336343931bb", &s);
   ASSERT_NE(one, nullptr) << driver.last_error();
   EXPECT_EQ(one->info().serial, "30002b000b513336343931bb");
   EXPECT_EQ(driver.open("30002b000b513336343931cc", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::not_found);
-  EXPECT_NE(driver.last_error().find("30002b000b513336343931cc"), std::string::npos);
+  EXPECT_TRUE(test::mentions(driver.last_error(), "30002b000b513336343931cc"));
 }
 
 }  // namespace

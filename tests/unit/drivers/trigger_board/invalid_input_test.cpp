@@ -3,19 +3,13 @@
 #include <optional>
 
 #include "core/math/random.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
 namespace {
 
-using test::at_s;
-using test::board_for;
-using test::BoardRig;
-using test::closed;
-using test::direct_line;
-using test::opened;
-using test::Talker;
-using test::Tampered;
+using namespace test;
 using Bytes = std::vector<std::uint8_t>;
 
 /// Takes so many ticks from every stamp of the board.
@@ -37,13 +31,16 @@ void set_back(Bytes* bytes, std::uint64_t ticks) {
 
 /// Result of half a minute with tampered frames, from the fifth second on.
 struct Outcome {
-  std::uint64_t tampered = 0, events = 0;  // frames in all, and those of them that are EVENTs
+  // Number of tampered frames and of EVENTs among them.
+  std::uint64_t tampered = 0, events = 0;
   TriggerStatistics statistics;
 };
 struct Way {
   const char* name;
-  double share;      // of the frames
-  bool events_only;  // of them EVENTs alone
+  // Share of frames that are tampered with.
+  double share;
+  // True if only EVENTs are tampered with.
+  bool events_only;
   void (*tamper)(Random*, Bytes*);
   void (*check)(const Outcome&);
 };
@@ -177,9 +174,11 @@ Talker::Answer answering(std::function<TriggerFrame(const TriggerFrame&)> answer
 struct Stranger {
   const char* name;
   DeviceStatus status;
-  std::vector<std::string> words;  // of the error
+  // Words that the error contains.
+  std::vector<std::string> words;
   std::string mentions;
-  std::optional<TriggerFrame> answers{};  // to every frame
+  // Answer to every frame.
+  std::optional<TriggerFrame> answers{};
 };
 struct Strangers : ::testing::TestWithParam<Stranger> {};
 
@@ -191,8 +190,7 @@ TEST_P(Strangers, otherDevicesAreNamed) {
   Device device(std::make_unique<test::SimulatedLinkFactory>(there, direct_line()), {});
   EXPECT_EQ(device.connect(), s.status);
   const std::string error = device.last_error();
-  for (const std::string& word : s.words)
-    EXPECT_NE(error.find(word), std::string::npos) << '"' << word << "\" in: " << error;
+  for (const std::string& word : s.words) EXPECT_TRUE(test::mentions(error, word));
 }
 
 constexpr DeviceStatus kNone = DeviceStatus::not_found, kOther = DeviceStatus::unsupported;
@@ -235,7 +233,7 @@ TEST(AStubbornBoard, boardIgnoringRequestsIsNamed) {
                                }));
   Device device(std::make_unique<test::SimulatedLinkFactory>(there, direct_line()), {});
   EXPECT_EQ(device.configure(test::thirty_hertz(), nullptr), DeviceStatus::failed);
-  EXPECT_NE(device.last_error().find("does not do it"), std::string::npos) << device.last_error();
+  EXPECT_TRUE(test::mentions(device.last_error(), "does not do it"));
 }
 
 }  // namespace

@@ -17,13 +17,11 @@ namespace {
 /// A device in real time and its board, with a terminal between them, at 100 Hz.
 struct TerminalRig {
   TerminalRig() {
-    TriggerConfiguration requested;
-    requested.rate_hz = 100;
+    TriggerConfiguration requested{.rate_hz = 100};
     EXPECT_EQ(device.configure(requested, nullptr), DeviceStatus::ok) << device.last_error();
   }
   static std::unique_ptr<test::BoardSimulator> simulator() {
-    test::BoardSimulatorOptions o;
-    o.power_on = monotonic_now();
+    test::BoardSimulatorOptions o{.power_on = monotonic_now()};
     return std::make_unique<test::BoardSimulator>(test::PulseSource{}, o);
   }
   static Options options() {

@@ -1,8 +1,6 @@
 #pragma once
-#include <algorithm>
 #include <map>
 #include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -29,21 +27,11 @@ namespace vergence::test {
 }
 
 /// A line without a converter: the board's own USB, or a UART of the host.
-[[nodiscard]] inline SimulatedLineOptions direct_line() {
-  SimulatedLineOptions o;
-  o.converter = false;
-  return o;
-}
+[[nodiscard]] inline SimulatedLineOptions direct_line() { return {.converter = false}; }
 [[nodiscard]] inline BoardSimulatorOptions board_for(Duration duration) {
-  BoardSimulatorOptions o;
-  o.duration = duration;
-  return o;
+  return {.duration = duration};
 }
-[[nodiscard]] inline TriggerConfiguration thirty_hertz() {
-  TriggerConfiguration c;
-  c.rate_hz = 30;
-  return c;
-}
+[[nodiscard]] inline TriggerConfiguration thirty_hertz() { return {.rate_hz = 30}; }
 
 /// A driver's device on a simulated line to a simulated board, and what the board really did.
 struct BoardRig {
@@ -61,8 +49,8 @@ struct BoardRig {
     device = std::make_unique<trigger_board::Device>(std::move(owned), options);
   }
 
-  std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp>
-      edges;  // by boot and number; of the device's thread while it runs
+  // Edges by boot and number; used by the device's thread while it runs.
+  std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp> edges;
   PulseSource exposures;
   std::shared_ptr<BoardSimulator> simulator;
   std::shared_ptr<Tampered> between;

@@ -7,10 +7,7 @@
 namespace vergence::trigger_board {
 namespace {
 
-using test::board_for;
-using test::BoardRig;
-using test::direct_line;
-using test::thirty_hertz;
+using namespace test;
 
 struct Case {
   const char* name;
@@ -42,7 +39,8 @@ TEST_P(Stamps, errorsStayWithinTheirBound) {
     };
     TriggerConfiguration requested = thirty_hertz();
     requested.feedback = 0x03;
-    const auto all = rig.drive(requested);  // which holds each against its bound
+    // drive() checks each stamp against its bound.
+    const auto all = rig.drive(requested);
     EXPECT_GT(all.size(), 1700U);
     for (const Pulse& p : all) {
       if (p.edge - all.front().edge < Duration::seconds(10)) continue;

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
-#include <array>
 #include <vector>
 
 #include "core/math/random.hpp"
@@ -54,7 +53,8 @@ class V4l2Luma : public ::testing::TestWithParam<std::uint32_t> {};
 
 struct Laid {
   std::vector<std::uint8_t> bytes;
-  std::vector<std::uint8_t> grey;  // expected
+  // Expected grey values.
+  std::vector<std::uint8_t> grey;
 };
 
 Laid lay(std::uint32_t fourcc, int width, int height, std::size_t stride, Random* random) {
@@ -125,8 +125,8 @@ INSTANTIATE_TEST_SUITE_P(, V4l2Luma,
                          [](const auto& p) { return name_of(p.param); });
 
 TEST(V4l2Formats, wordsBeyondTheirDepthSaturate) {
-  const PixelFormat shifted{V4L2_PIX_FMT_Y16, Layout::words,
-                            2};  // a sensor of ten bits that lays them low into Y16
+  // A ten-bit sensor stores its samples in the low bits of Y16.
+  const PixelFormat shifted{V4L2_PIX_FMT_Y16, Layout::words, 2};
   const std::uint8_t words[] = {0xFF, 0x03, 0x00, 0x04, 0x08, 0x00};
   std::uint8_t grey[3] = {};
   to_grey(shifted, words, sizeof words, 3, 1, grey, 3);

@@ -81,7 +81,8 @@ TEST(V4l2Slots, heldImageOutlivesTheCamera) {
   slots.use_buffers(60, 40, 64);
   slots.install(memory(4, 10));
   const FrameSlot old = slots.hold_buffer(1);
-  slots.install({});  // the cable is out
+  // The cable is unplugged.
+  slots.install({});
   slots.install(memory(4, 20));
   EXPECT_EQ(slots.view(old).at(0, 0), 11) << "still its pixels";
   for (std::uint32_t i = 0; i < 4; ++i) {

@@ -37,7 +37,8 @@ TEST(V4l2Stamps, exposureStartIsComputedByKindOfStamp) {
 TEST(V4l2Sequence, countsFromZeroAndReportsGaps) {
   struct Row {
     std::uint32_t sequence;
-    int ms;  // of the stamp, where the buffers have no numbers
+    // Time of the stamp, used if the buffers have no numbers.
+    int ms;
     std::uint64_t counter, missing;
   };
   const auto expect = [](Duration period, const std::vector<Row>& rows) {
@@ -50,15 +51,16 @@ TEST(V4l2Sequence, countsFromZeroAndReportsGaps) {
     }
   };
   expect({}, {{17, 0, 0, 0}, {18, 0, 1, 0}, {22, 0, 5, 3}, {23, 0, 6, 0}});
-  expect({}, {{0xFFFFFFFE, 0, 0, 0}, {0xFFFFFFFF, 0, 1, 0}, {1, 0, 3, 1}});  // through the wrap
-  expect({}, {{100, 0, 0, 0}, {3, 0, 1, 0}, {4, 0, 2, 0}});                  // it goes back
+  // The sequence wraps, and then goes back.
+  expect({}, {{0xFFFFFFFE, 0, 0, 0}, {0xFFFFFFFF, 0, 1, 0}, {1, 0, 3, 1}});
+  expect({}, {{100, 0, 0, 0}, {3, 0, 1, 0}, {4, 0, 2, 0}});
   // Without numbers: by time, with jitter; two at once are two.
   expect(Duration::milliseconds(40), {{0, 0, 0, 0}, {0, 43, 1, 0}, {0, 157, 4, 2}, {0, 158, 5, 0}});
 }
 
 TEST(V4l2Raster, keepsTheFirstFrameOfEachInterval) {
-  const Duration interval = Duration::milliseconds(100),
-                 frame = Duration::nanoseconds(16'683'333);  // 59.94 Hz
+  // The frame rate is 59.94 Hz.
+  const Duration interval = Duration::milliseconds(100), frame = Duration::nanoseconds(16'683'333);
   // Two cameras at one rate, started at different times: what they keep lies within one frame of
   // each other.
   Raster left(interval), right(interval);

@@ -70,7 +70,8 @@ TEST(SampleTime, continuesAcrossWrapsAndReportsARestart) {
   EXPECT_EQ(full.next(4, {}), ClockStep::forward);
   EXPECT_EQ(full.stamp(), DeviceStamp(4'294'967'300LL * 100'000));
 
-  SampleTime other;  // past a day's end: it has the full width
+  // The counter exceeds a day's end, so it has the full width.
+  SampleTime other;
   EXPECT_EQ(other.next(863'999'950, {}), ClockStep::first);
   EXPECT_EQ(other.next(864'000'050, {}), ClockStep::forward);
   EXPECT_EQ(other.stamp(), DeviceStamp(864'000'050LL * 100'000));
@@ -88,7 +89,8 @@ TEST(SampleTime, tenYearsStayExact) {
   SampleTime t;
   std::uint64_t truth = 12'345;
   EXPECT_EQ(t.next(static_cast<std::uint32_t>(truth), {}), ClockStep::first);
-  for (int day = 0; day < 3653 * 10; ++day) {  // in steps that it believes
+  // The steps are small enough to be accepted.
+  for (int day = 0; day < 3653 * 10; ++day) {
     truth += 86'400'000 / 1000;
     ASSERT_EQ(t.next(static_cast<std::uint32_t>(truth % 864'000'000), {}), ClockStep::forward);
     ASSERT_EQ(t.stamp().ns(), static_cast<std::int64_t>(truth) * 100'000);
@@ -192,9 +194,7 @@ TEST(Decoder, capturesGiveReadingsInStepWithTheirClock) {
 
 TEST(Decoder, mtdataOfAnotherLengthIsRefused) {
   Decoder decoder;
-  StreamSettings settings;
-  settings.generation = xbus::Generation::legacy;
-  settings.layout = {0x0834, 0x203};
+  StreamSettings settings{.generation = xbus::Generation::legacy, .layout = {0x0834, 0x203}};
   decoder.begin(settings, 115200, {});
   std::vector<std::uint8_t> frame(xbus::kMaxFrame);
   const std::vector<std::uint8_t> payload(74);

@@ -9,14 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/xsens/rig.hpp"
 
 namespace vergence::xsens {
 namespace {
 
-using test::easy_drive;
-using test::simulated;
-using test::XsensRig;
+using namespace test;
 using xbus::Generation;
 
 class BothGenerations : public ::testing::TestWithParam<Generation> {
@@ -30,7 +29,7 @@ TEST_P(BothGenerations, isFoundConfiguredAndReadInEnu) {
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.device->identity().generation, GetParam());
   EXPECT_EQ(rig.device->info().serial, legacy() ? "00500123" : "07701234");
-  EXPECT_NE(rig.device->info().model.find("G"), std::string::npos);
+  EXPECT_TRUE(mentions(rig.device->info().model, "G"));
   double actual = 0;
   ASSERT_EQ(rig.device->configure(100, &actual), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(actual, 100);
@@ -65,7 +64,8 @@ TEST_P(BothGenerations, isFoundConfiguredAndReadInEnu) {
     ASSERT_EQ(all[i].quality.utc_ns, sensor.unix_ns_at_power_on + times[i + skipped]);
   }
   EXPECT_EQ(all.back().quality.filter_valid, true);
-  if (!legacy()) {  // the receiver's word comes along at this rate and baud
+  // The receiver's data fit this rate and baud rate.
+  if (!legacy()) {
     EXPECT_EQ(all.back().quality.satellites, 11);
     EXPECT_NEAR(all.back().sample.position_sigma, 1.5, 1e-3);
     EXPECT_NEAR(all.back().sample.height_sigma, 3, 1e-3);
@@ -168,15 +168,15 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
     EXPECT_EQ(entries[1], (xbus::SyncEntry{xbus::kSyncIntervalTransition, xbus::kSyncLineOut,
                                            xbus::kSyncPositive, 0, 0, 12, 20, 0}));
     EXPECT_NEAR(rig.device->stream().sync_out_hz, 30.77, 0.01);
-    EXPECT_NE(rig.device->remark().find("30.77"), std::string::npos)
-        << "it cannot make 30 Hz, and says so";
+    EXPECT_TRUE(mentions(rig.device->remark(), "30.77")) << "it cannot make 30 Hz, and says so";
   }
 }
 
 TEST_P(BothGenerations, otherBaudRateIsFoundAndChanged) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 30);
   sensor.baud = 57600;
-  sensor.layout = {0x0004, 0x001};  // what that rate carries
+  // The baud rate can carry this layout.
+  sensor.layout = {0x0004, 0x001};
   Options options;
   options.baud = 460800;
   XsensRig rig(sensor, {}, options);
@@ -191,10 +191,8 @@ TEST_P(BothGenerations, slowLineIsRefusedNamingTheNeededRate) {
   XsensRig rig(simulated(GetParam()));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok);
   EXPECT_EQ(rig.device->configure(400, nullptr), DeviceStatus::no_bandwidth);
-  EXPECT_NE(rig.device->last_error().find("115200 baud"), std::string::npos)
-      << rig.device->last_error();
-  EXPECT_NE(rig.device->last_error().find("ins.baud"), std::string::npos)
-      << rig.device->last_error();
+  EXPECT_TRUE(mentions(rig.device->last_error(), "115200 baud"));
+  EXPECT_TRUE(mentions(rig.device->last_error(), "ins.baud"));
   EXPECT_EQ(rig.simulator->writes().outputs + rig.simulator->writes().layout +
                 rig.simulator->writes().period,
             0)
@@ -248,7 +246,8 @@ struct Timing {
   Generation generation;
   double rate;
   std::uint32_t baud;
-  int latency_ms;  // 0: no converter
+  // 0 if there is no converter.
+  int latency_ms;
 };
 
 class Stamps : public ::testing::TestWithParam<Timing> {};
@@ -270,10 +269,9 @@ TEST_P(Stamps, errorIsBelow300usAfterTwentySeconds) {
     sensor.clock_ppm = seed == 2 ? -50 : 50;
     sensor.seed = seed;
     sensor.duration = Duration::seconds(80);
-    test::SimulatedLineOptions line;
-    line.converter = t.latency_ms > 0;
-    line.latency_timer = Duration::milliseconds(t.latency_ms);
-    line.seed = seed;
+    test::SimulatedLineOptions line{.converter = t.latency_ms > 0,
+                                    .latency_timer = Duration::milliseconds(t.latency_ms),
+                                    .seed = seed};
     XsensRig rig(sensor, line);
     ASSERT_EQ(rig.device->configure(t.rate, nullptr), DeviceStatus::ok) << rig.device->last_error();
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
@@ -356,7 +354,7 @@ TEST(AnotherMake, isNamed) {
                       std::make_shared<test::Talker>(mentions, 9600), test::SimulatedLineOptions{}),
                   {});
     EXPECT_EQ(device.connect(), DeviceStatus::not_found);
-    EXPECT_NE(device.last_error().find(word), std::string::npos) << device.last_error();
+    EXPECT_TRUE(test::mentions(device.last_error(), word));
   }
 }
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "drivers/xsens/device.hpp"
@@ -15,12 +14,12 @@ namespace vergence::test {
 /// A drive that is easy to recompute: the sensor turns and moves along known functions of time.
 [[nodiscard]] inline InsSample easy_drive(std::uint64_t number, Duration time) {
   const double t = time.to_seconds();
-  InsSample s;
-  s.number = number;
-  s.fix = FixStatus::fix_3d;
-  s.attitude_valid = s.velocity_valid = true;
-  s.position = {-27.4975 + 1e-5 * t, 153.0137 + 2e-5 * t, 60 + 0.1 * t};
-  s.velocity_enu = {2.0 + 0.01 * t, 1.1, -0.1};
+  InsSample s{.number = number,
+              .fix = FixStatus::fix_3d,
+              .attitude_valid = true,
+              .velocity_valid = true,
+              .position = {-27.4975 + 1e-5 * t, 153.0137 + 2e-5 * t, 60 + 0.1 * t},
+              .velocity_enu = {2.0 + 0.01 * t, 1.1, -0.1}};
   const double yaw = 0.3 + 0.02 * t, roll = 0.05, h = 0.5;
   // yaw about up, then roll about forward
   s.q_enu_ins = {std::cos(h * yaw) * std::sin(h * roll), std::sin(h * yaw) * std::sin(h * roll),

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <string_view>
-#include <vector>
 
 #include "tests/unit/firmware_iface/iidc/rom_vector.hpp"
 
@@ -26,7 +25,8 @@ TEST(ConfigRom, truncatedRomIsRefusedOrLosesItsTexts) {
     const RomStatus status = parse_config_rom(std::span(q).first(n), &rom);
     if (n < 20) {
       EXPECT_NE(status, RomStatus::ok) << n;
-      EXPECT_EQ(rom.guid, 0U) << n;  // untouched
+      // A refusal leaves the result unchanged.
+      EXPECT_EQ(rom.guid, 0U) << n;
     } else {
       ASSERT_EQ(status, RomStatus::ok) << n;
       EXPECT_EQ(rom.model[0], '\0') << n;
@@ -43,10 +43,12 @@ TEST(ConfigRom, otherDevicesAreRefusedByReason) {
   q[5] = 0xFFFF'0000;
   EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::broken_root);
   q = example_rom();
-  q[11] = 0x1200'609E;  // a disk (SBP-2)
+  // The unit is an SBP-2 disk.
+  q[11] = 0x1200'609E;
   EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_camera);
   q = example_rom();
-  q[8] = 0xD1FF'FFFF;  // unit directory far outside
+  // The unit directory is far outside the ROM.
+  q[8] = 0xD1FF'FFFF;
   EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_camera);
   q = example_rom();
   q[13] = 0xD4FF'FFFF;
@@ -60,12 +62,14 @@ TEST(ConfigRom, textLeafOfWrongLengthIsLeftOut) {
   ConfigRom rom;
   for (const std::uint32_t header : {0U, 0x0001'0000U, 0x0002'0000U, 0xFFFF'0000U, 0x0006'0000U}) {
     auto q = example_rom();
-    q[26] = header;  // too short for the two leading quadlets, or beyond the end
+    // The length is too short for the two leading quadlets or exceeds the ROM.
+    q[26] = header;
     ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
     EXPECT_EQ(rom.model[0], '\0') << std::hex << header;
   }
   auto q = example_rom();
-  q[29] = 0x0746'0A80;  // control characters are shown as such
+  // Control characters are replaced.
+  q[29] = 0x0746'0A80;
   ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
   EXPECT_EQ(std::string_view(rom.model.data()), "?F??3");
 }

@@ -13,7 +13,8 @@ TEST(CycleTime, fieldsConvertToNanoseconds) {
   EXPECT_EQ(t.cycle, 7999U);
   EXPECT_EQ(t.tick, 3071U);
   EXPECT_TRUE(t.valid());
-  EXPECT_EQ(t.ns(), 128 * kSecond - 41);  // one tick of 40.69 ns before the wrap
+  // One tick of 40.69 ns before the wrap.
+  EXPECT_EQ(t.ns(), 128 * kSecond - 41);
   EXPECT_EQ((CycleTime{1, 1, 1536}.ns()), kSecond + 125'000 + 62'500);
   EXPECT_FALSE(CycleTime::of(8000U << 12U).valid());
   EXPECT_FALSE(CycleTime::of(3072U).valid());
@@ -32,7 +33,8 @@ TEST(CycleUnwrapper, timeContinuesAcrossTheWrap) {
   CycleUnwrapper u;
   const std::int64_t host = 5'000 * kSecond;
   std::int64_t first = 0;
-  for (std::int64_t i = 0; i < 10'000; ++i) {  // 1000 s at 10 Hz
+  // The loop covers 1000 s at 10 Hz.
+  for (std::int64_t i = 0; i < 10'000; ++i) {
     const std::int64_t bus = 120 * kSecond + i * kSecond / 10;
     const std::int64_t t =
         u.unwrap(bus % kCycleTimeWrapNs, host + i * kSecond / 10 + i % 7 * 1'000'000);
@@ -55,10 +57,11 @@ TEST(CycleUnwrapper, sharedUnwrapperKeepsCamerasConsistent) {
   CycleUnwrapper u;
   const std::int64_t host = 1'000 * kSecond, bus = 127 * kSecond + 990'000'000;
   const std::int64_t a = u.unwrap(bus, host);
-  const std::int64_t b = u.unwrap((bus + 20'000'000) % kCycleTimeWrapNs,
-                                  host + 5'000'000);  // exposed 20 ms later, arrived sooner
+  // The second frame was exposed 20 ms later and arrived earlier.
+  const std::int64_t b = u.unwrap((bus + 20'000'000) % kCycleTimeWrapNs, host + 5'000'000);
   EXPECT_EQ(b - a, 20'000'000);
-  EXPECT_EQ(u.unwrap(bus, host + 60'000'000), a);  // an older stamp that arrives late
+  // An older stamp arrives late.
+  EXPECT_EQ(u.unwrap(bus, host + 60'000'000), a);
 }
 
 TEST(CycleUnwrapper, restartForgetsCountedWraps) {

@@ -23,9 +23,7 @@ TEST(Features, inquiryBitsAreDecoded) {
 }
 
 TEST(Features, valueQuadletRoundTrips) {
-  FeatureValue v;
-  v.present = v.absolute = v.on = true;
-  v.value = 0x123;
+  FeatureValue v{.present = true, .absolute = true, .on = true, .value = 0x123};
   EXPECT_EQ(v.quadlet(), 0xC200'0123U);
   for (const std::uint32_t q : {0xC200'0123U, 0x8100'0FFFU, 0x8700'0000U})
     EXPECT_EQ(FeatureValue::of(q).quadlet(), q);
@@ -41,10 +39,7 @@ TEST(Features, triggerInquiryAndModeUseTheirBits) {
   EXPECT_TRUE(t.has_source(0) && t.has_source(1) && t.has_source(kTriggerSourceSoftware));
   EXPECT_FALSE(t.has_source(2) || t.has_source(4));
 
-  TriggerMode m;
-  m.on = true;
-  m.source = 1;
-  m.mode = 14;
+  TriggerMode m{.on = true, .source = 1, .mode = 14};
   EXPECT_EQ(m.quadlet(), 0x832E'0000U);
   m.rising = false;
   m.source = kTriggerSourceSoftware;
@@ -53,10 +48,7 @@ TEST(Features, triggerInquiryAndModeUseTheirBits) {
 }
 
 TEST(Features, strobeTimesAreCutToTwelveBits) {
-  StrobeControl s;
-  s.on = true;
-  s.delay = 0x1ABC;
-  s.duration = 0x1DEF;
+  StrobeControl s{.on = true, .delay = 0x1ABC, .duration = 0x1DEF};
   EXPECT_EQ(s.quadlet(), 0x83AB'CDEFU);
 }
 

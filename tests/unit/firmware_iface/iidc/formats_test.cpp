@@ -56,9 +56,12 @@ TEST(Formats, format7PacketIsTheSmallestReachingTheRate) {
         EXPECT_LT(packet_rate(307200, packet - unit), rate);
       }
     }
-  EXPECT_EQ(packet_for_rate(1280 * 960, 30, 4, 4096), 0U);     // S400 does not carry that
-  EXPECT_EQ(packet_for_rate(1280 * 960, 26, 4, 4096), 4016U);  // 306 packets and an idle cycle
-  EXPECT_EQ(packet_for_rate(1280 * 960, 30, 4, 8192), 4640U);  // 265
+  // S400 cannot carry this rate.
+  EXPECT_EQ(packet_for_rate(1280 * 960, 30, 4, 4096), 0U);
+  // The rate needs 306 packets and an idle cycle.
+  EXPECT_EQ(packet_for_rate(1280 * 960, 26, 4, 4096), 4016U);
+  // The rate needs 265 packets.
+  EXPECT_EQ(packet_for_rate(1280 * 960, 30, 4, 8192), 4640U);
 }
 
 TEST(Formats, invalidArgumentsGiveZero) {

@@ -13,7 +13,8 @@ TEST(FrameInfo, allItemsFollowInOrderWithoutGaps) {
   std::vector<std::uint8_t> image(64);
   for (std::size_t i = 0; i < image.size(); ++i) image[i] = static_cast<std::uint8_t>(i);
   EXPECT_EQ(all.read(FrameInfoItem::time, image), 0x0001'0203U);
-  EXPECT_EQ(all.read(FrameInfoItem::counter, image), 0x1819'1A1BU);  // byte 24
+  // The counter begins at byte 24.
+  EXPECT_EQ(all.read(FrameInfoItem::counter, image), 0x1819'1A1BU);
   EXPECT_EQ(all.read(FrameInfoItem::region, image), 0x2425'2627U);
 }
 
@@ -31,7 +32,8 @@ TEST(FrameInfo, absentFeatureOrItemsGiveNoLayout) {
   EXPECT_EQ(FrameInfoLayout::of(0).size(), 0U);
   EXPECT_EQ(FrameInfoLayout::of(0x41).size(), 0U);
   EXPECT_EQ(FrameInfoLayout::of(0x8000'0000).size(), 0U);
-  EXPECT_EQ(FrameInfoLayout::of(0x8000'0040).size(), 4U);  // the counter alone
+  // The register has the counter only.
+  EXPECT_EQ(FrameInfoLayout::of(0x8000'0040).size(), 4U);
 }
 
 TEST(CounterUnwrapper, countsFromZeroAcrossTheWrap) {

@@ -4,7 +4,6 @@
 
 #include <cstdio>
 #include <string>
-#include <vector>
 
 namespace vergence::nmea {
 namespace {
@@ -40,12 +39,14 @@ TEST(Nmea, rmcGivesDateSpeedAndCourse) {
   const Sentence s = parsed("GPRMC,235959,A,2729.85,S,15300.822,W,36.0,270.5,290224,,,A");
   EXPECT_EQ(s.type, Type::rmc);
   EXPECT_TRUE(s.valid);
-  EXPECT_EQ(s.days, 19782);  // 2024-02-29: date -d 2024-02-29 +%s / 86400
+  // The date is 2024-02-29: date -d 2024-02-29 +%s / 86400.
+  EXPECT_EQ(s.days, 19782);
   EXPECT_NEAR(s.speed.value(), 18.52, 1e-12);
   EXPECT_EQ(s.course_deg, 270.5);
   EXPECT_LT(s.longitude_deg.value(), 0);
-  EXPECT_EQ(parsed("GPRMC,,A,,,,,,,010100,,,A").days, 10957);  // 2000-01-01
-  EXPECT_EQ(parsed("GPRMC,,V,,,,,,,311299,,,N").days, 10956);  // of the century before
+  // The first date is 2000-01-01, the second is in the century before.
+  EXPECT_EQ(parsed("GPRMC,,A,,,,,,,010100,,,A").days, 10957);
+  EXPECT_EQ(parsed("GPRMC,,V,,,,,,,311299,,,N").days, 10956);
 }
 
 TEST(Nmea, hdtVtgAndGstGiveTheirFields) {

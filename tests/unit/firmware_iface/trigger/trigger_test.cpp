@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 #include <vector>
 
 namespace vergence {
@@ -75,19 +74,23 @@ TEST(TriggerFrames, anySingleDamagedByteIsRefused) {
     for (const unsigned flip : {0x01U, 0x80U, 0xFFU}) {
       Bytes bad = good;
       bad[i] = static_cast<std::uint8_t>(bad[i] ^ flip);
-      bad.push_back(0);  // where the damage hit the end
+      // The extra zero ends the frame if the damage hit its end.
+      bad.push_back(0);
       EXPECT_TRUE(decode_all(bad).frames.empty()) << i << " " << flip;
     }
 }
 
 TEST(TriggerFrames, frameAfterGarbageIsFoundAndLossesCounted) {
-  Bytes bytes = noise(300, 5);  // longer than a frame, zeros inside
+  // The noise is longer than a frame and contains zeros.
+  Bytes bytes = noise(300, 5);
   bytes.push_back(0);
   const Bytes cut = framed(trigger_event, 1, noise(50, 6));
   bytes.insert(bytes.end(), cut.begin() + 20, cut.end());
-  bytes.insert(bytes.end(), 200, 0x11);  // no end in sight
+  // The next bytes have no end marker.
+  bytes.insert(bytes.end(), 200, 0x11);
   bytes.push_back(0);
-  bytes.insert(bytes.end(), {2, 1, 0});  // COBS of one byte too few for a frame
+  // The COBS block is one byte too short for a frame.
+  bytes.insert(bytes.end(), {2, 1, 0});
   const Bytes good = framed(trigger_event, 2, noise(50, 6));
   bytes.insert(bytes.end(), good.begin(), good.end());
   const Decoded all = decode_all(bytes);

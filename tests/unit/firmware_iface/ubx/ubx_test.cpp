@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/support/gnss_bytes.hpp"
 
 namespace vergence::ubx {
@@ -14,7 +12,8 @@ using test::PvtBytes;
 TEST(Ubx, navPvtIsDecodedInSiUnits) {
   Pvt p;
   ASSERT_TRUE(decode_pvt(PvtBytes().bytes, &p));
-  EXPECT_EQ(p.utc_ns, 1709169825'000'000'000);  // date -u -d '2024-02-29 01:23:45' +%s
+  // The expected value is that of date -u -d '2024-02-29 01:23:45' +%s.
+  EXPECT_EQ(p.utc_ns, 1709169825'000'000'000);
   EXPECT_EQ(p.fix, FixType::fix_3d);
   EXPECT_TRUE(p.fix_ok);
   EXPECT_EQ(p.satellites, 17);
@@ -40,7 +39,8 @@ TEST(Ubx, negativeNanosecondsLowerTheTime) {
 TEST(Ubx, invalidFieldsAreAbsentOrRefused) {
   Pvt p;
   PvtBytes b;
-  b.put(11, 1, 3);  // not fully resolved
+  // The time is not fully resolved.
+  b.put(11, 1, 3);
   ASSERT_TRUE(decode_pvt(b.bytes, &p));
   EXPECT_FALSE(p.utc_ns);
   b = {};
@@ -48,7 +48,8 @@ TEST(Ubx, invalidFieldsAreAbsentOrRefused) {
   ASSERT_TRUE(decode_pvt(b.bytes, &p));
   EXPECT_FALSE(p.utc_ns);
   b = {};
-  b.put(28, 4, 900000001);  // beyond the pole
+  // The latitude is beyond the pole.
+  b.put(28, 4, 900000001);
   EXPECT_FALSE(decode_pvt(b.bytes, &p));
   b = {};
   b.put(20, 1, 6);
@@ -57,7 +58,8 @@ TEST(Ubx, invalidFieldsAreAbsentOrRefused) {
   b.put(21, 1, 0x21), b.put(84, 4, 9000000);
   ASSERT_TRUE(decode_pvt(b.bytes, &p));
   EXPECT_NEAR(p.heading_deg.value(), 90, 1e-12);
-  b.bytes.resize(84);  // u-blox 7 has no such field
+  // A u-blox 7 lacks this field.
+  b.bytes.resize(84);
   ASSERT_TRUE(decode_pvt(b.bytes, &p));
   EXPECT_FALSE(p.heading_deg);
   b.bytes.resize(83);

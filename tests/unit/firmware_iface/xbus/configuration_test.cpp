@@ -41,7 +41,8 @@ TEST(Commands, bytesAreThoseDocumented) {
 }
 
 TEST(Commands, legacySyncOutHoldsOneParameterPerMessage) {
-  constexpr std::uint32_t kMillisecond = 29491;  // of the 29.4912 MHz clock
+  // One millisecond of the 29.4912 MHz clock.
+  constexpr std::uint32_t kMillisecond = 29491;
   EXPECT_EQ(kMillisecond, static_cast<std::uint32_t>(kLegacySyncClock * 1e-3));
   const auto message = [](LegacySync p, std::uint32_t v) {
     return frame(MessageId::legacy_sync_out, legacy_sync(p, v));
@@ -79,17 +80,10 @@ TEST(Commands, syncSettingsAreTwelveByteEntries) {
 
 TEST(Commands, outputConfigurationIsPairsOfIdAndRate) {
   OutputConfiguration outputs;
-  for (const OutputEntry e : {OutputEntry{0x1010, kEveryMessage},
-                              {0x1020, kEveryMessage},
-                              {0x1060, kEveryMessage},
-                              {0x2013, 100},
-                              {0x4020, 100},
-                              {0x8020, 100},
-                              {0x5042, 100},
-                              {0x5022, 100},
-                              {0xD012, 100},
-                              {0xE020, kEveryMessage},
-                              {0x7010, 4}})
+  using O = OutputEntry;
+  for (const O e : {O{0x1010, kEveryMessage}, O{0x1020, kEveryMessage}, O{0x1060, kEveryMessage},
+                    O{0x2013, 100}, O{0x4020, 100}, O{0x8020, 100}, O{0x5042, 100}, O{0x5022, 100},
+                    O{0xD012, 100}, O{0xE020, kEveryMessage}, O{0x7010, 4}})
     ASSERT_TRUE(outputs.add(e));
   Bytes payload(4 * outputs.count);
   ASSERT_EQ(write_output_configuration(outputs, payload), payload.size());
@@ -109,14 +103,14 @@ TEST(Commands, outputConfigurationIsPairsOfIdAndRate) {
 TEST(Configuration, configurationMessageRoundTrips) {
   // Values of an MTi-300, which fills the common fields.
   Bytes payload(kConfigurationSize);
-  DeviceConfiguration written;
-  written.master_id = written.device_id = 0x037003F8;
-  written.period = 1152;
-  written.devices = 1;
-  written.output_mode = 0x0836;
-  written.output_settings = 0x80000203;
-  written.data_length = 75;
-  written.firmware = {2, 4, 6};
+  DeviceConfiguration written{.master_id = 0x037003F8,
+                              .period = 1152,
+                              .devices = 1,
+                              .device_id = 0x037003F8,
+                              .data_length = 75,
+                              .output_mode = 0x0836,
+                              .output_settings = 0x80000203,
+                              .firmware = {2, 4, 6}};
   write_configuration(written, payload);
   EXPECT_EQ(Bytes(payload.begin(), payload.begin() + 8), from_hex("037003F8 0480 0000"));
   EXPECT_EQ(Bytes(payload.begin() + 96, payload.begin() + 102), from_hex("0001 037003F8"));
@@ -177,16 +171,15 @@ TEST(LineBudget, legacyLayoutsHaveTheTabulatedLoad) {
     std::uint16_t mode;
     std::uint32_t settings;
     std::size_t bytes;
-    double percent;  // at 115200 and 120 Hz
-    double ms;       // on the wire
+    // Load in percent at 115200 baud and 120 Hz.
+    double percent;
+    // Time on the wire in ms.
+    double ms;
   };
-  for (const Row& r : {Row{0x0834, 0x001, 48, 50, 4.17},
-                       {0x0834, 0x201, 68, 71, 5.90},
-                       {0x0834, 0x203, 80, 83, 6.94},
-                       {0x1834, 0x203, 124, 129, 10.76},
-                       {0x0836, 0x203, 134, 140, 11.63},
-                       {0x1836, 0x203, 178, 185, 15.45},
-                       {0x1837, 0x303, 224, 233, 19.44}}) {
+  for (const Row& r : {Row{0x0834, 0x001, 48, 50, 4.17}, Row{0x0834, 0x201, 68, 71, 5.90},
+                       Row{0x0834, 0x203, 80, 83, 6.94}, Row{0x1834, 0x203, 124, 129, 10.76},
+                       Row{0x0836, 0x203, 134, 140, 11.63}, Row{0x1836, 0x203, 178, 185, 15.45},
+                       Row{0x1837, 0x303, 224, 233, 19.44}}) {
     const MtdataLayout layout{r.mode, r.settings};
     ASSERT_TRUE(layout.payload_size());
     EXPECT_EQ(frame_size(*layout.payload_size()), r.bytes);
@@ -202,11 +195,9 @@ TEST(LineBudget, legacyLayoutsHaveTheTabulatedLoad) {
 
 TEST(LineBudget, packetsAreCountedAtTheirOwnRates) {
   OutputConfiguration outputs;
-  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage},
-                              {0x1060, kEveryMessage},
-                              {0x2010, 100},
-                              {0x5042, 100},
-                              {0x7010, 4}})
+  using O = OutputEntry;
+  for (const O e : {O{0x1020, kEveryMessage}, O{0x1060, kEveryMessage}, O{0x2010, 100},
+                    O{0x5042, 100}, O{0x7010, 4}})
     (void)outputs.add(e);
   // A sample: 5 + (3+2) + (3+4) + (3+16) + (3+12) = 51; a fix: 5 + 5 + 7 + 97 = 114.
   const LineBudget b = line_budget(outputs, 115200);

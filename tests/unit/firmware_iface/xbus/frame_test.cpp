@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
-#include <string>
 
 #include "tests/unit/firmware_iface/xbus/hex.hpp"
 
@@ -90,7 +89,8 @@ TEST(ParseFrame, namesTheFault) {
     EXPECT_EQ(parse_frame(std::span(good).first(n)).status, FrameStatus::incomplete) << n;
   EXPECT_EQ(parse_frame(good).status, FrameStatus::ok);
   for (std::size_t i = 2; i < good.size(); ++i) {
-    if (i == 3) continue;  // another length is another frame
+    // Another length gives another frame.
+    if (i == 3) continue;
     Bytes bad = good;
     bad[i] ^= 0x10U;
     EXPECT_EQ(parse_frame(bad).status, FrameStatus::checksum_wrong) << i;
@@ -128,7 +128,8 @@ TEST(FrameStream, messagesInsideAFalseFrameAreFound) {
 }
 
 TEST(FrameStream, preambleInsideAPayloadIsPayload) {
-  const Bytes bytes = from_hex("FA FF 36 07 10 60 04 FA FF 36 00 21");  // SampleTimeFine = FAFF3600
+  // SampleTimeFine is FAFF3600.
+  const Bytes bytes = from_hex("FA FF 36 07 10 60 04 FA FF 36 00 21");
   FrameStream stream;
   const std::vector<Found> found = find_all(stream, bytes, 1);
   ASSERT_EQ(found.size(), 1U);
@@ -141,7 +142,8 @@ TEST(FrameStream, preambleInsideAPayloadIsPayload) {
 TEST(FrameStream, everyByteIsCountedOnce) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     Bytes bytes = noise(5000, seed);
-    for (std::size_t i = 0; i + 1 < bytes.size(); i += 97) {  // many half-credible beginnings
+    // The bytes contain many plausible frame starts.
+    for (std::size_t i = 0; i + 1 < bytes.size(); i += 97) {
       bytes[i] = kPreamble;
       bytes[i + 1] = kBusMaster;
     }

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "firmware_iface/xbus/bytes.hpp"
 #include "firmware_iface/xbus/frame.hpp"
@@ -55,8 +54,9 @@ TEST(Mtdata2, positionInFp1632IsDecodedExactly) {
 }
 
 TEST(Mtdata2, packetIdGivesFormatAndFrame) {
-  const Mtdata2 m = decoded(from_hex(
-      "FA FF 36 13 20 15 10 00 10 00 00 00 00 00 00 00 00 00 00 FF F8 00 00 6C"));  // 12.20, NED
+  // The packet is in 12.20 format and NED.
+  const Mtdata2 m =
+      decoded(from_hex("FA FF 36 13 20 15 10 00 10 00 00 00 00 00 00 00 00 00 00 FF F8 00 00 6C"));
   ASSERT_TRUE(m.quaternion);
   EXPECT_EQ(*m.quaternion, (std::array<double, 4>{1, 0, 0, -0.5}));
   EXPECT_EQ(m.orientation_frame, LocalFrame::ned);

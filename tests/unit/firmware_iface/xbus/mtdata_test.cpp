@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -23,7 +22,8 @@ Mtdata decoded(const Bytes& frame_bytes, const MtdataLayout& layout) {
   return out;
 }
 
-constexpr double kQuarter = 0.70710678118654752;  // cos 45°
+// The cosine of 45°.
+constexpr double kQuarter = 0.70710678118654752;
 
 void expect_place(const Mtdata& m, double tolerance_deg) {
   ASSERT_TRUE(m.latitude_longitude_deg && m.altitude_m);
@@ -49,7 +49,8 @@ TEST(Mtdata, floatFieldsAreDecoded) {
                        "3B"),
               {0x0836, 0x001});
   expect_attitude(m, 1e-7);
-  expect_place(m, 1.4e-5);  // half a step of a float at 153
+  // The tolerance is half a step of a float at 153.
+  expect_place(m, 1.4e-5);
   EXPECT_EQ(m.velocity, (Three{10.5, -0.125, 0.0625}));
   EXPECT_EQ(m.frame, LocalFrame::nwu);
   EXPECT_EQ(m.status, 7);
@@ -128,16 +129,16 @@ std::array<double, N> exact(double first) {
 }
 
 TEST(Mtdata, everyLayoutRoundTrips) {
-  Mtdata all;
-  all.fix = LegacyFix{2500, 3800, 45, 255};
-  all.quaternion = exact<4>(0.5), all.euler_deg = exact<3>(170.5),
-  all.rotation_matrix = exact<9>(0.75);
-  all.latitude_longitude_deg = exact<2>(27.5);
-  all.altitude_m = -12.5;
-  all.velocity = exact<3>(33.25);
-  all.status = 0x47;
-  all.sample_counter = 65535;
-  all.utc = Utc{999'999'999, 2036, 12, 31, 23, 59, 60, 7};
+  Mtdata all{.fix = LegacyFix{2500, 3800, 45, 255},
+             .quaternion = exact<4>(0.5),
+             .euler_deg = exact<3>(170.5),
+             .rotation_matrix = exact<9>(0.75),
+             .latitude_longitude_deg = exact<2>(27.5),
+             .altitude_m = -12.5,
+             .velocity = exact<3>(33.25),
+             .status = 0x47,
+             .sample_counter = 65535,
+             .utc = Utc{999'999'999, 2036, 12, 31, 23, 59, 60, 7}};
   int layouts = 0;
   for (unsigned mode = 0; mode < 0x8000; ++mode) {
     for (const std::uint32_t orientation : {kSettingsQuaternion, kSettingsEuler, kSettingsMatrix})

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "drivers/mock/world/detail/scene.hpp"
 
@@ -18,8 +17,7 @@ const World& bare_world() {
 }
 
 Drive make(DriveKind kind) {
-  DriveOptions options;
-  options.kind = kind;
+  DriveOptions options{.kind = kind};
   return Drive(options, bare_world());
 }
 
@@ -34,8 +32,8 @@ TEST(Drive, derivativesMatchCentralDifferences) {
     const BodyState s = drive.at(t), a = drive.at(t - h), b = drive.at(t + h);
     const double dt = 2 * h.to_seconds();
     EXPECT_LT(((b.T_enu_body.t - a.T_enu_body.t) / dt - s.velocity).norm(), 2e-6) << seconds;
-    EXPECT_LT(((b.velocity - a.velocity) / dt - s.acceleration).norm(), 1e-3)
-        << seconds;  // fifth derivative of the spline: jumps
+    // The fifth derivative of the spline jumps.
+    EXPECT_LT(((b.velocity - a.velocity) / dt - s.acceleration).norm(), 1e-3) << seconds;
     EXPECT_LT((log_so3(a.T_enu_body.R.transpose() * b.T_enu_body.R) / dt - s.angular_rate).norm(),
               2e-6)
         << seconds;
@@ -43,9 +41,7 @@ TEST(Drive, derivativesMatchCentralDifferences) {
 }
 
 TEST(Drive, speedAndAccelerationStayWithinLimits) {
-  DriveOptions options;
-  options.vibration = 0;
-  options.suspension = 0;
+  DriveOptions options{.suspension = 0, .vibration = 0};
   const Drive drive(options, bare_world());
   double speed = 0, acceleration = 0, turn = 0, steepest = 0;
   for (Duration t{}; t < drive.duration(); t = t + Duration::milliseconds(20)) {
@@ -58,16 +54,15 @@ TEST(Drive, speedAndAccelerationStayWithinLimits) {
     EXPECT_NEAR((s.T_enu_body.R.transpose() * s.T_enu_body.R - Mat3::Identity()).norm(), 0, 1e-12);
   }
   EXPECT_GT(speed, 0.97 * options.speed);
-  EXPECT_LT(speed, 1.02 * options.speed);  // the driver's wandering adds its square
+  // The driver's wandering adds its square.
+  EXPECT_LT(speed, 1.02 * options.speed);
   EXPECT_LT(acceleration, 1.3 * options.acceleration + 0.2);
   EXPECT_LT(turn, options.lateral + 0.4);
   EXPECT_NEAR(steepest * 180 / std::numbers::pi, WorldOptions{}.hill_deg, 0.1);
 }
 
 TEST(Drive, vehicleFollowsGroundAndHeading) {
-  DriveOptions options;
-  options.suspension = 0;
-  options.vibration = 0;
+  DriveOptions options{.suspension = 0, .vibration = 0};
   const Drive drive(options, bare_world());
   for (Duration t = Duration::seconds(5); t < drive.duration();
        t = t + Duration::milliseconds(310)) {

@@ -4,7 +4,6 @@
 #include <hwy/targets.h>
 
 #include <cmath>
-#include <stdexcept>
 #include <vector>
 
 #include "drivers/mock/world/detail/town.hpp"
@@ -49,13 +48,7 @@ Transform looking_north(const Vec3& position) {
 }
 
 Intrinsics lens(bool distorted) {
-  Intrinsics k;
-  k.width = 320;
-  k.height = 240;
-  k.fx = 290;
-  k.fy = 285;
-  k.cx = 158.3;
-  k.cy = 121.7;
+  Intrinsics k{.width = 320, .height = 240, .fx = 290, .fy = 285, .cx = 158.3, .cy = 121.7};
   if (distorted) k.distortion = {-0.28, 0.08, 0.0007, -0.0004, 0};
   return k;
 }
@@ -76,11 +69,7 @@ RenderedImage take(Renderer* renderer, const Transform& T_camera_enu, const Rend
   return p;
 }
 
-RenderRequest clean() {
-  RenderRequest s;
-  s.vignetting = 0;
-  return s;
-}
+RenderRequest clean() { return {.vignetting = 0}; }
 
 /// Where the brightness from x0 to x1 of a row steps between `left` and `right`: the edge that
 /// would give this sum.
@@ -111,7 +100,8 @@ TEST(Renderer, edgesLieWhereTheLensModelPutsThem) {
     const Camera camera(lens(distorted));
     Renderer renderer(scene.world(), camera);
     for (double shift = 0; shift < 0.03;
-         shift += 0.0041) {  // a pixel at 6 m is 0.02 m: every sub-pixel phase
+         // A pixel at 6 m is 0.02 m, so the shifts cover every sub-pixel phase.
+         shift += 0.0041) {
       const Transform T_camera_enu = looking_north({shift, 0, 0});
       const RenderedImage p = take(&renderer, T_camera_enu, clean());
       const double dark = p.at(2, 120), bright = p.at(160, 120);
@@ -135,9 +125,11 @@ TEST(Renderer, edgesLieWhereTheLensModelPutsThem) {
 
 TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   Plates scene;
-  const double width = 0.3 * 8.0 / 290;  // 0.3 px at 8 m
+  // The width is 0.3 px at 8 m.
+  const double width = 0.3 * 8.0 / 290;
   scene.plate(0, width, -3, 3, 8.0, 1);
-  scene.plate(-2, -0.5, -3, 3, 8.0, 1);  // wide, for the brightness of its like
+  // The wide plate gives the brightness.
+  scene.plate(-2, -0.5, -3, 3, 8.0, 1);
   Renderer renderer(scene.world(), Camera(lens(false)));
   for (double shift = 0; shift < 0.03; shift += 0.0037) {
     const RenderedImage p = take(&renderer, looking_north({shift, 0, 0}), clean());
@@ -145,7 +137,8 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
     ASSERT_GT(step, 150);
     double sum = 0;
     for (int x = 150; x < 180; ++x) sum += p.at(x, 120) - p.at(2, 120);
-    EXPECT_NEAR(sum, 0.3 * step, 2.0) << shift;  // three pixels and the step are rounded
+    // Three pixels and the step are rounded.
+    EXPECT_NEAR(sum, 0.3 * step, 2.0) << shift;
   }
 }
 
@@ -169,8 +162,8 @@ TEST(Renderer, noiseHasTheStatedVarianceAndSeed) {
     difference2 += std::pow(a.pixels[i] - b.pixels[i], 2) / n;
     product += (a.pixels[i] - mean) * (b.pixels[i] - mean) / n;
   }
-  const double variance = shot.shot_noise * mean + shot.read_noise * shot.read_noise +
-                          1.0 / 12;  // the last from rounding
+  // The last term is the variance of rounding.
+  const double variance = shot.shot_noise * mean + shot.read_noise * shot.read_noise + 1.0 / 12;
   // Standard errors over n pixels: of a variance √(2/n), of a product √(1/n) of the variance; four
   // of them.
   EXPECT_NEAR(0.5 * difference2, variance, 4 * std::sqrt(2 / n) * variance + 0.01 * variance);
@@ -183,8 +176,7 @@ TEST(Renderer, everySimdTargetDrawsTheSameImage) {
   scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
   const auto town = std::make_shared<const World>(WorldOptions{.seed = 5, .texture_detail = 0});
   const Transform T_town = looking_north({-1.9, 60, town->ground(-1.9, 60) + 1.7});
-  RenderRequest noisy;
-  noisy.noise_seed = 3;
+  RenderRequest noisy{.noise_seed = 3};
   Renderer renderer(town, Camera(lens(true)));
   const auto targets = hwy::SupportedAndGeneratedTargets();
   ASSERT_FALSE(targets.empty());

@@ -7,7 +7,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -47,7 +46,8 @@ class QemuBoard {
       ::_exit(127);
     }
     ::close(ends[1]);
-    (void)wait(trigger_status);  // it listens now
+    // The image now listens.
+    (void)wait(trigger_status);
   }
   ~QemuBoard() {
     ::kill(pid_, SIGKILL);

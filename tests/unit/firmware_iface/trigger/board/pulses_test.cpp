@@ -82,7 +82,8 @@ TEST(BoardPulses, refusedPulseIsSentLateAndFlagged) {
   const std::uint64_t due = b.pulse.count;
   b.armed = false;
   board_pulse_refused(&b.board);
-  b.now = due + 300 * kUs;  // long past it
+  // The time is long past the pulse.
+  b.now = due + 300 * kUs;
   b.run_for_us(30'000);
   const auto events = b.events();
   ASSERT_GE(events.size(), 3U);
@@ -99,7 +100,8 @@ TEST(BoardPulses, delayedBoardSkipsNumbersToKeepTheGrid) {
   b.start(100'000);
   b.run_for_us(15'000);
   const std::uint64_t armed_count = b.pulse.count;
-  b.now += 1'000'000 * kUs;  // a second in which only the armed pulse went out
+  // Only the armed pulse went out during this second.
+  b.now += 1'000'000 * kUs;
   b.armed = false;
   board_pulse_made(&b.board, b.now, armed_count, false);
   b.made.clear();
@@ -117,7 +119,8 @@ TEST(BoardPulses, delayedBoardSkipsNumbersToKeepTheGrid) {
 
 TEST(BoardPulses, areArmedAtMostAQuarterSecondAhead) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100));  // one in ten seconds
+  // The rate is one pulse in ten seconds.
+  b.configure(VirtualBoard::config(100));
   b.send(trigger_start);
   b.run_for_us(5'000'000);
   EXPECT_EQ(b.made.size(), 1U);
@@ -191,8 +194,8 @@ TEST_F(WithFeedback, missedTriggerGivesEventWithoutExposure) {
 
 TEST_F(WithFeedback, exposureBeyondTheIntervalHasNoEnd) {
   b.on_pulse = [this](const BoardPulse& p) {
-    if (p.number % 2 == 0)
-      exposure(0, p.count, 10, 14'000);  // a camera that ignores every other pulse
+    // The camera ignores every other pulse.
+    if (p.number % 2 == 0) exposure(0, p.count, 10, 14'000);
     exposure(1, p.count, 10, 9'999);
   };
   begin();
@@ -241,8 +244,8 @@ TEST_F(WithFeedback, edgeBeforeItsPulseIsIgnored) {
   b.run_for_us(2'000);
   ASSERT_EQ(b.made.size(), 1U);
   const std::uint64_t pulse = b.made[0].count;
-  board_edge(&b.board, b.now, input(0), true,
-             pulse - 1);  // came to the main loop after the pulse's own record
+  // The edge reaches the main loop after the pulse's own record.
+  board_edge(&b.board, b.now, input(0), true, pulse - 1);
   exposure(0, pulse, 3000, 4000);
   exposure(1, pulse, 3000, 4000);
   b.run_for_us(5'000);

@@ -25,25 +25,12 @@ constexpr std::uintptr_t kBegin = 0x40000000, kSize = 0x30000;
 constexpr std::uintptr_t kTim2 = 0x40000000, kTim4 = 0x40000800, kTim5 = 0x40000C00,
                          kUsart1 = 0x40011000, kSyscfg = 0x40013800, kExti = 0x40013C00,
                          kGpioa = 0x40020000, kGpiob = 0x40020400;
-enum Timer : std::uintptr_t {
-  cr1 = 0x00,
-  cr2 = 0x04,
-  smcr = 0x08,
-  dier = 0x0C,
-  sr = 0x10,
-  ccmr1 = 0x18,
-  ccmr2 = 0x1C,
-  ccer = 0x20,
-  cnt = 0x24,
-  psc = 0x28,
-  arr = 0x2C,
-  ccr1 = 0x34,
-  ccr2 = 0x38,
-  ccr3 = 0x3C,
-  ccr4 = 0x40
-};
-enum Gpio : std::uintptr_t { moder = 0x00, afrl = 0x20, afrh = 0x24 };
-enum Exti : std::uintptr_t { imr = 0x00, rtsr = 0x08, ftsr = 0x0C, pr = 0x14 };
+// Registers of a timer, of a GPIO port and of EXTI.
+constexpr std::uintptr_t cr1 = 0x00, cr2 = 0x04, smcr = 0x08, dier = 0x0C, sr = 0x10, ccmr1 = 0x18,
+                         ccmr2 = 0x1C, ccer = 0x20, cnt = 0x24, psc = 0x28, arr = 0x2C, ccr1 = 0x34,
+                         ccr2 = 0x38, ccr3 = 0x3C, ccr4 = 0x40;
+constexpr std::uintptr_t moder = 0x00, afrl = 0x20, afrh = 0x24;
+constexpr std::uintptr_t imr = 0x00, rtsr = 0x08, ftsr = 0x0C, pr = 0x14;
 
 volatile std::uint32_t& at(std::uintptr_t unit, std::uintptr_t offset) {
   return *reinterpret_cast<volatile std::uint32_t*>(

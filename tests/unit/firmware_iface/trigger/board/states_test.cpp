@@ -40,7 +40,8 @@ TEST(BoardTalk, pongCarriesReceiveAndSendTicks) {
   const Bytes ping = VirtualBoard::framed(trigger_ping, 77, {4, 3, 2, 1});
   const std::uint64_t arrival = b.now;
   for (const std::uint8_t byte : ping) board_receive(&b.board, b.now, arrival, byte);
-  b.now += 84ULL * 150;  // the answer leaves 150 us later
+  // The answer leaves 150 us later.
+  b.now += 84ULL * 150;
   b.listen();
   const auto pongs = b.take(trigger_pong);
   ASSERT_EQ(pongs.size(), 1U);
@@ -139,7 +140,8 @@ TEST(BoardStates, stateChangeIsSentAtOnce) {
   VirtualBoard b;
   b.start(10'000);
   b.run_for_us(50'000);
-  b.pause(4);  // the slots of 201, 301, 401 and 501 ms
+  // The pause covers the slots at 201, 301, 401 and 501 ms.
+  b.pause(4);
   EXPECT_EQ(b.status().state, trigger_paused);
   b.run_for_us(450'000);
   EXPECT_EQ(b.take(trigger_status).size(), 0U) << "nothing new";
@@ -177,7 +179,8 @@ TEST(BoardStates, stopIsAnsweredAfterAnArmedPulse) {
 TEST(BoardStates, pauseSkipsItsNumbersAndKeepsTheGrid) {
   VirtualBoard b;
   b.start(100'000);
-  b.run_for_us(46'500);  // numbers 0..4 are out, 5 is armed
+  // Numbers 0 to 4 are out and 5 is armed.
+  b.run_for_us(46'500);
   b.pause(7);
   b.run_for_us(200'000);
   const auto events = b.events();

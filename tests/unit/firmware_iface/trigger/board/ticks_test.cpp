@@ -106,14 +106,17 @@ TEST_F(Disciplined, ticksAreMonotonicAndSmooth) {
   begin(true);
   std::uint64_t count = b.now, tick = board_tick(&b.board, count);
   for (std::uint64_t k = 1; k < 200; ++k) {
-    if (k % 50 < 40) feed(k, k + 1);  // with outages of ten seconds
+    // PPS has outages of ten seconds.
+    if (k % 50 < 40) feed(k, k + 1);
     const std::uint64_t until = pps.count(static_cast<double>(k) + 0.5);
     while (count < until) {
-      count += 840'000;  // 10 ms
+      // The step is 10 ms.
+      count += 840'000;
       const std::uint64_t now_tick = board_tick(&b.board, count);
       const auto step = static_cast<double>(now_tick - tick);
       ASSERT_GE(now_tick, tick);
-      ASSERT_NEAR(step, 10'000, 3) << "second " << k;  // 100 ppm of 10 ms, and two roundings
+      // The tolerance is 100 ppm of 10 ms and two roundings.
+      ASSERT_NEAR(step, 10'000, 3) << "second " << k;
       tick = now_tick;
     }
     b.run_until(until);
@@ -154,7 +157,8 @@ TEST_F(Disciplined, spuriousEdgesAreReportedButNotFollowed) {
   begin(false);
   feed(1, 30);
   const double before = error_us(29.4);
-  for (std::uint64_t k = 30; k < 60; ++k)  // a spike between two seconds, every third
+  // Every third second has a spike between two edges.
+  for (std::uint64_t k = 30; k < 60; ++k)
     if (k % 3 == 0) b.edge_at(pps.count(static_cast<double>(k) + 0.3), board_input_pps, true);
   b.frames.clear();
   feed(30, 60);
@@ -187,7 +191,8 @@ TEST_F(Disciplined, movedPhaseIsSteeredUntilPpsIsLost) {
   b.send(trigger_hello, {trigger_protocol_version});
   feed(30, 32);
   const double before = error_us(31.4);
-  constexpr double kMoved = 60e-6;  // the receiver moves its pulse by as much
+  // The receiver shifts its pulse by this time.
+  constexpr double kMoved = 60e-6;
   const auto feed_moved = [this](int from, int to) {
     for (int k = from; k < to; ++k) b.edge_at(pps.count(k + kMoved), board_input_pps, true);
     b.run_until(pps.count(to - 0.5));
@@ -215,10 +220,11 @@ TEST_F(Disciplined, movedPhaseIsSteeredUntilPpsIsLost) {
 TEST(BoardTicks, rateChangeKeepsTicksOfEarlierStamps) {
   TickDiscipline d{};
   tick_init(&d, 84'000'000, 200, 0);
-  const std::uint64_t second = 84'000'000 + 12'600;  // 150 ppm
+  // The crystal is off by 150 ppm.
+  const std::uint64_t second = 84'000'000 + 12'600;
   for (std::uint64_t k = 1; k < 4; ++k) EXPECT_TRUE(tick_pps(&d, k * second, k * second + 100));
-  const std::uint64_t edge = 4 * second,
-                      reported = edge + 42'000'000;  // reported half a second later
+  // The edge is reported half a second later.
+  const std::uint64_t edge = 4 * second, reported = edge + 42'000'000;
   const std::uint64_t between = edge + 40'000'000;
   const std::uint64_t tick = tick_of(&d, between), at_told = tick_of(&d, reported);
   EXPECT_TRUE(tick_pps(&d, edge, reported));
@@ -231,7 +237,8 @@ TEST(BoardTicks, rateChangeKeepsTicksOfEarlierStamps) {
 TEST_F(Disciplined, signalOfWrongPeriodNeverLocks) {
   begin(false);
   for (int k = 1; k < 40;
-       ++k)  // each second by itself is within the crystal's 200 ppm, but they do not agree
+       // Each second is within the crystal's 200 ppm, but successive seconds disagree.
+       ++k)
     b.edge_at(b.now + static_cast<std::uint64_t>((k + (k % 2) * 150e-6) * kHz), board_input_pps,
               true);
   b.run_until(b.now + static_cast<std::uint64_t>(40 * kHz));
@@ -251,8 +258,8 @@ TEST_F(Disciplined, newPhaseLocksWithinSevenSeconds) {
   pps.ppm = 5;
   begin(false);
   feed(1, 30);
-  for (int k = 31; k < 90; ++k)
-    b.edge_at(pps.count(k + 0.37), board_input_pps, true);  // another receiver
+  // The pulses are another receiver's.
+  for (int k = 31; k < 90; ++k) b.edge_at(pps.count(k + 0.37), board_input_pps, true);
   b.run_until(pps.count(33.9));
   EXPECT_EQ(b.status().pps_locked, 0) << "three in a row did not fit";
   b.run_until(pps.count(36.9));
