@@ -41,7 +41,7 @@ class CameraClock {
 class ClockRecord {
  public:
   void observe(DeviceStamp device, const MappedStamp& mapped) noexcept {
-    //  Number of stamps after which the mapping has settled.
+    // Number of stamps after which the mapping has settled.
     constexpr std::uint64_t kSettled = 60;
     // In ppm; a larger drift means that the clock was set.
     constexpr std::int64_t kOddDrift = 2'000;
