@@ -111,7 +111,8 @@ double StereoMlesac::score(const Mat3& E, double best) const noexcept {
   return cost;
 }
 
-bool StereoMlesac::transform_of(const Mat3& E, double cap, double baseline, Transform* T) noexcept {
+bool StereoMlesac::transform_from_essential(const Mat3& E, double cap, double baseline,
+                                            Transform* T) noexcept {
   std::size_t n = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const Vec3 x = left_[i].homogeneous(), y = right_[i].homogeneous();
@@ -199,7 +200,7 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
       const Mat3& E = found.E[static_cast<std::size_t>(j)];
       const double cost = score(E, best);
       Transform T;
-      if (!(cost < best) || !transform_of(E, cap, baseline, &T)) continue;
+      if (!(cost < best) || !transform_from_essential(E, cap, baseline, &T)) continue;
       best = cost;
       Transform better = T;
       if (polished < kMaxPolished && polish(cap, &better)) {
@@ -208,7 +209,7 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
         // better E.
         const Mat3 E_better = essential_matrix(better);
         const double polished_cost = score(E_better, best);
-        if (polished_cost < best && transform_of(E_better, cap, baseline, &better))
+        if (polished_cost < best && transform_from_essential(E_better, cap, baseline, &better))
           best = polished_cost, T = better;
       }
       out.found = true;
