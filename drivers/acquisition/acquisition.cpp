@@ -192,7 +192,7 @@ void Acquisition::push_frame(std::size_t k) {
   in.camera = camera;
   in.slot = frame.slot;
   in.counter = frame.counter;
-  in.middle = clocks_[k].start_of(frame);
+  in.middle = clocks_[k].exposure_start(frame);
   counters_.cameras[k].observe(frame.exposure_start, in.middle);
   in.middle.host = in.middle.host + frame.exposure / 2;
   in.arrival = frame.arrival;
