@@ -60,8 +60,8 @@ std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCa
   const CameraMasks masks(pass.configuration, rig);
   const EstimatorOptions options = estimator_options(pass.configuration, begin.trust,
                                                      Adoption::after_fixed_frames, masks.views());
-  Arena frames_arena(arena_size(FramePool::memory_needed(width, height, FrameDecoder::kSlots)));
-  Arena estimator_arena(arena_size(Estimator::memory_needed(options, rig)));
+  Arena frames_arena;
+  Arena estimator_arena;
   FramePool pool(width, height, FrameDecoder::kSlots, frames_arena);
   const std::unique_ptr<PairRunner> runner = make_runner(pass.configuration.threads);
   BackgroundThread solver;
@@ -123,8 +123,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   found.trust = CalibrationTrust::given;
 
   const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(arena_size(2 * SegmentSolver::memory_needed(c.calibration, c.monitor,
-                                                          given.file.rig.cameras, features)));
+  Arena arena;
   SegmentSolver joined(
       SegmentSolver::Kind::joined, blank.file.rig, *first,
       stretch_length(result.frames, static_cast<std::size_t>(c.calibration.max_frames)),

@@ -69,8 +69,6 @@ EstimationLoop::EstimationLoop(FrameSource& source, const Configuration& configu
       masks_(configuration, facts_.begin.file.rig),
       options_(estimator_options(configuration, facts_.begin.trust, facts_.adoption, masks_.views(),
                                  frame_budget(facts_, configuration.realtime))),
-      estimator_arena_(arena_size(Estimator::memory_needed(options_, facts_.begin.file.rig))),
-      comparison_arena_(arena_size(facts_.ins ? Comparison::bytes_needed(facts_.ins->options) : 0)),
       runner_(make_runner(configuration.threads)),
       estimator_(std::make_unique<Estimator>(options_, facts_.begin.file.rig, facts_.begin.nominal,
                                              estimator_arena_, *runner_, watched_solver_)) {

@@ -184,8 +184,6 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
       ins_(std::move(ins)),
       count_(std::min(request.frames.value_or(sequence_.pairs.size()),
                       sequence_.pairs.size() - request.start)),
-      frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_),
-                                                        FrameDecoder::kSlots))),
       pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
       skipped_(sequence_.left_out) {
   facts_.begin = std::move(begin);
@@ -210,7 +208,7 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
     if (std::string warning = baseline_warning(rig); !warning.empty())
       facts_.remarks.push_back({std::move(warning), "calibration", !request.session.quiet});
   }
-  facts_.image_bytes = frames_arena_.capacity();
+  facts_.image_bytes = frames_arena_.used();
   facts_.ring_bytes = sizeof(FrameDecoder);
 }
 

@@ -14,9 +14,6 @@
 /// Shared steps of commands that write a session directory.
 namespace vergence::app {
 
-/// Size of an arena for so many bytes of contents, with the alignment of the first piece.
-[[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
-
 /// One worker beside the estimator with two threads or more.
 [[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
 

@@ -245,9 +245,9 @@ void SessionRunner::print_remarks(Progress* progress) {
 }
 
 std::vector<MemoryRow> SessionRunner::memory() const {
-  return {{"estimator_bytes", loop_.estimator_arena().capacity(), loop_.estimator_arena().rows()},
+  return {{"estimator_bytes", loop_.estimator_arena().used(), loop_.estimator_arena().rows()},
           {"comparison_bytes",
-           loop_.comparison_arena().capacity() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
+           loop_.comparison_arena().used() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
           {"images_bytes", facts_.image_bytes},
           {"recording_bytes", recording_ ? recording_->memory() : 0},
           {"recorder_bytes", recorder_->memory() + calibrations_->memory()},

@@ -151,7 +151,7 @@ ExitCode run_experiment(const Experiment& given) {
     json.open(a.json);
     if (!json) throw InputError("--json: " + a.json + " cannot be written; is the folder there?");
   }
-  Arena arena(BundleAdjuster::memory_needed(capacities_for(a.simulation)));
+  Arena arena;
   BundleAdjuster adjuster(capacities_for(a.simulation), arena);
   Progress progress = Progress::on_stderr(a.quiet);
   std::vector<Level> levels;

@@ -27,11 +27,12 @@ constexpr double kPivotTolerance = 1e-14;
 // Minimum relative pivot of the undamped system.
 constexpr double kRankTolerance = 1e-11;
 
-/// Requests storage for every array of a workspace from `take`, which either returns arena memory
-/// or only counts.
-template <class Take>
-void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
+/// Makes every array of a workspace in the arena.
+void lay_out(BundleWorkspace& w, const BundleCapacities& c, Arena& arena) {
   using namespace detail;
+  const auto take = [&arena]<class T>(std::span<T>& out, std::size_t n, const char* who) {
+    out = arena.make<T>(n, who);
+  };
   w.capacity = c;
   const std::size_t batches = (c.points + kBatch - 1) / kBatch;
   w.block_capacity = c.blocks > 0 ? c.blocks : std::min(batches * c.poses, c.observations);
@@ -75,22 +76,6 @@ void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
   }
 }
 
-struct TakeFromArena {
-  Arena& arena;
-  template <class T>
-  void operator()(std::span<T>& out, std::size_t n, const char* who) {
-    out = arena.make<T>(n, who);
-  }
-};
-
-struct Count {
-  std::size_t bytes = 0;
-  template <class T>
-  void operator()(std::span<T>&, std::size_t n, const char*) {
-    bytes += (n * sizeof(T) + kCacheLine - 1) / kCacheLine * kCacheLine;
-  }
-};
-
 /// One solve(): the Levenberg–Marquardt loop and the covariances.
 class Solve {
  public:
@@ -127,7 +112,6 @@ class Solve {
   void iterate() noexcept {
     result_.termination = BundleTermination::max_steps;
     while (result_.steps < options_.max_steps) {
-      if (gradient() <= options_.gradient_tolerance) return end(BundleTermination::small_gradient);
       ++result_.steps;
       std::copy_n(w_.rhs.begin(), system_.rows(), w_.delta.begin());
       pivots_ = detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(),
@@ -179,17 +163,6 @@ class Solve {
   }
 
   void end(BundleTermination t) noexcept { result_.termination = t; }
-
-  /// Largest component of the reduced gradient, each over the root of its diagonal.
-  double gradient() const noexcept {
-    if (!(options_.gradient_tolerance > 0) && system_.rows() > 0) return 1;
-    double largest = 0;
-    for (std::size_t i = 0; i < system_.rows(); ++i) {
-      const double diagonal = w_.A[i * system_.ld() + i];
-      if (diagonal > 0) largest = std::max(largest, std::abs(w_.rhs[i]) / std::sqrt(diagonal));
-    }
-    return std::max(largest, std::sqrt(system_.rows() > 0 ? 0.0 : system_.point_decrement()));
-  }
 
   /// Number of unobservable directions: the scale in parallel_monocular.
   int free_directions() const noexcept {
@@ -294,13 +267,6 @@ class Solve {
 
 }  // namespace
 
-std::size_t BundleAdjuster::memory_needed(const BundleCapacities& capacities) noexcept {
-  BundleWorkspace w;
-  Count count{(sizeof(BundleWorkspace) + kCacheLine - 1) / kCacheLine * kCacheLine};
-  lay_out(w, capacities, count);
-  return count.bytes;
-}
-
 BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
   // Limits of the index types.
   constexpr std::size_t kMaxPoses = 65535, kMaxObservations = 1U << 28U;
@@ -309,8 +275,7 @@ BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : worksp
     throw std::invalid_argument(
         "bundle adjustment: capacities out of range (cameras 1 … 4, poses 1 … 65535)");
   workspace_ = arena.make<BundleWorkspace>(1, "bundle: workspace").data();
-  TakeFromArena take{arena};
-  lay_out(*workspace_, c, take);
+  lay_out(*workspace_, c, arena);
 }
 
 BundleResult BundleAdjuster::solve(const BundleProblem& problem,

@@ -37,15 +37,6 @@ struct BundleObservation {
   double x = 0, y = 0;
 };
 
-/// Prior of a pose: `information` (rotation, then translation) of the perturbation δ = (φ, τ) from
-/// the prior to the pose: R = Exp(φ) R₀, t = Exp(φ) t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
-struct BundlePosePrior {
-  std::uint16_t pose = 0;
-  Transform T_left_world{};
-  /// Symmetric, positive semidefinite; in 1/rad², 1/(rad m), 1/m².
-  Mat6 information = Mat6::Zero();
-};
-
 /// A problem in the caller's arrays; solve() writes those marked in/out.
 ///
 /// Order  Observations are sorted by (point, pose, camera), strictly: a feature appears once.
@@ -65,9 +56,6 @@ struct BundleProblem {
   /// One flag per point, 1 if it is constant; if empty, none is.
   std::span<const std::uint8_t> point_constant;
   std::span<const BundleObservation> observations;
-
-  /// Priors of free poses; may be empty.
-  std::span<const BundlePosePrior> pose_priors;
   /// Output: |ε|² inverse_sigma² of each observation at the result; one per observation, or empty.
   std::span<float> squared_residuals;
 };
@@ -139,9 +127,6 @@ struct BundleOptions {
   double cost_tolerance = 1e-6;
   /// Stops if |δ| ≤ tolerance · (|θ| + tolerance), ≥ 0.
   double update_tolerance = 1e-10;
-  /// Stops if the largest component of the reduced gradient, each over the root of its diagonal, is
-  /// smaller, ≥ 0.
-  double gradient_tolerance = 0;
   /// Initial λ in (0, 1e6], by which diagonals are multiplied as 1 + λ; λ is divided by 10 after a
   /// success and multiplied by 10 after a failure.
   double initial_damping = 1e-4;
@@ -159,8 +144,6 @@ struct BundleOptions {
 enum class BundleTermination : std::uint8_t {
   /// Converged: |δ| is below update_tolerance.
   small_update,
-  /// Converged.
-  small_gradient,
   /// Converged.
   small_cost_change,
   /// Not converged; the result is the best so far.
@@ -252,7 +235,7 @@ struct BundleWorkspace;
 ///                  point's minimum depth, so that no point passes through a camera.
 ///
 ///     const BundleCapacities capacities{.poses = poses.size(), .points = points.size()};
-///     Arena arena(BundleAdjuster::memory_needed(capacities));
+///     Arena arena;
 ///     BundleAdjuster adjuster(capacities, arena);
 ///     BundleProblem problem;
 ///     problem.cameras = cameras;
@@ -264,7 +247,7 @@ struct BundleWorkspace;
 ///
 /// Ownership  The problem's arrays are the caller's; no reference is kept after solve().
 /// Threads    solve() by one thread at a time; adjusters are independent of each other.
-/// Memory     memory_needed() bytes of the arena at construction, nothing in solve().
+/// Memory     From the arena at construction, nothing in solve().
 /// Time       One pass over the observations per step, at most max_steps. Deterministic on one
 ///            machine; SIMD targets differ by rounding.
 /// Errors     solve() never throws and never returns NaN; the status states what was changed. The
@@ -277,7 +260,6 @@ class BundleAdjuster {
   BundleAdjuster(const BundleCapacities& capacities, Arena& arena);
   [[nodiscard]] BundleResult solve(const BundleProblem& problem,
                                    const BundleOptions& options) noexcept;
-  [[nodiscard]] static std::size_t memory_needed(const BundleCapacities& capacities) noexcept;
 
  private:
   detail::BundleWorkspace* workspace_;

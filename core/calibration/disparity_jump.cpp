@@ -45,10 +45,6 @@ double depth_of(const Vec3& left, const Vec3& other, const Transform& T_other_le
 
 }  // namespace
 
-std::size_t DisparityJumpDetector::memory_needed(std::size_t capacity) noexcept {
-  return capacity * (2 * sizeof(StereoObservation) + sizeof(Row) + sizeof(double)) + 4 * kCacheLine;
-}
-
 DisparityJumpDetector::DisparityJumpDetector(std::size_t capacity, Arena& arena)
     : before_(arena.make<StereoObservation>(capacity, "disparity jump: the frame before")),
       now_(arena.make<StereoObservation>(capacity, "disparity jump: this frame")),

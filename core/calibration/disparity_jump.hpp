@@ -46,7 +46,6 @@ struct DisparityJump {
 /// Threads  One caller. Time: linear, except for sorting the tracks.
 class DisparityJumpDetector {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   DisparityJumpDetector(std::size_t capacity, Arena& arena);
 
   /// Sets the transform and pinholes in use, and clears the previous frame.
@@ -87,7 +86,7 @@ class DisparityJumpDetector {
   [[nodiscard]] DisparityJump fit(std::span<Row> rows) noexcept;
   /// Copies observations sorted by track; returns their number.
   std::size_t sort_into(std::span<const StereoObservation> stereo,
-                   std::span<StereoObservation> into) noexcept;
+                        std::span<StereoObservation> into) noexcept;
   void evaluate(std::uint64_t frame, DisparityJump* jump) noexcept;
 
   /// A shift that waits for the next frame.

@@ -6,12 +6,6 @@
 #include "core/calibration/detail/depth.hpp"
 
 namespace vergence::calibration {
-namespace {
-
-// Depth of the rating, in metres.
-constexpr double kRatingDepth = 20;
-
-}  // namespace
 
 std::string_view to_string(CalibrationRating rating) noexcept {
   static constexpr std::array<std::string_view, 3> names = {"good", "fair", "poor"};

@@ -56,10 +56,6 @@ struct Monitor::Parts {
   void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& stereo) noexcept;
 };
 
-std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept {
-  return sizeof(Parts) + kCacheLine;
-}
-
 Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
   validate(options);
   parts_ = arena.make<Parts>(1, "monitor").data();

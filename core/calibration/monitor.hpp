@@ -108,7 +108,7 @@ struct MonitorResult {
 /// the largest statistic counts. Frames of a standing rig are tested one by one, because their
 /// errors repeat, and several in a row must exceed the threshold.
 ///
-///     Arena arena(Monitor::memory_needed(options));
+///     Arena arena;
 ///     Monitor monitor(options, arena);
 ///     if (!monitor.set_reference(T_right_left, left, right, covariance)) return;
 ///     const auto verdict = monitor.update(frame);  // each posed frame
@@ -121,7 +121,6 @@ struct MonitorResult {
 ///          Values that are not finite are left out.
 class Monitor {
  public:
-  [[nodiscard]] static std::size_t memory_needed(const MonitorOptions& options) noexcept;
   Monitor(const MonitorOptions& options, Arena& arena);
 
   /// Sets the calibration to test, X_k = T_camera_left X_left, and clears all evidence.

@@ -29,10 +29,6 @@ Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
 
 }  // namespace
 
-std::size_t PairingEvidence::memory_needed(std::size_t capacity) noexcept {
-  return capacity * (sizeof(StereoObservation) + 3 * sizeof(float)) + 4 * kCacheLine;
-}
-
 PairingEvidence::PairingEvidence(std::size_t capacity, Arena& arena)
     : before_(arena.make<StereoObservation>(capacity, "pairing: the frame before")),
       now_(arena.make<float>(capacity, "pairing: distances")),

@@ -24,7 +24,6 @@ namespace vergence::calibration {
 /// Threads  One caller. Time: linear, except for sorting the points.
 class PairingEvidence {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   PairingEvidence(std::size_t capacity, Arena& arena);
 
   /// Processes the next frame with the points that both cameras show, and sorts these by track. X_k

@@ -53,21 +53,6 @@ BundleCapacities RigSolver::capacities(const CalibrationOptions& options, int ca
   return c;
 }
 
-std::size_t RigSolver::memory_needed(const CalibrationOptions& options,
-                                     const MonitorOptions& monitor, int cameras,
-                                     std::size_t features) noexcept {
-  const BundleCapacities c = capacities(options, cameras, features);
-  const auto frames = static_cast<std::size_t>(options.max_frames);
-  return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) +
-         Monitor::memory_needed(monitor) + PairingEvidence::memory_needed(features) +
-         DisparityJumpDetector::memory_needed(features) +
-         c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) +
-         (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) +
-         c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) +
-         frames * features * sizeof(Reference) + features * sizeof(StereoObservation) +
-         12 * kCacheLine;
-}
-
 RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
                      std::size_t features, Arena& arena)
     : options_(options),

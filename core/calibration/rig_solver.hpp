@@ -83,9 +83,6 @@ class RigSolver {
  public:
   RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
             std::size_t features, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const CalibrationOptions& options,
-                                                 const MonitorOptions& monitor, int cameras,
-                                                 std::size_t features) noexcept;
 
   [[nodiscard]] TrackLog& log() noexcept { return log_; }
   [[nodiscard]] RigSolution solve(const RigSolveRequest& request) noexcept;

@@ -60,7 +60,7 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
                     static_cast<double>(s.sigma) / cameras_[c].intrinsics().fx};
     }
   }
-  const TriangulatedPoint p = triangulate(std::span(views).first(n), TriangulateOptions{});
+  const TriangulatedPoint p = triangulate(std::span(views).first(n));
   if (p.status != TriangulateStatus::ok && p.status != TriangulateStatus::no_parallax) return true;
 
   const std::size_t first = observations_.size();

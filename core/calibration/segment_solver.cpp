@@ -17,12 +17,6 @@ SegmentSolver::SegmentSolver(Kind kind, const RigCalibration& given, const RigCa
                          static_cast<std::size_t>(options.max_frames))),
       solver_(options_, monitor, given.cameras, features, arena) {}
 
-std::size_t SegmentSolver::memory_needed(const CalibrationOptions& options,
-                                         const MonitorOptions& monitor, int cameras,
-                                         std::size_t features) noexcept {
-  return RigSolver::memory_needed(options, monitor, cameras, features);
-}
-
 std::optional<RigSolution> SegmentSolver::add(const TrackLog& tracks) noexcept {
   std::optional<RigSolution> solved;
   for (std::size_t i = 0; i < tracks.size(); ++i) {

@@ -25,9 +25,6 @@ class SegmentSolver {
   SegmentSolver(Kind kind, const RigCalibration& given, const RigCalibration& start,
                 std::size_t frames, const CalibrationOptions& options,
                 const MonitorOptions& monitor, std::size_t features, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const CalibrationOptions& options,
-                                                 const MonitorOptions& monitor, int cameras,
-                                                 std::size_t features) noexcept;
 
   /// Adds the frames of `tracks` that are newer than those added before. Returns the solution if
   /// that completed a stretch.

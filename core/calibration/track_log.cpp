@@ -4,10 +4,6 @@
 
 namespace vergence::calibration {
 
-std::size_t TrackLog::memory_needed(std::size_t frames, std::size_t observations) noexcept {
-  return frames * (sizeof(LoggedFrame) + observations * sizeof(LoggedObservation)) + 2 * kCacheLine;
-}
-
 TrackLog::TrackLog(std::size_t frames, std::size_t observations, Arena& arena)
     : frames_(arena.make<LoggedFrame>(frames, "logged frames")),
       observations_(arena.make<LoggedObservation>(frames * observations, "logged tracks")),

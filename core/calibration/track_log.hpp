@@ -47,8 +47,6 @@ struct LoggedFrame {
 class TrackLog {
  public:
   TrackLog(std::size_t frames, std::size_t observations, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(std::size_t frames,
-                                                 std::size_t observations) noexcept;
 
   /// Begins a new frame, which push() then fills. `frame.observations` is not read.
   void begin(const LoggedFrame& frame) noexcept;

@@ -39,10 +39,6 @@ const char* to_string(InsMatch m) noexcept {
 Comparison::Comparison(const ComparisonOptions& options, Arena& arena)
     : options_(options), ins_(options_, counters_, arena), builder_(options_, arena) {}
 
-std::size_t Comparison::bytes_needed(const ComparisonOptions& options) noexcept {
-  return InsHistory::bytes_needed(options) + EnuAlignmentBuilder::bytes_needed();
-}
-
 void Comparison::add(const PoseSample& pose) noexcept {
   assert(pending_end_ - pending_begin_ < kPending);
   pending_[static_cast<std::size_t>(pending_end_ % kPending)] = pose;

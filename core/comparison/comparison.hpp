@@ -128,7 +128,7 @@ struct ComparisonCounters {
 
 /// Compares poses with a geodetic INS, frame by frame: interpolation, ENU alignment, errors, scale.
 ///
-///     Arena arena(Comparison::bytes_needed(options));
+///     Arena arena;
 ///     Comparison comparison(options, arena);
 ///     comparison.add(reading);  // in arrival order
 ///     comparison.add(pose);
@@ -152,7 +152,6 @@ class Comparison {
   /// Not copyable, because its parts refer to each other.
   Comparison(const Comparison&) = delete;
   Comparison& operator=(const Comparison&) = delete;
-  [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
 
   /// Adds a sample. Samples that are not in order of their stamps are rejected and counted.
   void add(const InsSample& sample) noexcept { ins_.add(sample); }

@@ -13,10 +13,6 @@ constexpr double kMinStep = 0.05;
 EnuAlignmentBuilder::EnuAlignmentBuilder(const ComparisonOptions& options, Arena& arena)
     : options_(options), pairs_(arena.make<EnuAlignmentPair>(kPairs, "comparison: alignment")) {}
 
-std::size_t EnuAlignmentBuilder::bytes_needed() noexcept {
-  return kPairs * sizeof(EnuAlignmentPair) + kCacheLine;
-}
-
 void EnuAlignmentBuilder::add(const EnuAlignmentPair& pair) noexcept {
   if (last_world_) {
     const double step = (pair.p_world_left - *last_world_).norm();

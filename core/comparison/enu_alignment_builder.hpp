@@ -20,7 +20,6 @@ class EnuAlignmentBuilder {
 
   /// `options` must outlive this object.
   EnuAlignmentBuilder(const ComparisonOptions& options, Arena& arena);
-  [[nodiscard]] static std::size_t bytes_needed() noexcept;
 
   /// Adds a pose with a fix, in order; fits the alignment after the distance.
   void add(const EnuAlignmentPair& pair) noexcept;

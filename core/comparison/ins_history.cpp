@@ -26,7 +26,7 @@ constexpr double kLevelSigma = 0.05;
 
 bool positive(double v) noexcept { return std::isfinite(v) && v > 0; }
 
-bool attitude_of(const InsSample& s, Mat3* R) noexcept {
+bool read_attitude(const InsSample& s, Mat3* R) noexcept {
   const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
   if (!s.attitude_valid || !(std::abs(q.norm() - 1.0) < kQuaternionLength)) return false;
   *R = q.normalized().toRotationMatrix();
@@ -34,7 +34,7 @@ bool attitude_of(const InsSample& s, Mat3* R) noexcept {
 }
 
 /// Attitude of a level vehicle at this yaw; kLevelSigma covers slopes.
-Mat3 level_at(double yaw) noexcept { return exp_so3({0, 0, yaw}); }
+Mat3 level_attitude(double yaw) noexcept { return exp_so3({0, 0, yaw}); }
 
 double or_default(double sigma, double fallback) noexcept {
   return positive(sigma) ? sigma : fallback;
@@ -46,10 +46,6 @@ InsHistory::InsHistory(const ComparisonOptions& options, ComparisonCounters& cou
     : options_(options),
       counters_(counters),
       readings_(arena.make<Reading>(options.ins_capacity, "comparison: INS samples")) {}
-
-std::size_t InsHistory::bytes_needed(const ComparisonOptions& options) noexcept {
-  return options.ins_capacity * sizeof(Reading) + kCacheLine;
-}
 
 bool InsHistory::accept_stamp(Stamp stamp) noexcept {
   if (end_ > begin_ && stamp <= reading(end_ - 1).stamp) {
@@ -74,7 +70,7 @@ void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {
   const bool fixed = sample.fix == FixStatus::fix_2d || sample.fix == FixStatus::fix_3d;
   Mat3 R_local_ins;
   if (fixed && !sample.position.plausible()) ++counters_.ins_refused;
-  bool attitude = attitude_of(sample, &R_local_ins);
+  bool attitude = read_attitude(sample, &R_local_ins);
   if (fixed && attitude && sample.position.plausible()) attitude = agrees(sample, R_local_ins);
   if (!attitude) {
     ++counters_.ins_without_attitude;
@@ -82,7 +78,7 @@ void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {
       yaw_ = sample.yaw_enu;
     if (sample.attitude_valid && attitude_check_.contradicted()) yaw_ = attitude_check_.course();
     // At standstill the last heading is used.
-    R_local_ins = level_at(yaw_.value_or(0));
+    R_local_ins = level_attitude(yaw_.value_or(0));
   }
   if (!fixed || !sample.position.plausible() || !(attitude || yaw_)) return;
   begin_plane(sample.position);

@@ -35,7 +35,6 @@ class InsHistory {
   /// Counts rejected samples and jumps in `counters`; `counters` and `options` must outlive this
   /// object.
   InsHistory(const ComparisonOptions& options, ComparisonCounters& counters, Arena& arena);
-  [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
 
   /// Adds a sample. Samples that are not in order of their stamps are rejected and counted.
   void add(const InsSample& sample) noexcept;

@@ -59,7 +59,7 @@ State moved(const State& s, const Parameters& d) {
 }
 
 /// Median interval between samples.
-Duration interval_of(std::span<const MountReference> reference) {
+Duration median_interval(std::span<const MountReference> reference) {
   // In ns.
   std::vector<std::int64_t> intervals;
   intervals.reserve(reference.size());
@@ -71,14 +71,14 @@ Duration interval_of(std::span<const MountReference> reference) {
 }
 
 /// Spacing of moments: the whole number of samples nearest to the step, at least one.
-Duration spacing_of(Duration interval, Duration step) {
+Duration moment_spacing(Duration interval, Duration step) {
   return interval * std::max<std::int64_t>(1, (step + interval / 2).ns() / interval.ns());
 }
 
 /// Samples at the step of `o`, a multiple of the interval, with an estimate around each.
-std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
-                               std::span<const MountReference> reference, Duration interval,
-                               const MountOptions& o) {
+std::vector<Moment> select_moments(std::span<const StampedPose> estimate,
+                                   std::span<const MountReference> reference, Duration interval,
+                                   const MountOptions& o) {
   // Range for the clock offset.
   constexpr Duration kRoom = Duration::milliseconds(500);
   std::vector<Moment> moments;
@@ -112,7 +112,7 @@ struct Block {
 /// Covariance of the sum of the blocks' scores from their scatter; zero if there are too few. A
 /// parameter seen by one block only is fitted to it, so its score is that of a fit to the others
 /// (jackknife: Bell and McCaffrey 2002).
-Information scatter_of(std::span<const Block> blocks, const Information& whole) {
+Information score_scatter(std::span<const Block> blocks, const Information& whole) {
   Information sum = Information::Zero();
   if (blocks.size() < kBlocks) return sum;
   const Information covariance = ldlt_inverse(whole);
@@ -216,20 +216,20 @@ bool Fit::start(const Mat3& nominal) {
   // Minimum path length in m; chosen.
   constexpr double kMinWay = 10;
   if (way < kMinWay) return false;
-  const auto rotation_of = [](const Mat3& M) {
+  const auto nearest_rotation = [](const Mat3& M) {
     const Svd3 s = svd(M);
     const Vec3 d(1, 1, (s.U * s.V.transpose()).determinant());
     return Mat3(s.U * d.asDiagonal() * s.V.transpose());
   };
   // The design rotation has a thousandth of the weight, so it only decides what is otherwise
   // undetermined.
-  state_.R_m = rotation_of(B + 1e-3 * B.norm() * nominal);
+  state_.R_m = nearest_rotation(B + 1e-3 * B.norm() * nominal);
   Mat3 sum = Mat3::Zero();
   for (const Moment& m : moments_) {
     if (!detail::pose_at(estimate_, m.reference.stamp, options_.max_gap, &e0)) return false;
     sum += m.reference.T_enu_ref.R * state_.R_m * e0.R.transpose();
   }
-  state_.R_enu_world = rotation_of(sum);
+  state_.R_enu_world = nearest_rotation(sum);
   for (const Moment& m : moments_) {
     (void)detail::pose_at(estimate_, m.reference.stamp, options_.max_gap, &e0);
     state_.translation += (m.reference.T_enu_ref.t - state_.R_enu_world * e0.t) /
@@ -331,7 +331,7 @@ bool Fit::step(Parameters* d) {
     }
   }
   information_ = H;
-  scatter_ = scatter_of(blocks, H);
+  scatter_ = score_scatter(blocks, H);
   *d = -ldlt_solve(H, g);
   return d->allFinite();
 }
@@ -410,10 +410,10 @@ MountStatus estimate_ins_extrinsics(std::span<const StampedPose> estimate,
                                     std::span<const MountReference> reference, const Mat3& nominal,
                                     const MountOptions& options, Mount* mount) {
   if (estimate.size() < kMountMoments || reference.size() < 2) return MountStatus::too_few;
-  const Duration interval = interval_of(reference);
+  const Duration interval = median_interval(reference);
   MountOptions spaced = options;
-  spaced.step = spacing_of(interval, options.step);
-  std::vector<Moment> moments = moments_of(estimate, reference, interval, spaced);
+  spaced.step = moment_spacing(interval, options.step);
+  std::vector<Moment> moments = select_moments(estimate, reference, interval, spaced);
   // Error correlation is estimated between consecutive moments; too few would show none.
   const auto following =
       std::count_if(moments.begin(), moments.end(), [](const Moment& m) { return m.follows; });

@@ -16,12 +16,6 @@ BackgroundSolve::BackgroundSolve(const EstimatorOptions& options, const RigCalib
       runner_(runner),
       task_{this} {}
 
-std::size_t BackgroundSolve::memory_needed(const EstimatorOptions& options, int cameras,
-                                           std::size_t tracks) noexcept {
-  return calibration::RigSolver::memory_needed(options.calibration, options.monitor, cameras,
-                                               tracks);
-}
-
 void BackgroundSolve::start(const calibration::TrackLog& log, const Start& start) noexcept {
   solver_.log().copy(log, log.size());
   start_ = start;

@@ -33,8 +33,6 @@ class BackgroundSolve {
   ~BackgroundSolve() { finish(); }
   BackgroundSolve(const BackgroundSolve&) = delete;
   BackgroundSolve& operator=(const BackgroundSolve&) = delete;
-  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options, int cameras,
-                                                 std::size_t tracks) noexcept;
 
   /// Precondition: !running().
   void start(const calibration::TrackLog& log, const Start& start) noexcept;

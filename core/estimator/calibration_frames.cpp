@@ -31,13 +31,8 @@ CalibrationFrames::CalibrationFrames(const calibration::CalibrationOptions& opti
                                      std::size_t tracks, Arena& arena)
     : options_(options), log_(static_cast<std::size_t>(options.max_frames), tracks, arena) {}
 
-std::size_t CalibrationFrames::memory_needed(const calibration::CalibrationOptions& options,
-                                             std::size_t tracks) noexcept {
-  return calibration::TrackLog::memory_needed(static_cast<std::size_t>(options.max_frames), tracks);
-}
-
 void CalibrationFrames::add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
-                             const RigFrame& frame) noexcept {
+                            const RigFrame& frame) noexcept {
   if (outcome.scale != 1.0) log_.scale_about(outcome.T_left_world.centre(), outcome.scale);
   ++frames_still_;
   if (!outcome.images_good || pixels_moved(odometry.map()) < kMovedPixels) return;

@@ -16,13 +16,11 @@ class CalibrationFrames {
  public:
   CalibrationFrames(const calibration::CalibrationOptions& options, std::size_t tracks,
                     Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const calibration::CalibrationOptions& options,
-                                                 std::size_t tracks) noexcept;
 
   /// Logs the tracks of a posed frame if every camera gave a good image and the tracks have moved
   /// by at least a pixel on average since the last logged frame.
   void add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
-            const RigFrame& frame) noexcept;
+           const RigFrame& frame) noexcept;
   /// Returns true if no frame was logged for so long that the rig must be standing still.
   [[nodiscard]] bool standing() const noexcept;
   void restart_standing() noexcept { frames_still_ = 0; }

@@ -55,12 +55,6 @@ RigFrame usable(const RigFrame& frame) noexcept {
 
 }  // namespace
 
-std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
-  check(options, rig);
-  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) +
-         OnlineCalibrator::memory_needed(options, rig) + sizeof(Parts) + 2 * kCacheLine;
-}
-
 Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig,
                      const RigCalibration& nominal, Arena& arena, PairRunner& runner,
                      BackgroundRunner& solver) {

@@ -98,7 +98,7 @@ struct EstimatorEvent {
 /// Estimates the pose of each rig frame, and calibrates the rig online. This is the entry point of
 /// core.
 ///
-///     Arena arena(Estimator::memory_needed(options, rig));
+///     Arena arena;
 ///     SequentialRunner runner;
 ///     Estimator estimator(options, rig, rig, arena, runner, solver);
 ///     for (RigFrame frame; next_frame(&frame);) {
@@ -118,9 +118,6 @@ struct EstimatorEvent {
 ///            process() never does.
 class Estimator {
  public:
-  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
-                                                 const RigCalibration& rig);
-
   /// `rig`: intrinsics, baseline length and, except with CalibrationTrust::none, T_camera_left.
   /// `nominal`: design values of the rig, which the gates compare a new calibration with
   /// (rig.nominal of the configuration).

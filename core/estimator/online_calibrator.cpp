@@ -30,13 +30,6 @@ void clear_rig(std::optional<RigCalibration>* refined) noexcept {
 
 }  // namespace
 
-std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o,
-                                            const RigCalibration& rig) noexcept {
-  return CalibrationFrames::memory_needed(o.calibration, max_tracks(o)) +
-         BackgroundSolve::memory_needed(o, rig.cameras, max_tracks(o)) +
-         RigMonitor::memory_needed(o.monitor, rig.cameras, max_tracks(o)) + kCacheLine;
-}
-
 OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
                                    const RigCalibration& nominal, Arena& arena,
                                    BackgroundRunner& solver)

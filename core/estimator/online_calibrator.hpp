@@ -31,8 +31,6 @@ class OnlineCalibrator {
  public:
   OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
                    const RigCalibration& nominal, Arena& arena, BackgroundRunner& solver);
-  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
-                                                 const RigCalibration& rig) noexcept;
 
   /// Frames that calibrations are solved from; call add() with each posed frame.
   [[nodiscard]] CalibrationFrames& frames() noexcept { return frames_; }

@@ -62,15 +62,6 @@ bool both_show(const odometry::FrameOutcome& outcome, int k) noexcept {
 
 }  // namespace
 
-std::size_t RigMonitor::memory_needed(const calibration::MonitorOptions& options, int cameras,
-                                      std::size_t capacity) noexcept {
-  return static_cast<std::size_t>(cameras - 1) *
-             (calibration::Monitor::memory_needed(options) +
-              calibration::DisparityJumpDetector::memory_needed(capacity) +
-              calibration::PairingEvidence::memory_needed(capacity)) +
-         capacity * sizeof(calibration::StereoObservation) + kCacheLine;
-}
-
 RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
                        std::size_t capacity, Arena& arena)
     : options_(options), cameras_(cameras) {

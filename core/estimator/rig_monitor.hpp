@@ -43,8 +43,6 @@ class RigMonitor {
   /// `capacity`: maximum number of tracks in a frame.
   RigMonitor(const calibration::MonitorOptions& options, int cameras, std::size_t capacity,
              Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const calibration::MonitorOptions& options,
-                                                 int cameras, std::size_t capacity) noexcept;
 
   /// Makes this calibration the reference. `solved_and_verified`: it was solved from images and
   /// is verified, so less scatter is expected.

@@ -17,6 +17,7 @@ constexpr float kFlat = 0.25F;
 
 struct Grid {
   int cell, columns, rows;
+  [[nodiscard]] int cells() const noexcept { return columns * rows; }
   [[nodiscard]] int index(float x, float y) const noexcept {
     const int c = std::clamp(static_cast<int>(x) / cell, 0, columns - 1);
     const int r = std::clamp(static_cast<int>(y) / cell, 0, rows - 1);
@@ -26,7 +27,7 @@ struct Grid {
 
 /// Best unmasked local maximum of the block's scores without its outer ring; score 0 if there is
 /// none. (x0, y0): the block's first pixel in the image.
-Corner best_of(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
+Corner best_corner(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
   Corner best;
   for (int y = 1; y < h - 1; ++y) {
     const float* s = score + y * detail::kMaxBlock;
@@ -73,7 +74,7 @@ void scan_rows(const ImageView& image, const CornerOptions& options, const Grid&
       const int y1 = std::min((r + 1) * grid.cell, image.height - low) + 1;
       if (x1 - x0 < 4 || y1 - y0 < 4) continue;
       detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data());
-      Corner best = best_of(score.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
+      Corner best = best_corner(score.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
       if (!(best.score > kFlat)) continue;
       best.x += static_cast<float>(x0);
       best.y += static_cast<float>(y0);
@@ -88,10 +89,11 @@ void find_corners(const ImageView& image, const CornerOptions& options,
                   std::span<const Corner> taken, PairRunner& runner,
                   BoundedVector<Corner>* out) noexcept {
   out->clear();
-  const int cell = std::clamp(options.cell, 8, kMaxCell);
-  const Grid grid{cell, (image.width + cell - 1) / cell, (image.height + cell - 1) / cell};
-  const int cells = grid.columns * grid.rows;
-  if (image.empty() || cells > kMaxGridCells) return;
+  if (image.empty()) return;
+  Grid grid{};
+  for (int cell = std::max(options.cell, 8); grid.cell == 0 || grid.cells() > kMaxGridCells; ++cell)
+    grid = {cell, (image.width + cell - 1) / cell, (image.height + cell - 1) / cell};
+  if (grid.cell > kMaxCell) return;
   std::array<bool, kMaxGridCells> occupied{};
   for (const Corner& c : taken) occupied[static_cast<std::size_t>(grid.index(c.x, c.y))] = true;
 
@@ -104,7 +106,7 @@ void find_corners(const ImageView& image, const CornerOptions& options,
   };
   runner.run(TaskRef(upper), TaskRef(lower));
 
-  const auto end = std::remove_if(found.begin(), found.begin() + cells,
+  const auto end = std::remove_if(found.begin(), found.begin() + grid.cells(),
                                   [](const Corner& c) { return !(c.score > 0.F); });
   std::sort(found.begin(), end, stronger);
   for (auto it = found.begin(); it != end && !out->full(); ++it)

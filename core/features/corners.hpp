@@ -17,7 +17,8 @@ struct Corner {
 };
 
 struct CornerOptions {
-  /// Cell size in px; there is at most one corner per cell.
+  /// Minimum cell size in px; there is at most one corner per cell. Cells are larger if there would
+  /// be more than kMaxGridCells.
   int cell = 32;
   /// Margin of the image without corners, in px.
   int border = 16;

@@ -17,7 +17,7 @@ using detail::kBlock;
 constexpr int kPlaces = kMaxSearchSteps * 5;
 constexpr int kMaxBand = 2;
 
-Block middle_of(const Patch& patch, int level) noexcept {
+Block middle_block(const Patch& patch, int level) noexcept {
   Block b;
   const auto& from = patch.pixels[static_cast<std::size_t>(level)];
   constexpr int kFirst = kPatchSide / 2 - kBlock / 2;
@@ -40,27 +40,26 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
                           const EpipolarSearchOptions& options) noexcept {
   SearchResult result;
   const int coarsest = std::min<int>(image.levels(), patch.levels) - 1;
-  int level = std::min(options.level, coarsest);
+  int level = std::min(1, coarsest);
   if (level < 0) return result;
   Vec2 first;
-  if (curve.at(options.rho_first, &first, nullptr) != ProjectStatus::ok) return result;
+  if (curve.at(0, &first, nullptr) != ProjectStatus::ok) return result;
   Vec2 last = first;
   // The near end may be outside the image or the lens model; the range then ends where the curve
   // leaves it.
-  double rho_last = options.rho_first;
-  double step = options.rho_last - options.rho_first;
+  double rho_last = 0;
+  double step = options.rho_last;
   // Resolution of a thousandth of the range.
   constexpr int kBisections = 10;
   for (int i = 0; i <= kBisections; ++i, step *= 0.5) {
     Vec2 p;
-    if (std::abs(rho_last + step - options.rho_first) >
-            std::abs(options.rho_last - options.rho_first) ||
+    if (rho_last + step > options.rho_last ||
         curve.at(rho_last + step, &p, nullptr) != ProjectStatus::ok || !curve.camera->inside(p, 0))
       continue;
     rho_last += step;
     last = p;
   }
-  if (rho_last == options.rho_first) return result;
+  if (rho_last == 0) return result;
 
   const double length = (last - first).norm();
   while (level < coarsest && std::ldexp(length, -level) > kMaxSearchSteps - 1) ++level;
@@ -70,7 +69,7 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   const Vec2 along = (last - first).normalized();
   const bool horizontal = std::abs(along.x()) >= std::abs(along.y());
   const int band = std::clamp(options.band, 0, kMaxBand);
-  const Block block = middle_of(patch, level);
+  const Block block = middle_block(patch, level);
   // The block's first pixel is kBlock/2 before the searched pixel; the anchor's offset in its pixel
   // moves with it.
   const Vec2 anchor = patch.offset[static_cast<std::size_t>(level)].cast<double>();
@@ -90,9 +89,7 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
     if (i % kChord == 0 && i < steps) {
       const int end = std::min(i + kChord, steps);
       Vec2 there;
-      if (curve.at(options.rho_first + (rho_last - options.rho_first) * end / steps, &there,
-                   nullptr) != ProjectStatus::ok)
-        break;
+      if (curve.at(rho_last * end / steps, &there, nullptr) != ProjectStatus::ok) break;
       d = (there * scale - anchor - p) / (end - i);
     }
     // Rounding towards zero is harmless, because negative values are outside.
@@ -142,7 +139,7 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
       second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
   second = std::sqrt(second);
   result.zncc = best_score;
-  result.rho = options.rho_first + (rho_last - options.rho_first) * at.index / steps;
+  result.rho = rho_last * at.index / steps;
   result.pixel =
       (Vec2(at.x + (horizontal ? 0 : aside), at.y + (horizontal ? aside : 0)) + anchor) / scale;
   if (best_score < options.min_zncc)

@@ -21,17 +21,12 @@ struct EpipolarCurve {
 };
 
 struct EpipolarSearchOptions {
-  /// Pyramid level of the search. If the curve is longer there than kMaxSearchSteps, a coarser
-  /// level is searched, because steps above a pixel miss matches.
-  int level = 1;
-  /// Start of the range in 1/m; may be negative to test for swapped cameras.
-  double rho_first = 0.0;
-  /// End of the range in 1/m; earlier if the curve leaves the image.
+  /// End of the range in 1/m, which begins at infinity; earlier if the curve leaves the image.
   double rho_last = 1.0;
   /// Half width of the band around the curve in px of the level, at most 2.
   int band = 1;
   /// Minimum correlation of the 8×8 px compared.
-  float min_zncc = 0.7F;
+  float min_zncc = kMinZncc;
   /// Ratio (1 − best) / (1 − second best) above which the match is ambiguous.
   float unique = 0.85F;
   /// Mask of the searched image; may be null.
@@ -52,8 +47,9 @@ struct SearchResult {
 /// Maximum number of positions along a curve: half of a 640 px wide level 1.
 inline constexpr int kMaxSearchSteps = 320;
 
-/// Compares the middle 8×8 px of one level of the patch along the curve, by normalised correlation
-/// in integers.
+/// Compares the middle 8×8 px of level 1 of the patch along the curve, by normalised correlation in
+/// integers. If the curve is longer there than kMaxSearchSteps, a coarser level is searched,
+/// because steps above a pixel miss matches.
 [[nodiscard]] SearchResult search_along(const Patch& patch, const Pyramid& image,
                                         const EpipolarCurve& curve,
                                         const EpipolarSearchOptions& options) noexcept;

@@ -1,28 +1,14 @@
 #include "core/features/mask.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 namespace vergence::features {
-namespace {
-
-std::size_t words_of(int width) noexcept {
-  return (static_cast<std::size_t>(std::max(0, width)) + 63U) / 64U;
-}
-
-}  // namespace
-
-std::size_t Mask::memory_needed(int width, int height) noexcept {
-  return words_of(width) * static_cast<std::size_t>(std::max(0, height)) * sizeof(std::uint64_t) +
-         kCacheLine;
-}
-
 Mask::Mask(const ImageView& image, int margin, Arena& arena) {
   if (image.empty()) return;
   width_ = image.width;
   height_ = image.height;
-  words_per_row_ = words_of(width_);
+  words_per_row_ = (static_cast<std::size_t>(width_) + 63U) / 64U;
   bits_ = arena.make<std::uint64_t>(words_per_row_ * static_cast<std::size_t>(height_), "mask");
   for (int y = 0; y < height_; ++y) {
     const std::uint8_t* row = image.row(y);
@@ -52,12 +38,6 @@ void Mask::hide(int first, int last, int y) noexcept {
 bool Mask::hides(const Vec2& pixel) const noexcept {
   if (bits_.empty() || !(pixel.cwiseAbs().maxCoeff() < 1e6)) return false;
   return hides(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
-}
-
-std::int64_t Mask::count() const noexcept {
-  std::int64_t n = 0;
-  for (const std::uint64_t w : bits_) n += std::popcount(w);
-  return n;
 }
 
 }  // namespace vergence::features

@@ -13,7 +13,6 @@ namespace vergence::features {
 /// Ownership  The source image is read in the constructor only.
 /// Threads    Any number of readers.
 /// Memory     From the arena at construction: an eighth of the image.
-/// Errors     The constructor throws std::length_error if the arena is full.
 class Mask {
  public:
   /// Hides nothing.
@@ -21,7 +20,6 @@ class Mask {
   /// Hides the pixels of `image` that are 0 and those within `margin` px of one along x and y. An
   /// empty image hides nothing.
   Mask(const ImageView& image, int margin, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(int width, int height) noexcept;
 
   /// Pixels outside the image are not hidden; callers check the edge.
   [[nodiscard]] bool hides(int x, int y) const noexcept {
@@ -30,8 +28,6 @@ class Mask {
   }
   [[nodiscard]] bool hides(const Vec2& pixel) const noexcept;
   [[nodiscard]] bool empty() const noexcept { return bits_.empty(); }
-  /// Number of hidden pixels.
-  [[nodiscard]] std::int64_t count() const noexcept;
 
  private:
   [[nodiscard]] std::size_t word(int x, int y) const noexcept {

@@ -21,6 +21,9 @@ constexpr float kMinContrast = 0.6F;
 // squared gradient of rounding (1/24).
 constexpr float kMinHessian = 0.25F;
 
+// Maximum number of steps per level.
+constexpr int kMaxSteps = 12;
+
 struct LevelOutcome {
   AlignStatus status;
   // Pixel of the level.
@@ -28,14 +31,13 @@ struct LevelOutcome {
   float zncc;
   // Standard deviation for one grey level of noise, in px of the level.
   float sigma;
-  int steps;
 };
 
 LevelOutcome align_level(const detail::Window& w, const ImageView& image, float x, float y,
-                         float max_shift, int max_steps) noexcept {
+                         float max_shift) noexcept {
   constexpr float kPixels = kWindow * kWindow;
   constexpr float kHalfWindow = 0.5F * static_cast<float>(kWindow - 1);
-  LevelOutcome out{AlignStatus::diverged, x, y, 0.F, 0.F, 0};
+  LevelOutcome out{AlignStatus::diverged, x, y, 0.F, 0.F};
   const float trace = 0.5F * (w.hxx + w.hyy);
   const float det = w.hxx * w.hyy - w.hxy * w.hxy;
   const float least = trace - std::sqrt(std::max(0.F, trace * trace - det));
@@ -51,7 +53,7 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
   // rows.
   const float last_x = static_cast<float>(image.width - kWindowStride - 2),
               last_y = static_cast<float>(image.height - kWindow - 2);
-  for (out.steps = 1; out.steps <= max_steps; ++out.steps) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const float left = out.x - kHalfWindow, top = out.y - kHalfWindow;
     if (!(left >= 0.F && top >= 0.F && left <= last_x && top <= last_y)) {
       out.status = AlignStatus::outside;
@@ -132,11 +134,9 @@ AlignResult align(const Patch& patch, const Pyramid& image, const Vec2& predicte
     detail::make_window(patch.pixels[i].data(), static_cast<float>(kHalf) + patch.offset[i].x(),
                         static_cast<float>(kHalf) + patch.offset[i].y(), B, &window);
     const double scale = std::ldexp(1.0, l);
-    const LevelOutcome out =
-        align_level(window, image.level(l), static_cast<float>(pixel.x() / scale),
-                    static_cast<float>(pixel.y() / scale),
-                    options.max_shift / static_cast<float>(scale), options.max_steps);
-    result.steps += out.steps;
+    const LevelOutcome out = align_level(
+        window, image.level(l), static_cast<float>(pixel.x() / scale),
+        static_cast<float>(pixel.y() / scale), options.max_shift / static_cast<float>(scale));
     // A coarse level may be flat or outside the image although a finer one is not.
     if (out.status != AlignStatus::ok && l > options.finest) continue;
     result.status = out.status;

@@ -30,17 +30,6 @@ std::size_t padded_stride(int width) noexcept {
 
 }  // namespace
 
-std::size_t Pyramid::memory_needed(int width, int height, int levels) noexcept {
-  std::size_t bytes = detail::filtered_row_length(width) * sizeof(std::uint16_t) + kCacheLine;
-  const int n = usable_levels(width, height, levels);
-  Size s{width, height};
-  for (int l = 1; l < n; ++l) {
-    s = {(s.width + 1) / 2, (s.height + 1) / 2};
-    bytes += padded_stride(s.width) * static_cast<std::size_t>(s.height) + 2 * kCacheLine;
-  }
-  return bytes;
-}
-
 Pyramid::Pyramid(int width, int height, int levels, Arena& arena)
     : levels_(usable_levels(width, height, levels)) {
   assert(levels >= 1 && levels <= kMaxPyramidLevels);

@@ -23,7 +23,6 @@ class Pyramid {
   /// Precondition: 1 ≤ levels ≤ kMaxPyramidLevels. There are fewer if a level would be smaller than
   /// 32 px on a side.
   Pyramid(int width, int height, int levels, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(int width, int height, int levels) noexcept;
 
   /// Precondition: the image has the size given to the constructor.
   void build(const ImageView& image) noexcept;

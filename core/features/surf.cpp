@@ -54,12 +54,6 @@ struct Surf::Octave {
   int step, first = 0, columns = 0, rows = 0;
 };
 
-std::size_t Surf::memory_needed(int max_width, int max_height) noexcept {
-  return detail::IntegralImage::memory_needed(max_width, max_height) +
-         static_cast<std::size_t>(std::max(0, max_width)) * kLayers * kRows * sizeof(float) +
-         2 * kCacheLine;
-}
-
 Surf::Surf(int max_width, int max_height, Arena& arena)
     : max_width_(std::max(0, max_width)),
       max_height_(std::max(0, max_height)),
@@ -114,7 +108,6 @@ bool Surf::refine(const Octave& octave, int layer, int column, int row,
   p->x = static_cast<float>(x + top.x() * octave.step);
   p->y = static_cast<float>(y + top.y() * octave.step);
   p->scale = kSigmaOfSize * static_cast<float>(size + size_top * octave.size_step());
-  p->angle = 0;
   p->response = static_cast<float>(centre);
   p->dark = detail::box_hessian(sums_, x, y, size).trace() > 0;
   return true;
@@ -149,15 +142,10 @@ int Surf::scan_octave(const Octave& octave, const SurfOptions& options,
 int Surf::detect(const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept {
   out->clear();
   int found = 0;
-  const int octaves = std::clamp(options.octaves, 1, kMaxSurfOctaves);
-  for (int o = 0; o < octaves; ++o)
+  for (int o = 0; o < kOctaves; ++o)
     found += scan_octave(Octave(o, sums_.width(), sums_.height()), options, out);
   std::sort(out->begin(), out->end(), stronger);
   return found;
-}
-
-void Surf::orient(std::span<SurfPoint> points) const noexcept {
-  for (SurfPoint& p : points) p.angle = detail::surf_orientation(sums_, p.x, p.y, p.scale);
 }
 
 void Surf::describe(std::span<const SurfPoint> points,

@@ -11,14 +11,12 @@
 
 namespace vergence::features {
 
-/// A blob with its size and direction.
+/// A blob with its size.
 struct SurfPoint {
   /// Sub-pixel position; pixel centres are at integer coordinates.
   float x = 0, y = 0;
   /// Scale s in px: sigma of the Gaussian whose second derivatives fit best.
   float scale = 0;
-  /// Direction in rad, x towards y; 0 if upright.
-  float angle = 0;
   /// Determinant of the box Hessian, in grey levels².
   float response = 0;
   /// Sign of the Laplacian: true if dark on a bright background.
@@ -30,11 +28,7 @@ struct SurfDescriptor {
   alignas(16) std::array<float, 64> values{};
 };
 
-inline constexpr int kMaxSurfOctaves = 4;
-
 struct SurfOptions {
-  /// Number of octaves, 1 … kMaxSurfOctaves: scales up to 3, 6, 12, 24 px.
-  int octaves = 3;
   /// Minimum response, in grey levels².
   float min_response = 4;
   /// Mask of the image; may be null.
@@ -50,10 +44,10 @@ enum class SurfStatus : std::uint8_t {
 };
 
 /// Speeded-up robust features: detects blobs by the determinant of a box Hessian and describes them
-/// by sums of Haar wavelets.
+/// by sums of Haar wavelets, upright: for cameras that roll less than about 15°.
 ///
 /// Source     Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 110 (2008). Boxes
-///            of 3 (k 2^o + 1) px in octave o = 1, 2, … with k = 1 … 4, sampled every 2^(o−1) px;
+///            of 3 (k 2^o + 1) px in octave o = 1, 2, 3 with k = 1 … 4, sampled every 2^(o−1) px;
 ///            maxima of the two inner sizes. They are refined by one parabola in x and y and one in
 ///            size; the paper's joint one is biased by up to a tenth of a step.
 /// Ownership  Only sums over the image are kept. The caller owns points and descriptors.
@@ -66,25 +60,21 @@ enum class SurfStatus : std::uint8_t {
 class Surf {
  public:
   Surf() noexcept = default;
-  /// Throws std::length_error if the arena is full.
   Surf(int max_width, int max_height, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
   /// Sets the image. If the result is not `ok`, there is no image.
   [[nodiscard]] SurfStatus set_image(const ImageView& image) noexcept;
 
-  /// Detects the upright points of the image, strongest first. Returns their number, which exceeds
+  /// Detects the points of the image, strongest first. Returns their number, which exceeds
   /// out->size() if some did not fit.
   int detect(const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept;
-
-  /// Sets each point's direction from its neighbourhood. Upright points are more distinct and
-  /// faster, for cameras that roll less than about 15°.
-  void orient(std::span<SurfPoint> points) const noexcept;
 
   /// Precondition: as many descriptors as points.
   void describe(std::span<const SurfPoint> points, std::span<SurfDescriptor> out) const noexcept;
 
  private:
+  // Number of octaves: scales up to 3, 6 and 12 px.
+  static constexpr int kOctaves = 3;
   // Number of sizes per octave.
   static constexpr int kLayers = 4;
   // Number of neighbouring rows of each size.

@@ -9,32 +9,22 @@
 namespace vergence::features {
 namespace {
 
+// Maximum ratio of the best to the second best distance (Lowe 2004).
+constexpr float kMaxRatio = 0.8F;
+// Maximum distance; that of unrelated descriptors is about 0.8.
+constexpr float kMaxDistance = 0.6F;
 constexpr float kNone = std::numeric_limits<float>::infinity();
 
 /// True unless the descriptor is zero, as those of all flat neighbourhoods are.
 bool described(const SurfDescriptor& d) noexcept { return detail::squared_distance(d, {}) > 0.5F; }
 
-/// Epipolar line of a left point, a x + b y + c = 0 with a² + b² = 1; all zero if it has no
-/// direction, so that every point is on it.
-Vec3 epipolar_line(const EpipolarBand* band, const SurfPoint& p) noexcept {
-  if (band == nullptr) return Vec3::Zero();
-  const Vec3 line = band->F * Vec3(static_cast<double>(p.x), static_cast<double>(p.y), 1.0);
-  const double length = line.head<2>().norm();
-  return length > 0 ? Vec3(line / length) : Vec3(Vec3::Zero());
-}
-
 }  // namespace
-
-std::size_t SurfMatcher::memory_needed(std::size_t capacity) noexcept {
-  return 2 * (capacity * sizeof(Best) + kCacheLine);
-}
 
 SurfMatcher::SurfMatcher(std::size_t capacity, Arena& arena)
     : left_(arena.make<Best>(capacity, "matches of left blobs")),
       right_(arena.make<Best>(capacity, "matches of right blobs")) {}
 
-void SurfMatcher::compare(const SurfView& left, const SurfView& right,
-                          const EpipolarBand* band) noexcept {
+void SurfMatcher::compare(const SurfView& left, const SurfView& right) noexcept {
   for (std::size_t j = 0; j < right.points.size(); ++j)
     right_[j] = {0, kNone, kNone, described(right.descriptors[j])};
   for (std::size_t i = 0; i < left.points.size(); ++i) {
@@ -42,15 +32,9 @@ void SurfMatcher::compare(const SurfView& left, const SurfView& right,
     Best& mine = left_[i];
     mine = {0, kNone, kNone, described(left.descriptors[i])};
     if (!mine.described) continue;
-    const Vec3 line = epipolar_line(band, p);
-    const auto far = [&](const SurfPoint& q) noexcept {
-      return band != nullptr &&
-             !(std::abs(line.x() * static_cast<double>(q.x) + line.y() * static_cast<double>(q.y) +
-                        line.z()) <= band->px);
-    };
     for (std::size_t j = 0; j < right.points.size(); ++j) {
       Best& yours = right_[j];
-      if (!yours.described || p.dark != right.points[j].dark || far(right.points[j])) continue;
+      if (!yours.described || p.dark != right.points[j].dark) continue;
       const float square = detail::squared_distance(left.descriptors[i], right.descriptors[j]);
       if (square < yours.square) {
         yours.square = square;
@@ -68,7 +52,6 @@ void SurfMatcher::compare(const SurfView& left, const SurfView& right,
 }
 
 SurfMatchStatus SurfMatcher::match(const SurfView& left, const SurfView& right,
-                                   const SurfMatchOptions& options, const EpipolarBand* band,
                                    BoundedVector<SurfMatch>* out) noexcept {
   out->clear();
   if (left.points.size() != left.descriptors.size() ||
@@ -76,14 +59,12 @@ SurfMatchStatus SurfMatcher::match(const SurfView& left, const SurfView& right,
     return SurfMatchStatus::invalid_input;
   if (left.points.size() > left_.size() || right.points.size() > right_.size())
     return SurfMatchStatus::capacity;
-  compare(left, right, band);
-  const float most = options.max_distance * options.max_distance,
-              ratio = options.ratio * options.ratio;
+  compare(left, right);
   for (std::size_t i = 0; i < left.points.size() && !out->full(); ++i) {
     const Best& mine = left_[i];
     // The negated comparisons also reject infinity and NaN.
-    if (!(mine.square <= most) || !(mine.square < ratio * mine.second) ||
-        right_[mine.partner].partner != i)
+    if (!(mine.square <= kMaxDistance * kMaxDistance) ||
+        !(mine.square < kMaxRatio * kMaxRatio * mine.second) || right_[mine.partner].partner != i)
       continue;
     (void)out->push({static_cast<std::uint32_t>(i), mine.partner, std::sqrt(mine.square)});
   }

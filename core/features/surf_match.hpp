@@ -3,7 +3,6 @@
 #include <span>
 
 #include "core/features/surf.hpp"
-#include "core/math/types.hpp"
 
 namespace vergence::features {
 
@@ -17,21 +16,6 @@ struct SurfMatch {
   std::uint32_t left = 0, right = 0;
   /// Euclidean distance of unit vectors, 0 … 2.
   float distance = 0;
-};
-
-/// Band of width ±px around a left point's epipolar line, in which its partner must be:
-/// pixel_rightᵀ F pixel_left = 0. F is for the points' pixels; a lens with distortion needs a wider
-/// band.
-struct EpipolarBand {
-  Mat3 F = Mat3::Zero();
-  double px = 0;
-};
-
-struct SurfMatchOptions {
-  /// Maximum ratio of the best to the second best distance.
-  float ratio = 0.8F;
-  /// Maximum distance; that of unrelated descriptors is about 0.8.
-  float max_distance = 0.6F;
 };
 
 enum class SurfMatchStatus : std::uint8_t {
@@ -49,19 +33,16 @@ enum class SurfMatchStatus : std::uint8_t {
 /// Threads    One caller.
 /// Memory     From the arena at construction. If the output is full, matches of the last left
 ///            points are dropped.
-/// Time       About 64 multiplications per pair of points of equal sign (in the band).
+/// Time       About 64 multiplications per pair of points of equal sign.
 /// Errors     If the result is not `ok`, *out is empty.
 class SurfMatcher {
  public:
   SurfMatcher() noexcept = default;
-  /// `capacity`: maximum number of points in either image. Throws std::length_error if the arena is
-  /// full.
+  /// `capacity`: maximum number of points in either image.
   SurfMatcher(std::size_t capacity, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
 
-  /// Matches are in the order of the left points. `band` may be null.
+  /// Matches are in the order of the left points.
   [[nodiscard]] SurfMatchStatus match(const SurfView& left, const SurfView& right,
-                                      const SurfMatchOptions& options, const EpipolarBand* band,
                                       BoundedVector<SurfMatch>* out) noexcept;
 
  private:
@@ -71,7 +52,7 @@ class SurfMatcher {
     float square = 0, second = 0;
     bool described = false;
   };
-  void compare(const SurfView& left, const SurfView& right, const EpipolarBand* band) noexcept;
+  void compare(const SurfView& left, const SurfView& right) noexcept;
 
   std::span<Best> left_, right_;
 };

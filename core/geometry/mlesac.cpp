@@ -38,14 +38,6 @@ int samples_needed(double inliers, int size, double confidence, int cap) noexcep
   return n >= cap ? cap : std::max(1, static_cast<int>(std::ceil(n)));
 }
 
-std::size_t RigMlesac::memory_needed(std::size_t capacity) noexcept {
-  const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
-  const std::size_t camera =
-      7 * (n * sizeof(float) + kCacheLine) + n * sizeof(std::uint32_t) + n + 2 * kCacheLine;
-  return static_cast<std::size_t>(kMaxCameras) * camera + capacity + kCacheLine +
-         detail::PoseProblem::memory_needed(capacity);
-}
-
 RigMlesac::RigMlesac(std::size_t capacity, Arena& arena)
     : problem_(capacity, arena, kWho), flags_(arena.make<std::uint8_t>(capacity, kWho)) {
   const std::size_t n = detail::padded(capacity, detail::kFloatBlock);

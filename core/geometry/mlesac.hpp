@@ -63,7 +63,6 @@ struct MlesacPose {
 ///            result, on every instruction set.
 class RigMlesac {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   /// `capacity`: maximum number of points. Throws std::length_error if the arena is full.
   RigMlesac(std::size_t capacity, Arena& arena);
 

@@ -25,11 +25,6 @@ bool RigObservations::usable(std::size_t i, int camera) const noexcept {
          std::isfinite(sigma[i]);
 }
 
-std::size_t RigObservationTable::memory_needed(std::size_t capacity) noexcept {
-  const std::size_t arrays = 5 + 2 * static_cast<std::size_t>(kMaxCameras);
-  return arrays * (capacity * sizeof(double) + kCacheLine);
-}
-
 RigObservationTable::RigObservationTable(std::size_t capacity, Arena& arena)
     : x_(arena.make<double>(capacity, "rig observations")),
       y_(arena.make<double>(capacity, "rig observations")),

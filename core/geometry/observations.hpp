@@ -46,7 +46,6 @@ struct RigObservations {
 /// Owns the arrays of RigObservations in an arena; refilled every frame.
 class RigObservationTable {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   RigObservationTable(std::size_t capacity, Arena& arena);
 
   /// Clears the points; keeps the rig.

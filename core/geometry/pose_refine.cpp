@@ -35,12 +35,6 @@ constexpr double kMaxCondition = 1e12;
 
 }  // namespace
 
-std::size_t PoseRefiner::memory_needed(std::size_t capacity) noexcept {
-  return detail::PoseProblem::memory_needed(capacity) +
-         static_cast<std::size_t>(kMaxCameras) * capacity * sizeof(double) + capacity +
-         2 * kCacheLine;
-}
-
 PoseRefiner::PoseRefiner(std::size_t capacity, Arena& arena)
     : problem_(capacity, arena, kWho),
       sorted_(arena.make<double>(static_cast<std::size_t>(kMaxCameras) * capacity, kWho)),
@@ -142,6 +136,7 @@ void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& op
   std::fill_n(flags_.begin(), points_, std::uint8_t{0});
   const double limit = options.inlier_chi2 * pose->scale * pose->scale;
   double sum_px2 = 0;
+  int agreeing = 0;
   for (int k = 0; k < problem_.cameras(); ++k) {
     const std::span<const double> errors = problem_.errors(k);
     for (std::size_t i = 0; i < errors.size(); ++i) {
@@ -149,13 +144,12 @@ void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& op
       const std::size_t p = problem_.point(k, i);
       flags_[p] = static_cast<std::uint8_t>(flags_[p] | (1U << k));
       sum_px2 += errors[i] * o.sigma[p] * o.sigma[p];
-      ++pose->inlier_observations;
+      ++agreeing;
     }
   }
   for (std::size_t i = 0; i < points_; ++i)
     pose->inliers += flags_[i] != 0 && flags_[i] == o.seen[i] ? 1 : 0;
-  if (pose->inlier_observations > 0)
-    pose->rms_px = std::sqrt(sum_px2 / (2.0 * pose->inlier_observations));
+  if (agreeing > 0) pose->rms_px = std::sqrt(sum_px2 / (2.0 * agreeing));
 }
 
 RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start,
@@ -194,13 +188,6 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
   const Mat6 unit = d.asDiagonal() * out.information * d.asDiagonal();
   const Vec6 scaled = semidefinite_eigenvalues(unit);
   if (!(scaled[5] > scaled[0] / kMaxCondition)) return out;
-  const Mat6 covariance = d.asDiagonal() * Cholesky<6>(unit).inverse() * d.asDiagonal();
-  const auto worst = [&covariance](int at) noexcept {
-    const Mat3 block = covariance.block<3, 3>(at, at);
-    return std::sqrt(semidefinite_eigenvalues(block)[0]);
-  };
-  out.rotation_sigma = worst(0);
-  out.translation_sigma = worst(3);
   out.usable = true;
   return out;
 }

@@ -34,13 +34,6 @@ struct RefinedPose {
   Transform T_left_world{};
   /// Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m), X_left ← Exp(φ) X_left + τ.
   Mat6 information = Mat6::Zero();
-  /// Standard deviation of the rotation in its worst direction, in rad, marginalised over the
-  /// translation.
-  double rotation_sigma = 0;
-  /// Standard deviation of the camera position in its worst direction, in metres, marginalised over
-  /// the rotation; large values mean weak geometry.
-  double translation_sigma = 0;
-
   /// Robust residual scale in input sigmas, ≥ min_scale.
   double scale = 1;
   /// Root mean square of the inliers' residuals, per coordinate.
@@ -48,7 +41,6 @@ struct RefinedPose {
 
   /// Number of points with every usable observation below the χ² threshold.
   int inliers = 0;
-  int inlier_observations = 0;
   int observations = 0;
   int steps = 0;
 };
@@ -72,7 +64,6 @@ struct RefinedPose {
 ///            instruction set.
 class PoseRefiner {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   /// `capacity`: maximum number of points. Throws std::length_error if the arena is full.
   PoseRefiner(std::size_t capacity, Arena& arena);
 

@@ -51,12 +51,6 @@ constexpr double kMaxCondition = 1e12;
 
 }  // namespace
 
-std::size_t StereoMlesac::memory_needed(std::size_t capacity) noexcept {
-  const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
-  return n * (6 * sizeof(float) + 4 * sizeof(Vec2) + sizeof(double) + sizeof(std::uint32_t) + 2) +
-         14 * kCacheLine;
-}
-
 StereoMlesac::StereoMlesac(std::size_t capacity, Arena& arena) {
   const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
   for (std::span<float>* column : {&x1_, &y1_, &x2_, &y2_, &weight_, &cap_})
@@ -111,8 +105,8 @@ double StereoMlesac::score(const Mat3& E, double best) const noexcept {
   return cost;
 }
 
-bool StereoMlesac::transform_from_essential(const Mat3& E, double cap, double baseline,
-                                            Transform* T) noexcept {
+bool StereoMlesac::best_transform(const Mat3& E, double cap, double baseline,
+                                  Transform* T) noexcept {
   std::size_t n = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const Vec3 x = left_[i].homogeneous(), y = right_[i].homogeneous();
@@ -200,7 +194,7 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
       const Mat3& E = found.E[static_cast<std::size_t>(j)];
       const double cost = score(E, best);
       Transform T;
-      if (!(cost < best) || !transform_from_essential(E, cap, baseline, &T)) continue;
+      if (!(cost < best) || !best_transform(E, cap, baseline, &T)) continue;
       best = cost;
       Transform better = T;
       if (polished < kMaxPolished && polish(cap, &better)) {
@@ -209,7 +203,7 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
         // better E.
         const Mat3 E_better = essential_matrix(better);
         const double polished_cost = score(E_better, best);
-        if (polished_cost < best && transform_from_essential(E_better, cap, baseline, &better))
+        if (polished_cost < best && best_transform(E_better, cap, baseline, &better))
           best = polished_cost, T = better;
       }
       out.found = true;

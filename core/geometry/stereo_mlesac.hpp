@@ -56,7 +56,6 @@ struct StereoEstimate {
 /// RigMlesac.
 class StereoMlesac {
  public:
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   /// `capacity`: maximum number of matches. Throws std::length_error if the arena is full.
   StereoMlesac(std::size_t capacity, Arena& arena);
 
@@ -76,8 +75,8 @@ class StereoMlesac {
   [[nodiscard]] double score(const Mat3& E, double best) const noexcept;
   /// Chooses the transform of E that has most of the matches explained by E in front. Returns false
   /// if there is none.
-  [[nodiscard]] bool transform_from_essential(const Mat3& E, double cap, double baseline,
-                                              Transform* T) noexcept;
+  [[nodiscard]] bool best_transform(const Mat3& E, double cap, double baseline,
+                                    Transform* T) noexcept;
   [[nodiscard]] bool polish(double cap, Transform* T) const noexcept;
   /// `gradient`: −Σ J r/σ².
   [[nodiscard]] Mat5 information(double cap, const Transform& T, Vec5* gradient) const noexcept;

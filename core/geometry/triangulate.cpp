@@ -16,6 +16,11 @@ constexpr double kConverged = 1e-12;
 // Minimum of Σ (∂ray/∂ρ)² in m²; below it the cameras are within nanometres.
 constexpr double kMinParallaxGain = 1e-18;
 
+// Maximum number of Gauss–Newton steps; two or three are usual.
+constexpr int kMaxSteps = 5;
+// Minimum ratio of the inverse depth to its sigma.
+constexpr double kMinSignificance = 3;
+
 struct Reduced {
   Mat3 H;
   Vec3 g;
@@ -81,8 +86,7 @@ struct Reduced {
 
 }  // namespace
 
-TriangulatedPoint triangulate(std::span<const RayView> views,
-                              const TriangulateOptions& options) noexcept {
+TriangulatedPoint triangulate(std::span<const RayView> views) noexcept {
   TriangulatedPoint out;
   if (!valid(views)) return out;
   const RayView& first = views.front();
@@ -97,7 +101,7 @@ TriangulatedPoint triangulate(std::span<const RayView> views,
     out.inverse_depth = abr[2];
     return out;
   }
-  for (int step = 0; step < options.max_steps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const Cholesky<3> llt(now.H);
     if (!llt.ok()) break;
     const Vec3 delta = llt.solve(now.g);
@@ -119,15 +123,15 @@ TriangulatedPoint triangulate(std::span<const RayView> views,
   out.inverse_depth = abr[2];
   out.inverse_depth_sigma = std::sqrt(S(2, 2));
   const double rho = abr[2], sigma = out.inverse_depth_sigma;
-  if (rho < -options.min_significance * sigma) {
+  if (rho < -kMinSignificance * sigma) {
     out.status = TriangulateStatus::behind;
     return out;
   }
   const Transform T_world_first = first.T_camera_world.inverse();
-  if (rho < options.min_significance * sigma) {
+  if (rho < kMinSignificance * sigma) {
     out.status = TriangulateStatus::no_parallax;
-    out.p_world = T_world_first * Vec3(Vec3(abr[0], abr[1], 1.0) /
-                                       (std::max(rho, 0.0) + options.min_significance * sigma));
+    out.p_world = T_world_first *
+                  Vec3(Vec3(abr[0], abr[1], 1.0) / (std::max(rho, 0.0) + kMinSignificance * sigma));
     return out;
   }
   out.status = TriangulateStatus::ok;

@@ -29,13 +29,6 @@ enum class TriangulateStatus : std::uint8_t {
   invalid_input,
 };
 
-struct TriangulateOptions {
-  /// Maximum number of Gauss–Newton steps; two or three are usual.
-  int max_steps = 5;
-  /// Minimum ratio of the inverse depth to its sigma.
-  double min_significance = 3;
-};
-
 struct TriangulatedPoint {
   TriangulateStatus status = TriangulateStatus::invalid_input;
   /// Position in metres, for ok and no_parallax only.
@@ -56,7 +49,6 @@ struct TriangulatedPoint {
 /// Parameters (a, b, ρ): the point (a, b, 1)/ρ of the first view's frame; view i sees h = R_i (a,
 /// b, 1) + ρ t_i, its ray is h_xy/h_z, which stays regular for a point at infinity (J. Montiel, J.
 /// Civera, A. Davison, RSS 2006). Pure. Errors by status; results are never NaN.
-[[nodiscard]] TriangulatedPoint triangulate(std::span<const RayView> views,
-                                            const TriangulateOptions& options) noexcept;
+[[nodiscard]] TriangulatedPoint triangulate(std::span<const RayView> views) noexcept;
 
 }  // namespace vergence

@@ -31,17 +31,6 @@ Vec3 log_so3(const Mat3& R) noexcept {
 
 double rotation_angle(const Mat3& R) noexcept { return log_so3(R).norm(); }
 
-Mat3 left_jacobian_so3(const Vec3& phi) noexcept {
-  const double theta2 = phi.squaredNorm();
-  const Mat3 K = skew(phi);
-  if (theta2 < 1e-8) return Mat3::Identity() + (0.5 - theta2 / 24.0) * K + K * K / 6.0;
-  const double theta = std::sqrt(theta2);
-  // 1 − cos θ = 2 sin²(θ/2) keeps its precision at small angles.
-  const double s = std::sin(0.5 * theta);
-  return Mat3::Identity() + 2.0 * s * s / theta2 * K +
-         (theta - std::sin(theta)) / (theta2 * theta) * K * K;
-}
-
 Mat32 tangent_basis(const Vec3& unit) noexcept {
   int least = 0;
   (void)unit.cwiseAbs().minCoeff(&least);

@@ -23,9 +23,6 @@ namespace vergence {
 /// Angle of a rotation, rad, in [0, π].
 [[nodiscard]] double rotation_angle(const Mat3& R) noexcept;
 
-/// Left Jacobian: Exp(φ + δ) ≈ Exp(Jl(φ) δ) Exp(φ).
-[[nodiscard]] Mat3 left_jacobian_so3(const Vec3& phi) noexcept;
-
 /// Two unit vectors that span the plane perpendicular to a unit vector, deterministically.
 [[nodiscard]] Mat32 tangent_basis(const Vec3& unit) noexcept;
 

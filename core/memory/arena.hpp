@@ -1,16 +1,13 @@
 #pragma once
 #include <algorithm>
-#include <cassert>
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <new>
 #include <span>
-#include <stdexcept>
-#include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace vergence {
@@ -24,29 +21,21 @@ struct ArenaRow {
   std::size_t bytes = 0;
 };
 
-/// All memory of the real-time path, allocated once at start and never returned in parts.
+/// All memory of the real-time path, taken at start and returned only as a whole.
 ///
-///     Arena arena(odometry::Map::memory_needed());
+///     Arena arena;
 ///     odometry::Map map(10, arena);  // 10 keyframes
 ///     for (const ArenaRow& row : arena.rows()) use(row.name, row.bytes);
 ///
 /// Ownership  The arena owns the bytes; objects in it live as long as the arena.
 /// Threads    One thread, during initialisation.
-/// Memory     Reserved as zero pages, which become resident when first written, so that unused
-///            capacity costs address space only. The program can lock all of it
-///            (realtime.lock_memory), which makes it resident.
-/// Errors     Throws std::length_error with the requester's name if full, and std::bad_alloc; at
-///            construction only.
+/// Memory     Taken from the heap as zero pages, which become resident when first written, so that
+///            unused capacity costs address space only. Small requests share blocks of kBlock. The
+///            program can lock all of it (realtime.lock_memory), which makes it resident.
+/// Errors     Throws std::bad_alloc; at construction of the objects only.
 class Arena {
  public:
-  explicit Arena(std::size_t bytes)
-      : capacity_(bytes), storage_(std::calloc(bytes + kCacheLine, 1)) {
-    if (!storage_) throw std::bad_alloc();
-    void* first = storage_.get();
-    std::size_t space = bytes + kCacheLine;
-    begin_ = static_cast<std::byte*>(std::align(kCacheLine, bytes, first, space));
-  }
-
+  Arena() = default;
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
 
@@ -70,13 +59,15 @@ class Arena {
   }
 
   [[nodiscard]] std::size_t used() const noexcept { return used_; }
-  [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
   /// Bytes by name, in the order of their first request.
   [[nodiscard]] std::span<const ArenaRow> rows() const noexcept { return rows_; }
-  /// All bytes, to query the system for resident pages.
-  [[nodiscard]] std::span<const std::byte> bytes() const noexcept { return {begin_, capacity_}; }
 
  private:
+  // Size of a block in bytes; requests of more than a quarter have blocks of their own.
+  static constexpr std::size_t kBlock = std::size_t{1} << 22;
+  // Maximum size of a request, which no address space has.
+  static constexpr std::size_t kMaxBytes = std::size_t{1} << 62;
+
   struct Free {
     void operator()(void* p) const noexcept { std::free(p); }
   };
@@ -85,15 +76,28 @@ class Arena {
   [[nodiscard]] std::span<T> take(std::size_t n, const char* who) {
     static_assert(std::is_trivially_destructible_v<T>, "nothing in the arena is destroyed");
     static_assert(alignof(T) <= kCacheLine);
+    if (n > kMaxBytes / sizeof(T)) throw std::bad_alloc();
     const std::size_t bytes = (n * sizeof(T) + kCacheLine - 1) / kCacheLine * kCacheLine;
-    if (n > capacity_ / sizeof(T) || bytes > capacity_ - used_)
-      throw std::length_error(
-          std::string("arena full: ") + who + " asks for " + std::to_string(bytes) + " bytes, " +
-          std::to_string(capacity_ - used_) + " of " + std::to_string(capacity_) + " are left");
-    T* first = reinterpret_cast<T*>(begin_ + used_);
+    std::byte* const first = place(bytes);
     used_ += bytes;
     count(who, bytes);
-    return {first, n};
+    return {reinterpret_cast<T*>(first), n};
+  }
+
+  [[nodiscard]] std::byte* place(std::size_t bytes) {
+    if (bytes > kBlock / 4) return allocate(bytes);
+    if (bytes > left_) {
+      next_ = allocate(kBlock);
+      left_ = kBlock;
+    }
+    left_ -= bytes;
+    return std::exchange(next_, next_ + bytes);
+  }
+  [[nodiscard]] std::byte* allocate(std::size_t bytes) {
+    std::size_t space = bytes + kCacheLine;
+    void* first = blocks_.emplace_back(std::calloc(space, 1)).get();
+    if (first == nullptr) throw std::bad_alloc();
+    return static_cast<std::byte*>(std::align(kCacheLine, bytes, first, space));
   }
 
   /// Returns true if a value-initialised T is all zero bytes; constructs one at `at`, which is
@@ -118,10 +122,11 @@ class Arena {
       rows_.push_back({who, bytes});
   }
 
-  std::size_t capacity_;
+  std::vector<std::unique_ptr<void, Free>> blocks_;
+  // Rest of the newest shared block.
+  std::byte* next_ = nullptr;
+  std::size_t left_ = 0;
   std::size_t used_ = 0;
-  std::unique_ptr<void, Free> storage_;
-  std::byte* begin_ = nullptr;
   std::vector<ArenaRow> rows_;
 };
 

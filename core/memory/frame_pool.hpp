@@ -19,7 +19,7 @@ using FrameSlot = std::uint16_t;
 /// Image memory of one size, allocated once: slots start on a cache line, rows are padded to whole
 /// cache lines.
 ///
-///     Arena arena(FramePool::memory_needed(752, 480, 4));
+///     Arena arena;
 ///     FramePool pool(752, 480, 4, arena);
 ///     if (const auto slot = pool.acquire()) {
 ///       fill(pool.writable(*slot), FramePool::stride(752));
@@ -34,8 +34,7 @@ using FrameSlot = std::uint16_t;
 /// Memory     From the arena in the constructor; no lock or system call afterwards.
 /// Full       Without a free slot acquire() returns nothing, and the caller's policy applies
 ///            (replay waits, live drops and counts).
-/// Errors     The constructor throws std::length_error if the arena is too small. Releasing a slot
-///            that is not acquired has no effect.
+/// Errors     Releasing a slot that is not acquired has no effect.
 class FramePool {
  public:
   /// 16 rig frames of four cameras; more only adds latency.
@@ -45,17 +44,14 @@ class FramePool {
   [[nodiscard]] static constexpr std::size_t stride(int width) noexcept {
     return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine;
   }
-  [[nodiscard]] static constexpr std::size_t memory_needed(int width, int height,
-                                                           std::size_t slots) noexcept {
-    return slots * stride(width) * static_cast<std::size_t>(height);
-  }
 
   /// Preconditions: width, height > 0; 0 < slots ≤ kMaxSlots.
   FramePool(int width, int height, std::size_t slots, Arena& arena)
       : width_(width),
         height_(height),
         slots_(slots),
-        bytes_(arena.make<std::uint8_t>(memory_needed(width, height, slots), "frame pool")) {
+        bytes_(arena.make<std::uint8_t>(slots * stride(width) * static_cast<std::size_t>(height),
+                                        "frame pool")) {
     assert(width > 0 && height > 0 && slots > 0 && slots <= kMaxSlots);
     for (std::size_t i = 0; i < slots; ++i) (void)free_.push(static_cast<FrameSlot>(i));
   }

@@ -2,14 +2,6 @@
 
 namespace vergence::odometry {
 
-std::size_t BlobMatcher::memory_needed(int max_width, int max_height) noexcept {
-  constexpr std::size_t kOfAnImage =
-      kMaxBlobs * (sizeof(features::SurfPoint) + sizeof(features::SurfDescriptor)) + 2 * kCacheLine;
-  return features::Surf::memory_needed(max_width, max_height) +
-         features::SurfMatcher::memory_needed(kMaxBlobs) + 2 * kOfAnImage +
-         kMaxBlobs * (sizeof(features::SurfMatch) + sizeof(RoughMatch)) + 2 * kCacheLine;
-}
-
 BlobMatcher::BlobMatcher(int max_width, int max_height, Arena& arena)
     : surf_(max_width, max_height, arena),
       matcher_(kMaxBlobs, arena),
@@ -25,9 +17,7 @@ BlobMatcher::BlobMatcher(int max_width, int max_height, Arena& arena)
 features::SurfView BlobMatcher::describe(const ImageView& image, const features::Mask* mask,
                                          std::size_t k) noexcept {
   if (surf_.set_image(image) != features::SurfStatus::ok) return {};
-  features::SurfOptions how;
-  how.mask = mask;
-  (void)surf_.detect(how, &points_[k]);
+  (void)surf_.detect({.mask = mask}, &points_[k]);
   const std::span<features::SurfDescriptor> descriptors = descriptors_[k].first(points_[k].size());
   surf_.describe(points_[k].span(), descriptors);
   return {points_[k].span(), descriptors};
@@ -39,7 +29,7 @@ std::span<const RoughMatch> BlobMatcher::match(const ImageView& left,
                                                const features::Mask* other_mask) noexcept {
   matches_.clear();
   const features::SurfView a = describe(left, left_mask, 0), b = describe(other, other_mask, 1);
-  if (matcher_.match(a, b, {}, nullptr, &found_) != features::SurfMatchStatus::ok) return {};
+  if (matcher_.match(a, b, &found_) != features::SurfMatchStatus::ok) return {};
   const auto pixel = [](const features::SurfPoint& p) noexcept {
     return Vec2(static_cast<double>(p.x), static_cast<double>(p.y));
   };

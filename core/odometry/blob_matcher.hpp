@@ -27,7 +27,6 @@ class BlobMatcher {
  public:
   BlobMatcher() noexcept = default;
   BlobMatcher(int max_width, int max_height, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
   /// Returns the matches, strongest left blob first; valid until the next call. A mask may be null.
   [[nodiscard]] std::span<const RoughMatch> match(const ImageView& left,

@@ -22,12 +22,6 @@ constexpr double kExtrapolatedTurn = 0.1;
 // Sigma of a vehicle's unseen acceleration, in m/s².
 constexpr double kUnknownAcceleration = 1;
 
-Mat3 skew(const Vec3& v) noexcept {
-  Mat3 S;
-  S << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return S;
-}
-
 /// Adjoint of T for perturbations δ = (τ, φ): Exp(δ') T = T Exp(δ), δ' = A δ.
 Mat6 adjoint(const Transform& T) noexcept {
   Mat6 A = Mat6::Zero();

@@ -9,13 +9,9 @@
 namespace vergence::odometry {
 namespace {
 
-// Margin of the image in pixels: half a window and one more.
-constexpr double kImageMargin = 9.0;
 // Minimum standard deviation of the coarsest level in grey levels; a lens cap's noise stays below
 // 2.
 constexpr float kMinStructure = 3.0F;
-// Noise of a pixel in grey levels, 1 sigma: rounding has 0.3, a sensor in daylight about one.
-constexpr double kGreyNoise = 1;
 // Margin of masks in pixels, so that no feature contains a masked pixel.
 constexpr int kMaskMargin = features::kWindow / 2 + 1;
 
@@ -43,39 +39,7 @@ bool shows_something(const FrontEnd::Fingerprint& f, const ImageView& image) noe
          static_cast<double>(kMinStructure * kMinStructure);
 }
 
-int largest_width(const RigCalibration& rig) noexcept {
-  int w = 0;
-  for (int k = 0; k < rig.cameras; ++k)
-    w = std::max(w, rig.intrinsics[static_cast<std::size_t>(k)].width);
-  return w;
-}
-
-int largest_height(const RigCalibration& rig) noexcept {
-  int h = 0;
-  for (int k = 0; k < rig.cameras; ++k)
-    h = std::max(h, rig.intrinsics[static_cast<std::size_t>(k)].height);
-  return h;
-}
-
 }  // namespace
-
-std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCalibration& rig,
-                                    std::span<const ImageView> masks) noexcept {
-  std::size_t bytes = 0;
-  for (const ImageView& mask : masks)
-    if (!mask.empty()) bytes += features::Mask::memory_needed(mask.width, mask.height);
-  for (int k = 0; k < rig.cameras; ++k) {
-    const Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
-    bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) +
-             kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
-  }
-  if (options.init_features != 0)
-    bytes += BlobMatcher::memory_needed(largest_width(rig), largest_height(rig));
-  const auto n = static_cast<std::size_t>(options.features);
-  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint) + sizeof(FreeMatch)) +
-         kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor) + sizeof(float)) +
-         7 * kCacheLine;
-}
 
 FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
                    PairRunner& runner, std::span<const ImageView> masks)
@@ -85,9 +49,12 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
       cameras_(rig.cameras),
       band_px_(options.band_px) {
   const auto n = static_cast<std::size_t>(options.features);
+  int width = 0, height = 0;
   for (int k = 0; k < cameras_; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const Intrinsics& c = rig.intrinsics[i];
+    width = std::max(width, c.width);
+    height = std::max(height, c.height);
     pyramids_[i] = features::Pyramid(c.width, c.height, options.pyramid_levels, arena);
     followed_[i] = arena.make<Followed>(kMaxPoints, "followed points");
     if (i < masks.size()) masks_[i] = features::Mask(masks[i], kMaskMargin, arena);
@@ -99,8 +66,7 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   distances_ = BoundedVector<float>(arena.make<float>(kMaxPoints, "distances to epipolar lines"));
   described_ = arena.make<features::Descriptor>(kMaxPoints, "descriptors");
   free_matches_ = BoundedVector<FreeMatch>(arena.make<FreeMatch>(n, "free matches"));
-  if (options.init_features != 0)
-    blobs_ = BlobMatcher(largest_width(rig), largest_height(rig), arena);
+  if (options.init_features != 0) blobs_ = BlobMatcher(width, height, arena);
   rebuild_lenses();
 }
 
@@ -125,17 +91,12 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     repeated[i] = structured[i] && f == fingerprints_[i];
     fingerprints_[i] = f;
   };
-  auto left = [&]() noexcept { build(0); };
-  auto others = [&]() noexcept {
-    for (int k = 1; k < cameras_; ++k) build(k);
-  };
-  runner_.run(TaskRef(left), TaskRef(others));
+  for_each_camera(build);
   ImageCheck check;
   bool renewed = false;
   for (int k = 0; k < cameras_; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    if (!frame.images[i].empty())
-      check.given = static_cast<std::uint8_t>(check.given | (1U << static_cast<unsigned>(k)));
+    if (!frame.images[i].empty()) add_camera(&check.given, k);
     // A copy of the left image from another camera is as impossible as a repeated image.
     if (k > 0 && structured[i] && fingerprints_[i] == fingerprints_[0]) {
       repeated[i] = true;
@@ -146,9 +107,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     // A repeated image of an additional camera is from another instant; the left camera's pose is
     // valid.
     if (k > 0 && repeated[i] && !repeated[0]) structured[i] = false;
-    if (structured[i])
-      check.structured =
-          static_cast<std::uint8_t>(check.structured | (1U << static_cast<unsigned>(k)));
+    if (structured[i]) add_camera(&check.structured, k);
   }
   check.left_repeated = repeated[0];
   check.uneven = check.repeated && renewed;
@@ -164,8 +123,9 @@ bool FrontEnd::finish(int k, const Vec2& raw, double by_noise, double parallax,
   f->found = true;
   f->raw = raw.cast<float>();
   f->ideal = ideal.cast<float>();
+  // A sensor in daylight has a noise of about one grey level, for which `by_noise` is.
   f->sigma = static_cast<float>(
-      std::hypot(options_.pixel_sigma, kGreyNoise * by_noise, options_.parallax_sigma * parallax) *
+      std::hypot(options_.pixel_sigma, by_noise, options_.parallax_sigma * parallax) *
       magnification);
   return true;
 }
@@ -174,7 +134,7 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
                                     const features::AlignOptions& how) const noexcept {
   Followed f;
   const auto i = static_cast<std::size_t>(k);
-  if (!placed(k)) return f;
+  if (!has_extrinsics(k)) return f;
   const Transform T_k_world = rig_.T_camera_left[i] * T_left_world;
   const Camera& camera = lenses_[i].raw();
   Vec2 predicted;
@@ -188,7 +148,7 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
   features::AlignResult a = features::align(p.patch, pyramids_[i], predicted, A, how);
   // From a good prediction the finest level suffices; otherwise try a coarser one, which has a
   // larger range.
-  if (a.status != features::AlignStatus::ok && how.coarsest == how.finest) {
+  if (a.status != features::AlignStatus::ok && how.coarsest == 0) {
     features::AlignOptions farther = how;
     ++farther.coarsest;
     farther.max_shift *= 2;
@@ -204,12 +164,13 @@ void FrontEnd::store(const Followed& f, int k, MapPoint* p) noexcept {
   p->raw[static_cast<std::size_t>(k)] = f.raw;
 }
 
-void FrontEnd::follow_into_all(Map& map, const Transform& T_left_world,
-                               const features::AlignOptions& how, int stride) noexcept {
+void FrontEnd::follow_into_all(Map& map, const Transform& T_left_world, int coarsest,
+                               float max_shift, int stride) noexcept {
+  const features::AlignOptions how{.coarsest = coarsest, .max_shift = max_shift};
   const std::span<MapPoint> points = map.points();
   const auto one = [&](int k) noexcept {
     const auto c = static_cast<std::size_t>(k);
-    const bool structured = ((structured_ >> static_cast<unsigned>(k)) & 1U) != 0;
+    const bool structured = has_camera(structured_, k);
     int active = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       followed_[c][i].found = false;
@@ -218,11 +179,7 @@ void FrontEnd::follow_into_all(Map& map, const Transform& T_left_world,
       followed_[c][i] = follow(points[i], T_left_world, k, how);
     }
   };
-  auto left = [&]() noexcept { one(0); };
-  auto others = [&]() noexcept {
-    for (int k = 1; k < cameras_; ++k) one(k);
-  };
-  runner_.run(TaskRef(left), TaskRef(others));
+  for_each_camera(one);
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].now.cameras = 0;
     for (int k = 0; k < cameras_; ++k)
@@ -235,21 +192,13 @@ void FrontEnd::follow_sample(Map& map, const Transform& T_left_world, int sample
                              int coarsest) noexcept {
   int active = 0;
   for (const MapPoint& p : map.points()) active += p.stage == PointStage::active ? 1 : 0;
-  features::AlignOptions how;
-  how.coarsest = coarsest;
-  how.finest = 0;
-  how.min_zncc = kMayMatch;
-  how.max_shift = static_cast<float>(8 << coarsest);
   // Use a stride of at least 2, because stride 1 would include the candidates.
-  follow_into_all(map, T_left_world, how, std::max(2, active / std::max(sample, 1)));
+  follow_into_all(map, T_left_world, coarsest, static_cast<float>(8 << coarsest),
+                  std::max(2, active / std::max(sample, 1)));
 }
 
 void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
-  features::AlignOptions how;
-  how.coarsest = how.finest = 0;
-  how.min_zncc = kMayMatch;
-  how.max_shift = 4.F;
-  follow_into_all(map, T_left_world, how, 1);
+  follow_into_all(map, T_left_world, 0, 4.F, 1);
 }
 
 }  // namespace vergence::odometry

@@ -18,6 +18,10 @@
 
 namespace vergence::odometry {
 
+/// Margin of the image in px, in which points are not followed: half a row of a window in memory,
+/// and one more.
+inline constexpr double kImageMargin = features::kWindowStride / 2 + 1;
+
 /// Checks of the images of one frame.
 struct ImageCheck {
   /// Bit k is set if camera k delivered an image.
@@ -75,9 +79,6 @@ class FrontEnd {
   /// 0. Missing or empty masks hide nothing.
   FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
            PairRunner& runner, std::span<const ImageView> masks = {});
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
-                                                 const RigCalibration& rig,
-                                                 std::span<const ImageView> masks = {}) noexcept;
 
   /// Builds the pyramids of a frame's images.
   [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;
@@ -104,10 +105,11 @@ class FrontEnd {
   /// the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
-  /// Detects new corners of `left` where `map` has no points (null: everywhere) and matches them in
-  /// stereo. `effort` limits their number, but not below `min_corners`.
-  [[nodiscard]] StereoCount match_new(const Map* map, const FrameWorkload& effort = {},
-                                      int min_corners = 0) noexcept;
+  /// Detects new corners of `left` where `map` has no points (null: everywhere). `effort` limits
+  /// their number, but not below `min_corners`.
+  void detect_new(const Map* map, const FrameWorkload& effort = {}, int min_corners = 0) noexcept;
+  /// Matches the corners of the last detect_new() in stereo.
+  [[nodiscard]] StereoCount match_new() noexcept;
   /// Evaluates the distances of this frame's points to the epipolar lines between the first two
   /// cameras.
   [[nodiscard]] EpipolarEvidence weigh_points(const Map& map) noexcept;
@@ -117,8 +119,11 @@ class FrontEnd {
 
   /// Returns true if the corners of the last match_new() fit the rig better with its cameras
   /// swapped. Discards the matches.
-  [[nodiscard]] bool exchanged() noexcept;
+  [[nodiscard]] bool swapped() noexcept;
 
+  [[nodiscard]] const std::array<UndistortedCamera, kMaxCameras>& lenses() const noexcept {
+    return lenses_;
+  }
   [[nodiscard]] const UndistortedCamera& lens(int k) const noexcept {
     return lenses_[static_cast<std::size_t>(k)];
   }
@@ -126,16 +131,8 @@ class FrontEnd {
   [[nodiscard]] bool hides(int k, const Vec2& pixel) const noexcept {
     return masks_[static_cast<std::size_t>(k)].hides(pixel);
   }
-  [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }
 
  private:
-  /// Minimum correlation of two windows to be compared further; the epipolar distance, the ratio to
-  /// the second best and later frames decide on the match. The value was the best over thirteen
-  /// sequences.
-  static constexpr float kMayMatch = 0.7F;
-  // Minimum cell size in pixels, the size of a window; corners nearer to each other share pixels.
-  static constexpr int kSmallestCell = 12;
-
   struct Followed {
     bool found = false;
     Eigen::Vector2f raw{}, ideal{};
@@ -156,16 +153,26 @@ class FrontEnd {
     Followed left, stereo;
   };
 
+  /// Calls f(k) for every camera, the left one in parallel with the others.
+  template <class F>
+  void for_each_camera(const F& f) noexcept {
+    auto left = [&]() noexcept { f(0); };
+    auto others = [&]() noexcept {
+      for (int k = 1; k < cameras_; ++k) f(k);
+    };
+    runner_.run(TaskRef(left), TaskRef(others));
+  }
   [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k,
                                 const features::AlignOptions& how) const noexcept;
-  void follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how,
+  /// Follows every stride-th active point, or with stride 1 every followed point.
+  void follow_into_all(Map& map, const Transform& T_left_world, int coarsest, float max_shift,
                        int stride) noexcept;
   /// Undistorts a raw pixel and sets its sigma. `by_noise`: AlignResult::sigma, in px per grey
   /// level. `parallax`: distance of this camera from where the patch was cut, over the depth there,
   /// which weights the effect of the patch's unknown slope.
   [[nodiscard]] bool finish(int k, const Vec2& raw, double by_noise, double parallax,
                             Followed* f) const noexcept;
-  void match_stereo(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
+  void match_stereo(const features::Corner& corner, bool swapped, NewPoint* out) const noexcept;
   [[nodiscard]] features::CornerOptions corner_options(int k) const noexcept;
   /// Finds corners of camera k four times as dense as points, so that most corners of the other
   /// image have a partner.
@@ -173,11 +180,13 @@ class FrontEnd {
   void match_corners_freely(int k) noexcept;
   /// Aligns a rough match and keeps it if that succeeds and there is room.
   void keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept;
-  void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
+  void match_all(std::span<const features::Corner> corners, bool swapped) noexcept;
+  /// Weighs `distances_`.
+  [[nodiscard]] EpipolarEvidence weigh_distances() noexcept;
   /// Weighs the epipolar distances of the matches whose disparity exceeds `min_disparity`.
   [[nodiscard]] EpipolarEvidence weigh(double min_disparity) noexcept;
   /// True if camera k's transform is known at least roughly; before, it is the identity.
-  [[nodiscard]] bool placed(int k) const noexcept {
+  [[nodiscard]] bool has_extrinsics(int k) const noexcept {
     return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0;
   }
   /// Mask of camera k, or null.
@@ -207,7 +216,6 @@ class FrontEnd {
   // Has no memory with init_features 0.
   BlobMatcher blobs_;
   double band_px_;
-  float detect_ms_ = 0;
 };
 
 }  // namespace vergence::odometry

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -10,50 +9,42 @@
 
 /// New points: corners of `left`, matched along their epipolar lines.
 namespace vergence::odometry {
-namespace {
-
-float milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
-  return std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-}  // namespace
-
 features::CornerOptions FrontEnd::corner_options(int k) const noexcept {
+  // The minimum cell has the size of a window; corners nearer to each other share pixels.
   // Number of cells per point: about half of the cells have no usable corner (sky, road).
   constexpr double kCellsAPoint = 1.6;
   const Intrinsics& c = rig_.intrinsics[0];
   features::CornerOptions how;
   how.cell = std::clamp(
       static_cast<int>(std::sqrt(c.width * c.height / (kCellsAPoint * options_.features))),
-      kSmallestCell, features::kMaxCell);
+      features::kWindow, features::kMaxCell);
   how.min_distance = 0.5F * static_cast<float>(how.cell);
   how.mask = mask(k);
   return how;
 }
 
-void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
+void FrontEnd::match_stereo(const features::Corner& corner, bool swapped,
                             NewPoint* out) const noexcept {
   out->usable = false;
   const Vec2 at(corner.x, corner.y);
   if (!features::cut_patch(pyramids_[0], at, &out->patch)) return;
   if (!finish(0, at, 0.0, 0.0, &out->left)) return;
   for (int k = 1; k < cameras_; ++k) {
-    if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0 || !placed(k)) continue;
+    if (!has_camera(structured_, k) || !has_extrinsics(k)) continue;
     const auto i = static_cast<std::size_t>(k);
     // With the cameras swapped, the first image is that of camera k.
-    const UndistortedCamera& here = lenses_[exchanged ? i : 0];
+    const UndistortedCamera& here = lenses_[swapped ? i : 0];
     if (!here.ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) continue;
     const Transform& T_k_left = rig_.T_camera_left[i];
-    const features::EpipolarCurve curve{&lenses_[exchanged ? 0 : i].raw(),
-                                        exchanged ? T_k_left.inverse() : T_k_left, out->ray};
+    const features::EpipolarCurve curve{&lenses_[swapped ? 0 : i].raw(),
+                                        swapped ? T_k_left.inverse() : T_k_left, out->ray};
     const double baseline = rig_.T_camera_left[i].t.norm();
-    features::EpipolarSearchOptions search;
-    search.level = 1;
-    search.band = std::max(1, static_cast<int>(std::lround(0.5 * band_px_)));
-    search.mask = mask(k);
     // Search over the width of the image; two cameras do not both see nearer points.
     const Intrinsics& lens = rig_.intrinsics[i];
-    search.rho_last = std::max(lens.width, lens.height) / (lens.fx * baseline);
+    const features::EpipolarSearchOptions search{
+        .rho_last = std::max(lens.width, lens.height) / (lens.fx * baseline),
+        .band = std::max(1, static_cast<int>(std::lround(0.5 * band_px_))),
+        .mask = mask(k)};
     const features::SearchResult s =
         features::search_along(out->patch, pyramids_[i], curve, search);
     if (s.status != features::SearchStatus::ok) continue;
@@ -61,10 +52,7 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
     Vec2 foot;
     Mat23 J;
     if (curve.at(rho, &foot, &J) != ProjectStatus::ok) continue;
-    features::AlignOptions how;
-    how.coarsest = 1;
-    how.min_zncc = kMayMatch;
-    how.max_shift = 6.F;
+    const features::AlignOptions how{.coarsest = 1, .max_shift = 6.F};
     // The curve's point is in units of depth 1, so the warp's depth is 1 too.
     const features::AlignResult a =
         features::align(out->patch, pyramids_[i], s.pixel,
@@ -87,23 +75,20 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
   }
 }
 
-void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchanged) noexcept {
+void FrontEnd::match_all(std::span<const features::Corner> corners, bool swapped) noexcept {
   const std::size_t half = corners.size() / 2;
   const auto some = [&](std::size_t begin, std::size_t end) noexcept {
-    for (std::size_t i = begin; i < end; ++i) match_stereo(corners[i], exchanged, &fresh_[i]);
+    for (std::size_t i = begin; i < end; ++i) match_stereo(corners[i], swapped, &fresh_[i]);
   };
   auto first = [&]() noexcept { some(0, half); };
   auto second = [&]() noexcept { some(half, corners.size()); };
   runner_.run(TaskRef(first), TaskRef(second));
 }
 
-StereoCount FrontEnd::match_new(const Map* map, const FrameWorkload& effort,
-                                int min_corners) noexcept {
-  StereoCount count;
+void FrontEnd::detect_new(const Map* map, const FrameWorkload& effort, int min_corners) noexcept {
   corners_.clear();
   // Without a left image the pyramid refers to the last one, whose memory may have been released.
-  if ((structured_ & 1U) == 0) return count;
-  const auto start = std::chrono::steady_clock::now();
+  if (!has_camera(structured_, 0)) return;
   taken_.clear();
   if (map != nullptr)
     for (const MapPoint& p : map->points())
@@ -114,7 +99,10 @@ StereoCount FrontEnd::match_new(const Map* map, const FrameWorkload& effort,
       std::max(min_corners,
                options_.features * effort.points_percent / 100 - static_cast<int>(taken_.size())));
   if (corners_.size() > room) corners_.truncate(room);
-  detect_ms_ = milliseconds_since(start);
+}
+
+StereoCount FrontEnd::match_new() noexcept {
+  StereoCount count;
 
   match_all(corners_.span(), false);
   count.corners = static_cast<int>(corners_.size());
@@ -127,13 +115,17 @@ StereoCount FrontEnd::match_new(const Map* map, const FrameWorkload& effort,
   return count;
 }
 
+EpipolarEvidence FrontEnd::weigh_distances() noexcept {
+  return weigh_epipolar_distances(distances_.span(), band_px_,
+                                  std::numbers::sqrt2 * options_.pixel_sigma);
+}
+
 EpipolarEvidence FrontEnd::weigh(double min_disparity) noexcept {
   distances_.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i)
     if (fresh_[i].usable && fresh_[i].disparity > min_disparity)
       (void)distances_.push(fresh_[i].distance);
-  return weigh_epipolar_distances(distances_.span(), band_px_,
-                                  std::numbers::sqrt2 * options_.pixel_sigma);
+  return weigh_distances();
 }
 
 EpipolarEvidence FrontEnd::weigh_points(const Map& map) noexcept {
@@ -149,11 +141,10 @@ EpipolarEvidence FrontEnd::weigh_points(const Map& map) noexcept {
     // it.
     if (off >= 0) (void)distances_.push(static_cast<float>(std::min(off, band_px_)));
   }
-  return weigh_epipolar_distances(distances_.span(), band_px_,
-                                  std::numbers::sqrt2 * options_.pixel_sigma);
+  return weigh_distances();
 }
 
-bool FrontEnd::exchanged() noexcept {
+bool FrontEnd::swapped() noexcept {
   const double as_given = weigh(kNearDisparity).log_likelihood_ratio;
   match_all(corners_.span(), true);
   const EpipolarEvidence other = weigh(kNearDisparity);

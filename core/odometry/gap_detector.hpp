@@ -19,9 +19,9 @@ class GapDetector {
  public:
   /// Call for every frame. Returns the seconds since the previous one; 0 for the first.
   [[nodiscard]] double since_frame(Stamp frame) noexcept {
-    const double since = any_ ? (frame - last_).to_seconds() : 0;
-    if (any_) intervals_[count_++ % kIntervals] = since;
-    any_ = true;
+    const double since = frames_ > 0 ? (frame - last_).to_seconds() : 0;
+    if (frames_ > 0) intervals_[(frames_ - 1) % kIntervals] = since;
+    ++frames_;
     last_ = frame;
     return since;
   }
@@ -47,7 +47,7 @@ class GapDetector {
 
   /// Median interval in seconds; gaps have no effect unless they are the majority.
   [[nodiscard]] double usual_interval() const noexcept {
-    const std::size_t n = std::min(count_, kIntervals);
+    const std::size_t n = std::min(std::max<std::size_t>(frames_, 1) - 1, kIntervals);
     if (n == 0) return 0;
     std::array<double, kIntervals> sorted = intervals_;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>((n - 1) / 2);
@@ -55,12 +55,11 @@ class GapDetector {
     return *middle;
   }
 
-  // True once there was a frame, at `last_`.
-  bool any_ = false;
+  // Stamp of the last frame.
   Stamp last_{};
   // In seconds.
   std::array<double, kIntervals> intervals_{};
-  std::size_t count_ = 0;
+  std::size_t frames_ = 0;
   // True if the newest frame came after a gap.
   bool before_ = false;
   bool due_ = false;

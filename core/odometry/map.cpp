@@ -42,14 +42,24 @@ void Map::drop_oldest_keyframe() noexcept {
   }
 }
 
-std::size_t Map::make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept {
+std::size_t Map::make_keyframe(const Keyframe& keyframe) noexcept {
   if (order_.size() >= window_) drop_oldest_keyframe();
   std::size_t slot = 0;
   while (std::find(order_.begin(), order_.end(), slot) != order_.end()) ++slot;
   (void)order_.push(static_cast<std::uint8_t>(slot));
-  keyframes_[slot] = {T_left_world, {}, stamp};
+  keyframes_[slot] = keyframe;
   for (MapPoint& p : points_) p.seen[slot].cameras = 0;
   return slot;
+}
+
+int Map::observe(std::size_t slot) noexcept {
+  int seen = 0;
+  for (MapPoint& p : points_) {
+    if (!p.followed()) continue;
+    p.seen[slot] = p.now;
+    seen += p.now.by(0) ? 1 : 0;
+  }
+  return seen;
 }
 
 void Map::scale_about(const Vec3& centre, double factor) noexcept {

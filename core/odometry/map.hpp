@@ -21,6 +21,14 @@ inline constexpr double kNearDisparity = 3.0;
 // Depth in baselines of a point whose disparity is within the noise of zero.
 inline constexpr double kFarBaselines = 2000.0;
 
+/// Sets of cameras: bit k stands for camera k.
+[[nodiscard]] inline bool has_camera(std::uint8_t set, int k) noexcept {
+  return ((set >> static_cast<unsigned>(k)) & 1U) != 0;
+}
+inline void add_camera(std::uint8_t* set, int k) noexcept {
+  *set = static_cast<std::uint8_t>(*set | (1U << static_cast<unsigned>(k)));
+}
+
 /// Observations of a point in one rig frame: pixels of an ideal pinhole camera with each camera's
 /// own K, distortion removed.
 struct PointObservation {
@@ -30,13 +38,11 @@ struct PointObservation {
   /// Bit k is set if camera k saw the point.
   std::uint8_t cameras = 0;
 
-  [[nodiscard]] bool by(int k) const noexcept {
-    return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0;
-  }
+  [[nodiscard]] bool by(int k) const noexcept { return has_camera(cameras, k); }
   void set(int k, const Vec2& at, float s) noexcept {
     pixel[static_cast<std::size_t>(k)] = at.cast<float>();
     sigma[static_cast<std::size_t>(k)] = s;
-    cameras = static_cast<std::uint8_t>(cameras | (1U << static_cast<unsigned>(k)));
+    add_camera(&cameras, k);
   }
   void drop(int k) noexcept {
     cameras = static_cast<std::uint8_t>(cameras & ~(1U << static_cast<unsigned>(k)));
@@ -88,7 +94,7 @@ struct MapPoint {
   std::array<PointObservation, kMaxWindow> seen{};
 
   /// True if the position is accurate enough to constrain poses.
-  [[nodiscard]] bool holds_poses() const noexcept {
+  [[nodiscard]] bool constrains_poses() const noexcept {
     return stage == PointStage::active || stage == PointStage::dormant;
   }
   [[nodiscard]] bool followed() const noexcept {
@@ -109,9 +115,6 @@ class Map {
  public:
   Map(std::size_t window, Arena& arena)
       : points_(arena.make<MapPoint>(kMaxPoints, "map points")), window_(window) {}
-  [[nodiscard]] static std::size_t memory_needed() noexcept {
-    return kMaxPoints * sizeof(MapPoint) + 2 * kCacheLine;
-  }
 
   void clear() noexcept;
   /// Returns a cleared free slot, or null if there is none.
@@ -122,7 +125,10 @@ class Map {
   void rewind(std::size_t cursor) noexcept { next_point_ = cursor; }
   /// Returns the slot of a new keyframe without observations; drops the oldest one if the window is
   /// full.
-  [[nodiscard]] std::size_t make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept;
+  [[nodiscard]] std::size_t make_keyframe(const Keyframe& keyframe) noexcept;
+  /// Stores the followed points' current observations in a keyframe. Returns the number of points
+  /// that the left camera saw.
+  int observe(std::size_t slot) noexcept;
   /// Scales points, keyframes and baselines by `factor` about a point of the world.
   void scale_about(const Vec3& centre, double factor) noexcept;
   /// Changes the world frame: poses become T_left_world · T_old_new, and points follow.

@@ -10,31 +10,13 @@
 
 namespace vergence::odometry {
 
-using detail::kNearEnough;
-using detail::kRigidShare;
-using detail::StageClock;
-using detail::weakness;
-
 namespace {
 
 // Number of frames without new points after which some are tried. A standing rig makes no keyframe,
 // and it also seems to stand next to a truck at its own speed.
 constexpr int kFramesUntilTrial = 3;
-// Number of trial points regardless of the time budget; enough for an evaluation.
-constexpr int kTrialPoints = 40;
-constexpr int kFramesLostBeforeRestart = 3;
-// Band in px for unlinked cameras, whose transform is only measured in this frame.
-constexpr double kUnlinkedBand = 4.0;
 
 }  // namespace
-
-std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCalibration& rig,
-                                    std::span<const ImageView> masks) noexcept {
-  const auto n = static_cast<std::size_t>(options.features);
-  return FrontEnd::memory_needed(options, rig, masks) + Map::memory_needed() +
-         WindowAdjuster::memory_needed(options, rig) + PoseEstimator::memory_needed() +
-         RigInitialiser::memory_needed(n);
-}
 
 Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known,
                    Arena& arena, PairRunner& runner, std::span<const ImageView> masks)
@@ -48,7 +30,6 @@ Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bo
       poses_(options, rig_, arena),
       initialiser_(static_cast<std::size_t>(options.features), options.seed, arena) {
   if (known) return;
-  link_ = Link::unlinked;
   unlink();
   reset_extrinsics();
 }
@@ -60,7 +41,8 @@ void Odometry::unlink() noexcept {
   link_ = Link::unlinked;
   gaps_.clear_renewal();
   next_rig_.reset();
-  front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
+  // The transform is only measured in this frame, with about the error of a calibration.
+  front_end_.set_band(2 * options_.band_px);
 }
 
 bool Odometry::wants_keyframe() const noexcept {
@@ -90,18 +72,14 @@ double Odometry::renew_scale(std::size_t slot) noexcept {
 
 void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  const std::size_t slot = map_.make_keyframe(motion_.T_left_world(), stamp);
-  map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
-  for (MapPoint& p : map_.points())
-    if (p.followed()) p.seen[slot] = p.now;
-  WindowOutcome window;
-  if (link_ == Link::linked) {
-    window = window_.adjust(map_, out->effort);
-    if (window.usable)
-      std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
+  const std::size_t slot = map_.make_keyframe({motion_.T_left_world(), rig_.T_camera_left, stamp});
+  (void)map_.observe(slot);
+  const bool linked = link_ == Link::linked;
+  const WindowOutcome window = window_.adjust(map_, linked, out->effort);
+  if (linked) {
+    if (window.usable) rig_.T_camera_left = window_.T_camera_left();
     out->corrected = map_.keyframe(slot).T_left_world * motion_.T_left_world().inverse();
   } else {
-    window = window_.adjust_unlinked(map_, out->effort);
     out->scale = renew_scale(slot);
     rig_.T_camera_left = map_.keyframe(slot).T_camera_left;
   }
@@ -110,23 +88,17 @@ void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
   budget_.add_window_time(static_cast<double>(clock.mark(Stage::window)),
                           static_cast<int>(keyframes), window.steps);
   budget_.add_points_time(new_points(0, out), out->effort);
-  keyframe_points_ = 0;
-  for (MapPoint& p : map_.points()) {
-    if (!p.followed()) continue;
-    p.seen[slot] = p.now;
-    if (p.now.by(0)) ++keyframe_points_;
-  }
+  keyframe_points_ = map_.observe(slot);
   out->keyframe = true;
 }
 
 double Odometry::new_points(int min_corners, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  (void)front_end_.match_new(&map_, out->effort, min_corners);
+  front_end_.detect_new(&map_, out->effort, min_corners);
+  const float detect_ms = clock.mark(Stage::detect);
+  (void)front_end_.match_new();
   front_end_.add_points(motion_.T_left_world(), PointStage::candidate, &map_);
-  const float ms = clock.mark(Stage::match);
-  out->stage_ms[static_cast<std::size_t>(Stage::match)] -= front_end_.detect_ms();
-  out->stage_ms[static_cast<std::size_t>(Stage::detect)] += front_end_.detect_ms();
-  return static_cast<double>(ms);
+  return static_cast<double>(detect_ms + clock.mark(Stage::match));
 }
 
 void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
@@ -175,7 +147,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
       adopt(*std::exchange(next_rig_, std::nullopt));
       out.relinked = true;
     }
-    begin_scene(frame, images, predicted, dt, &out);
+    begin_map(frame, images, predicted, dt, &out);
     return out;
   }
 
@@ -185,7 +157,11 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     out.reason = of_images != Reason::none ? of_images
                  : out.gap_s > 0           ? Reason::time_gap
                                            : Reason::no_pose;
-    if (images.structured != 0 && ++frames_lost_ >= kFramesLostBeforeRestart) lose_scene();
+    if (images.structured != 0 && ++frames_lost_ > kMissesAllowed) {
+      map_.clear();
+      // Without a calibration the rig must be initialised again.
+      if (link_ == Link::unlinked) reset_extrinsics();
+    }
     return out;
   }
   settle_points(fit);
@@ -220,7 +196,8 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     cursor_before_trial_ = map_.cursor();
     frames_untried_ = 0;
     out.effort.points_percent = effort.points_percent;
-    (void)new_points(kTrialPoints, &out);
+    // As many points as an `ok` pose needs suffice for an evaluation, whatever the time budget.
+    (void)new_points(options_.ok_inliers, &out);
   }
   return out;
 }

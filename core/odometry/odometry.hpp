@@ -113,9 +113,6 @@ class Odometry {
   /// and the first suitable pair initialises the cameras, unlinked. `masks`: see FrontEnd.
   Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena,
            PairRunner& runner, std::span<const ImageView> masks = {});
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
-                                                 const RigCalibration& rig,
-                                                 std::span<const ImageView> masks = {}) noexcept;
 
   /// Estimates the pose of one frame. If it would take longer than `budget`, work is left out in
   /// WorkBudget's order; zero means no limit. A replayed frame with a recorded workload repeats it.
@@ -153,6 +150,8 @@ class Odometry {
   [[nodiscard]] PoseFit fit(const Transform& start, bool sample) noexcept;
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
                               FrameOutcome* out) noexcept;
+  /// True if camera k should see a point of its own frame.
+  [[nodiscard]] bool in_view(int k, const Vec3& p_camera) const noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
   /// Estimates the pose from all map points, without a prediction. Dormant points are followed
   /// again and marked in *revived.
@@ -168,22 +167,17 @@ class Odometry {
   double new_points(int min_corners, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
-  [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp,
-                                 FrameOutcome* out) noexcept;
-  void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
-                   double dt, FrameOutcome* out) noexcept;
-  /// Rebuilds the map from the newest frame at its pose. Returns false if that fails; the old map
-  /// is kept.
-  bool renew_scene(FrameOutcome* out) noexcept;
+  [[nodiscard]] bool start_map(const Transform& T_left_world, Stamp stamp,
+                               FrameOutcome* out) noexcept;
+  void begin_map(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
+                 double dt, FrameOutcome* out) noexcept;
   void adopt(const RigCalibration& rig) noexcept;
   /// Changes to a calibration and keeps the map: undistorts the window's pixels with the new
   /// intrinsics, triangulates points again, and keeps the newest pose. Returns false if this
   /// frame's matches do not fit the calibration.
-  [[nodiscard]] bool reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept;
+  [[nodiscard]] bool reexpress_map(const RigCalibration& rig, double* points_kept) noexcept;
   /// Changes back to the previous calibration if a map can be built with it.
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
-  /// Discards the map; without a calibration the rig must be initialised again.
-  void lose_scene() noexcept;
   void assess_frame(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
 
   const OdometryOptions& options_;

@@ -10,38 +10,18 @@
 /// Tracking: the pose of a frame from the map's points.
 namespace vergence::odometry {
 
-using detail::kRigidShare;
-using detail::StageClock;
-
 namespace {
 
-// Number of points followed from a rough prediction: enough for MLESAC, a third of the work.
-constexpr int kSample = 100;
-// Minimum number of inliers of a good prediction. Three points determine a pose; five more of
-// thirty, found within 32 px, agree with it to half a pixel by chance once in 10¹⁰ hypotheses.
-constexpr int kSampleInliers = 8;
-// Minimum share of found points that agree.
-constexpr double kSampleShare = 0.3;
 // Minimum share if no attempt does better; a wrong calibration leaves a quarter of the far points.
 constexpr double kMinSampleShare = 0.2;
-// Maximum rms residual in px, however many points agree.
+// Maximum rms residual in px, however many points agree; on a motorway wrong poses have such ones.
 constexpr double kSampleResidual = 3.0;
-// Minimum number of points that agree on a pose; of rough matches 8 do by chance.
-constexpr int kRelocaliseInliers = 15;
-// Minimum share of points in view that must be found again if the motion was not tracked.
-constexpr double kRecognisedShare = 0.5;
-// Margin of the image in px, in which a patch does not fit.
-constexpr double kBorder = 12.0;
-// Minimum share of the points in view of additional cameras that they must see.
-constexpr double kSeenAcross = 0.3;
-// Maximum number of consecutive frames for which a point may be hidden.
-constexpr std::uint8_t kMissesAllowed = 2;
 // Number of rig frames, so four images, before a point constrains poses.
 constexpr std::uint16_t kFoundEnough = 2;
 
 /// True if the pose of the sample is accurate enough to follow all points from it.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
-  return fit.inliers >= kSampleInliers && fit.inliers > share * fit.given &&
+  return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given &&
          fit.rms_px < kSampleResidual;
 }
 
@@ -67,12 +47,13 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   PoseFit best;
   for (const Attempt& a :
        {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&motion_.T_left_world(), 3}}) {
-    front_end_.follow_sample(map_, *a.start, kSample, a.coarsest);
+    // A quarter of the points is enough for MLESAC, for a third of the work.
+    front_end_.follow_sample(map_, *a.start, options_.features / 4, a.coarsest);
     clock.mark(Stage::track);
     fit = this->fit(*a.start, true);
     clock.mark(Stage::pose);
     if (sample_agrees(fit, kMinSampleShare) && fit.inliers > best.inliers) best = fit;
-    if (sample_agrees(fit, kSampleShare)) break;
+    if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
   bool unreliable = frames_lost_ > 0 || out->gap_s > 0;
@@ -89,8 +70,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   fit = this->fit(coarse, false);
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
   // Facades look alike: a place is recognised only if most points in view are found.
-  if (unreliable && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
-    fit.found = false;
+  if (unreliable && fit.inliers < kMajority * points_in_view(fit.T_left_world)) fit.found = false;
   // If they stayed active, they would count as missing in the next attempt.
   for (std::size_t i = 0; !fit.found && i < map_.points().size(); ++i)
     if (revived[i]) map_.points()[i].stage = PointStage::dormant;
@@ -100,27 +80,25 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
 
 void Odometry::recover_cameras(const PoseFit& fit) noexcept {
   for (int k = 1; k < rig_.cameras; ++k) {
-    if (((fit.cameras >> static_cast<unsigned>(k)) & 1U) != 0 ||
-        front_end_.relocalise(map_, k) < kRelocaliseInliers)
-      continue;
+    if (has_camera(fit.cameras, k) || front_end_.relocalise(map_, k) < kCameraAlone) continue;
     Transform& T_camera_left = rig_.T_camera_left[static_cast<std::size_t>(k)];
     Transform T_camera_world;
-    if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, true, &T_camera_world))
-      continue;
+    if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, &T_camera_world)) continue;
     T_camera_left = T_camera_world * fit.T_left_world.inverse();
   }
 }
 
+bool Odometry::in_view(int k, const Vec3& p_camera) const noexcept {
+  Vec2 pixel;
+  const Camera& camera = front_end_.lens(k).raw();
+  return camera.project(p_camera, &pixel, nullptr) == ProjectStatus::ok &&
+         camera.inside(pixel, kImageMargin) && !front_end_.hides(k, pixel);
+}
+
 int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
   int n = 0;
-  for (const MapPoint& p : map_.points()) {
-    Vec2 pixel;
-    const Camera& camera = front_end_.lens(0).raw();
-    if (p.stage == PointStage::active &&
-        camera.project(T_left_world * p.p_world, &pixel, nullptr) == ProjectStatus::ok &&
-        camera.inside(pixel, kBorder) && !front_end_.hides(0, pixel))
-      ++n;
-  }
+  for (const MapPoint& p : map_.points())
+    if (p.stage == PointStage::active && in_view(0, T_left_world * p.p_world)) ++n;
   return n;
 }
 
@@ -130,10 +108,10 @@ PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived
   const int candidates = front_end_.relocalise(map_, 0);
   clock.mark(Stage::match);
   PoseFit fit;
-  if (candidates < kRelocaliseInliers) return fit;
+  if (candidates < kCameraAlone) return fit;
   fit = this->fit(motion_.T_left_world(), true);
   clock.mark(Stage::pose);
-  fit.found = fit.inliers >= kRelocaliseInliers;
+  fit.found = fit.inliers >= kCameraAlone;
   if (!fit.found) return fit;
   out->relocalised = true;
   // Points that are not found are dropped as usual.
@@ -150,28 +128,23 @@ PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived
 void Odometry::count_across(const PoseFit& fit) noexcept {
   int expected = 0, seen = 0;
   for (MapPoint& p : map_.points()) {
-    if (!p.holds_poses() || !p.now.by(0)) continue;
+    if (!p.constrains_poses() || !p.now.by(0)) continue;
     const bool now = std::popcount(p.now.cameras) > 1;
-    bool in_view = now;
-    for (int k = 1; k < rig_.cameras && !in_view; ++k) {
-      Vec2 pixel;
-      const Camera& camera = front_end_.lens(k).raw();
-      in_view = camera.project(rig_.T_camera_left[static_cast<std::size_t>(k)] *
-                                   (fit.T_left_world * p.p_world),
-                               &pixel, nullptr) == ProjectStatus::ok &&
-                camera.inside(pixel, kBorder) && !front_end_.hides(k, pixel);
-    }
-    expected += p.across && in_view ? 1 : 0;
+    bool visible = now;
+    for (int k = 1; k < rig_.cameras && !visible; ++k)
+      visible = in_view(
+          k, rig_.T_camera_left[static_cast<std::size_t>(k)] * (fit.T_left_world * p.p_world));
+    expected += p.across && visible ? 1 : 0;
     seen += p.across && now ? 1 : 0;
     p.across = p.across || now;
   }
-  stereo_fails_ = link_ == Link::linked && seen < kSeenAcross * expected;
+  stereo_fails_ = link_ == Link::linked && seen < kMinSeenAgain * expected;
 }
 
 void Odometry::settle_points(const PoseFit& fit) noexcept {
   for (MapPoint& p : map_.points()) p.in_images = p.now.cameras;
   for (std::size_t i = 0; i < map_.points().size(); ++i)
-    if (map_.points()[i].holds_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
+    if (map_.points()[i].constrains_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
   count_across(fit);
   int tried = 0, kept = 0;
   for (MapPoint& p : map_.points()) {
@@ -207,7 +180,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     else if (p.missed > kMissesAllowed)
       p.stage = PointStage::dormant;
   }
-  const bool few_fit = fit.inliers < kRigidShare * fit.given, few_kept = 2 * kept < tried;
+  const bool few_fit = fit.inliers < kRigidShare * fit.given, few_kept = kept < kMajority * tried;
   const bool others = (few_fit || few_kept) && poses_.others_move(map_, fit.T_left_world);
   others_move_ = few_fit && others;
   new_points_.add(tried, others ? kept : tried);

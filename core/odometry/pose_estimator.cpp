@@ -12,32 +12,13 @@
 namespace vergence::odometry {
 namespace {
 
-// Minimum share of points found in two cameras in which both must agree with the pose.
-constexpr double kStereoShare = 0.5;
-// Minimum number of inliers of a camera that supports the pose.
-constexpr int kCameraHolds = 8;
-// Minimum number of inliers of a camera's own pose.
-constexpr int kCameraAlone = 12;
 // Maximum ratio of matches to inliers; wrong matches agree by chance.
 constexpr int kByChance = 4;
-
-/// Zero if the observations do not determine the pose.
-Mat6 covariance_of(const RefinedPose& pose) noexcept {
-  const Cholesky<6> factor(pose.information);
-  if (!factor.ok()) return Mat6::Zero();
-  return factor.inverse();
-}
 
 }  // namespace
 
 bool PoseFit::confirmed_stereo() const noexcept {
-  return std::popcount(cameras) >= 2 && stereo >= kStereoShare * stereo_found;
-}
-
-std::size_t PoseEstimator::memory_needed() noexcept {
-  return RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) +
-         PoseRefiner::memory_needed(kMaxPoints) + kMaxPoints * (sizeof(std::uint16_t) + 2) +
-         3 * kCacheLine;
+  return std::popcount(cameras) >= 2 && stereo >= kMajority * stereo_found;
 }
 
 PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibration& rig,
@@ -52,53 +33,43 @@ PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibratio
       agrees_all_(arena.make<std::uint8_t>(kMaxPoints, "pose flags of all cameras")),
       random_(options.seed) {}
 
-bool PoseEstimator::collect_point(const Map& map, std::size_t i, std::uint8_t cameras) noexcept {
-  const MapPoint& p = map.points()[i];
-  if (!table_.push(p.p_world, p.now.sigma[static_cast<std::size_t>(std::countr_zero(cameras))]))
-    return false;
-  for (int k = 0; k < rig_.cameras; ++k)
-    if (((cameras >> static_cast<unsigned>(k)) & 1U) != 0)
-      table_.see(k, p.now.pixel[static_cast<std::size_t>(k)].cast<double>());
-  return owner_.push(static_cast<std::uint16_t>(i));
-}
-
-void PoseEstimator::collect(const Map& map) noexcept {
-  table_.set_rig(rig_);
-  table_.clear();
-  owner_.clear();
-  for (std::size_t i = 0; i < map.points().size(); ++i) {
-    const MapPoint& p = map.points()[i];
-    if (p.holds_poses() && p.now.cameras != 0 && !collect_point(map, i, p.now.cameras)) return;
-  }
-}
-
-bool PoseEstimator::others_move(const Map& map, const Transform& T_left_world) noexcept {
-  table_.set_rig(rig_);
-  table_.clear();
-  owner_.clear();
-  for (std::size_t i = 0; i < map.points().size(); ++i) {
-    const MapPoint& p = map.points()[i];
-    if (p.in_images != 0 && p.now.cameras == 0 && !collect_point(map, i, p.in_images)) break;
-  }
-  return holds_camera(solve(T_left_world, true));
-}
-
-void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
-  const auto c = static_cast<std::size_t>(k);
-  RigCalibration one;
-  one.cameras = 1;
-  one.intrinsics[0] = rig_.intrinsics[c];
-  table_.set_rig(one);
+template <class CamerasOf>
+void PoseEstimator::collect(const Map& map, const RigCalibration& rig, int first,
+                            CamerasOf cameras_of) noexcept {
+  table_.set_rig(rig);
   table_.clear();
   owner_.clear();
   const std::span<const MapPoint> points = map.points();
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const MapPoint& p = points[i];
-    if (!p.holds_poses() || !p.now.by(k)) continue;
-    if (!table_.push(p.p_world, p.now.sigma[c])) return;
-    table_.see(0, p.now.pixel[c].cast<double>());
+    const PointObservation& now = points[i].now;
+    const std::uint8_t cameras = cameras_of(points[i]);
+    if (cameras == 0) continue;
+    if (!table_.push(points[i].p_world,
+                     now.sigma[static_cast<std::size_t>(std::countr_zero(cameras))]))
+      return;
+    for (int k = 0; k < rig_.cameras; ++k)
+      if (has_camera(cameras, k))
+        table_.see(k - first, now.pixel[static_cast<std::size_t>(k)].cast<double>());
     (void)owner_.push(static_cast<std::uint16_t>(i));
   }
+}
+
+bool PoseEstimator::others_move(const Map& map, const Transform& T_left_world) noexcept {
+  collect(map, rig_, 0, [](const MapPoint& p) noexcept {
+    return p.now.cameras == 0 ? p.in_images : std::uint8_t{0};
+  });
+  return supports_camera(solve(T_left_world, true));
+}
+
+void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
+  RigCalibration one;
+  one.cameras = 1;
+  one.intrinsics[0] = rig_.intrinsics[static_cast<std::size_t>(k)];
+  collect(map, one, k, [k](const MapPoint& p) noexcept {
+    std::uint8_t cameras = 0;
+    if (p.constrains_poses() && p.now.by(k)) add_camera(&cameras, k);
+    return cameras;
+  });
 }
 
 PoseRefineOptions PoseEstimator::how_to_refine(bool rough) const noexcept {
@@ -109,26 +80,26 @@ PoseRefineOptions PoseEstimator::how_to_refine(bool rough) const noexcept {
   return o;
 }
 
-PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) noexcept {
+PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample,
+                                           std::span<const std::uint8_t> used) noexcept {
   Solved s;
   if (table_.size() < 3) return s;
   s.T = start;
   if (sample) {
-    MlesacOptions how;
-    how.max_hypotheses = options_.mlesac_hypotheses;
+    const MlesacOptions how{.max_hypotheses = options_.mlesac_hypotheses};
     const MlesacPose m = mlesac_.solve(table_.view(), how, &start, random_);
     if (!m.found) return s;
     s.T = m.T_left_world;
   }
-  const RefinedPose r = refiner_.refine(table_.view(), s.T,
-                                        sample ? mlesac_.flags() : std::span<const std::uint8_t>{},
-                                        how_to_refine(sample));
+  const RefinedPose r =
+      refiner_.refine(table_.view(), s.T, sample ? mlesac_.flags() : used, how_to_refine(sample));
   if (!r.usable) return s;
   s.found = true;
   s.T = r.T_left_world;
   s.rms_px = r.rms_px;
   s.inliers = r.inliers;
-  s.covariance = covariance_of(r);
+  // It stays zero if the observations do not determine the pose.
+  if (const Cholesky<6> factor(r.information); factor.ok()) s.covariance = factor.inverse();
   return s;
 }
 
@@ -137,13 +108,14 @@ void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
   const std::span<const MapPoint> points = map.points();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const MapPoint& p = points[i];
-    if (!p.holds_poses() || p.now.cameras == 0) continue;
+    if (!p.constrains_poses() || p.now.cameras == 0) continue;
     ++fit->given;
     if (std::popcount(p.now.cameras) > 1) ++fit->stereo_found;
     const std::uint8_t good = agrees_[i];
     if (good == 0) continue;
     ++fit->inliers;
-    for (int k = 0; k < rig_.cameras; ++k) held[static_cast<std::size_t>(k)] += (good >> k) & 1;
+    for (int k = 0; k < rig_.cameras; ++k)
+      held[static_cast<std::size_t>(k)] += has_camera(good, k) ? 1 : 0;
     if ((good & 1U) == 0 || (good & ~1U) == 0) continue;
     ++fit->stereo;
     const double z = (fit->T_left_world * p.p_world).z();
@@ -153,19 +125,23 @@ void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
       ++fit->near;
   }
   for (int k = 0; k < rig_.cameras; ++k)
-    if (held[static_cast<std::size_t>(k)] >= kCameraHolds)
-      fit->cameras = static_cast<std::uint8_t>(fit->cameras | (1U << static_cast<unsigned>(k)));
+    if (held[static_cast<std::size_t>(k)] >= kMinAgreeing) add_camera(&fit->cameras, k);
   // A single camera measures no depth and creates no points, so more inliers are required.
   fit->found = fit->inliers >=
                (std::popcount(fit->cameras) < 2 ? options_.ok_inliers : options_.min_inliers);
 }
 
-PoseFit PoseEstimator::fit_linked(const Map& map, const Transform& start, bool sample) noexcept {
+PoseFit PoseEstimator::fit_all(const Map& map, const Transform& start, bool sample,
+                               bool left_only) noexcept {
+  collect(map, rig_, 0, [](const MapPoint& p) noexcept {
+    return p.constrains_poses() ? p.now.cameras : std::uint8_t{0};
+  });
   PoseFit fit;
-  collect(map);
   fit.T_left_world = start;
   std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
-  const Solved s = solve(start, sample);
+  std::array<std::uint8_t, kMaxPoints> left;
+  left.fill(1);
+  const Solved s = solve(start, sample, std::span(left).first(left_only ? table_.size() : 0));
   if (s.found) {
     fit.T_left_world = s.T;
     fit.rms_px = s.rms_px;
@@ -176,25 +152,13 @@ PoseFit PoseEstimator::fit_linked(const Map& map, const Transform& start, bool s
   return fit;
 }
 
+PoseFit PoseEstimator::fit_linked(const Map& map, const Transform& start, bool sample) noexcept {
+  return fit_all(map, start, sample, false);
+}
+
 PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept {
-  PoseFit fit;
-  fit.T_left_world = start;
   Transform T;
-  if (!fit_camera(map, 0, start, true, &T)) return fit;
-  collect(map);
-  std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
-  std::array<std::uint8_t, kMaxPoints> left;
-  left.fill(1);
-  const RefinedPose r =
-      refiner_.refine(table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()),
-                      how_to_refine(false));
-  if (!r.usable) return fit;
-  fit.T_left_world = r.T_left_world;
-  fit.rms_px = r.rms_px;
-  fit.covariance = covariance_of(r);
-  for (std::size_t i = 0; i < owner_.size(); ++i) agrees_[owner_[i]] = refiner_.flags()[i];
-  count(map, &fit);
-  return fit;
+  return fit_camera(map, 0, start, &T) ? fit_all(map, T, false, true) : PoseFit{};
 }
 
 PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
@@ -206,15 +170,15 @@ PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
   return all;
 }
 
-bool PoseEstimator::holds_camera(const Solved& s) const noexcept {
+bool PoseEstimator::supports_camera(const Solved& s) const noexcept {
   return s.inliers >= kCameraAlone && kByChance * s.inliers >= static_cast<int>(owner_.size());
 }
 
-bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start, bool sample,
+bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start,
                                Transform* T_camera_world) noexcept {
   collect_camera(map, k);
-  const Solved s = solve(start, sample);
-  if (!holds_camera(s)) return false;
+  const Solved s = solve(start, true);
+  if (!supports_camera(s)) return false;
   *T_camera_world = s.T;
   return true;
 }
@@ -230,15 +194,13 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
     const auto c = static_cast<std::size_t>(k);
     collect_camera(map, k);
     const Solved s = solve(T_camera_left[c] * (k == 0 ? start : fit.T_left_world), sample);
-    if (!holds_camera(s)) {
+    if (!supports_camera(s)) {
       // The rig's pose needs the left camera's.
       if (k == 0) break;
       continue;
     }
     for (std::size_t i = 0; i < owner_.size(); ++i)
-      if (refiner_.flags()[i] != 0)
-        agrees_[owner_[i]] =
-            static_cast<std::uint8_t>(agrees_[owner_[i]] | (1U << static_cast<unsigned>(k)));
+      if (refiner_.flags()[i] != 0) add_camera(&agrees_[owner_[i]], k);
     if (k == 0) {
       fit.T_left_world = s.T;
       fit.covariance = s.covariance;
@@ -250,7 +212,7 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
   }
   fit.rms_px = cameras == 0 ? 0.0 : std::sqrt(squares / cameras);
   count(map, &fit);
-  if ((fit.cameras & 1U) == 0) fit.found = false;
+  if (!has_camera(fit.cameras, 0)) fit.found = false;
   return fit;
 }
 

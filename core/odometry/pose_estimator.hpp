@@ -6,6 +6,15 @@
 
 namespace vergence::odometry {
 
+/// Share of what is expected above which evidence counts: a majority.
+inline constexpr double kMajority = 0.5;
+/// Minimum number of inliers that do not agree by chance. Three points determine a pose; five more
+/// of thirty, found within 32 px, agree with it to half a pixel once in 10¹⁰ hypotheses.
+inline constexpr int kMinAgreeing = 8;
+/// Minimum number of inliers of a pose that only one camera's observations, or rough matches,
+/// support; a few more than agree by chance.
+inline constexpr int kCameraAlone = 12;
+
 /// Pose of the rig from this frame's observations of the map, with its support.
 struct PoseFit {
   bool found = false;
@@ -37,7 +46,6 @@ struct PoseFit {
 class PoseEstimator {
  public:
   PoseEstimator(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed() noexcept;
 
   /// Fits the pose of linked cameras from `start`; with `sample` by MLESAC first, else by
   /// refinement alone.
@@ -54,8 +62,8 @@ class PoseEstimator {
   /// this frame's; a camera without a pose keeps its prediction.
   [[nodiscard]] PoseFit fit_unlinked(const Map& map, const Transform& start, bool sample,
                                      std::span<Transform> T_camera_left) noexcept;
-  /// Fits the pose T_camera_world of one camera. Returns false if none was found.
-  [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
+  /// Fits the pose T_camera_world of one camera by MLESAC. Returns false if none was found.
+  [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start,
                                 Transform* T_camera_world) noexcept;
 
   /// Call after settle_points(). Returns true if the points that do not fit the pose agree on
@@ -78,13 +86,20 @@ class PoseEstimator {
     double rms_px = 0;
     Mat6 covariance = Mat6::Zero();
   };
-  void collect(const Map& map) noexcept;
-  /// Adds a row to the table. Returns false if it is full.
-  bool collect_point(const Map& map, std::size_t i, std::uint8_t cameras) noexcept;
+  /// Fills the table with the observations of every point in the cameras that `cameras_of` selects
+  /// for it. `first`: number of the table's first camera.
+  template <class CamerasOf>
+  void collect(const Map& map, const RigCalibration& rig, int first, CamerasOf cameras_of) noexcept;
   void collect_camera(const Map& map, int k) noexcept;
-  [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
+  /// Refines `start` with the observations flagged in `used` (empty: all), or samples first.
+  [[nodiscard]] Solved solve(const Transform& start, bool sample,
+                             std::span<const std::uint8_t> used = {}) noexcept;
+  /// Fits the pose of linked cameras. With `left_only`, without sampling, the other cameras'
+  /// observations are only compared with the result.
+  [[nodiscard]] PoseFit fit_all(const Map& map, const Transform& start, bool sample,
+                                bool left_only) noexcept;
   /// Returns true if a camera's own pose, solved from all rows of the table, can be relied on.
-  [[nodiscard]] bool holds_camera(const Solved& s) const noexcept;
+  [[nodiscard]] bool supports_camera(const Solved& s) const noexcept;
   [[nodiscard]] PoseRefineOptions how_to_refine(bool rough) const noexcept;
   void count(const Map& map, PoseFit* fit) const noexcept;
 

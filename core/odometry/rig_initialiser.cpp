@@ -8,10 +8,6 @@ constexpr double kFreeMatchSigma = 2.0;
 
 }  // namespace
 
-std::size_t RigInitialiser::memory_needed(std::size_t capacity) noexcept {
-  return StereoMlesac::memory_needed(capacity) + 5 * (capacity * sizeof(double) + kCacheLine);
-}
-
 RigInitialiser::RigInitialiser(std::size_t capacity, std::uint64_t seed, Arena& arena)
     : mlesac_(capacity, arena), random_(seed) {
   for (std::span<double>& column : columns_)

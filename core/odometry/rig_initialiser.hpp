@@ -16,7 +16,6 @@ class RigInitialiser {
  public:
   /// `capacity`: maximum number of matches. `seed`: of the sampling.
   RigInitialiser(std::size_t capacity, std::uint64_t seed, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
 
   [[nodiscard]] StereoEstimate estimate(std::span<const FreeMatch> matches,
                                         const RigCalibration& rig) noexcept;

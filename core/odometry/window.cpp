@@ -8,7 +8,6 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr std::size_t kMaxWindowPoints = 1024;
 // Average number of observations per point over all cameras; more are left out.
 constexpr std::size_t kObservationsAPoint = 10;
 // Limit of the squared whitened residual with 2 degrees of freedom; Gaussian errors exceed it with
@@ -16,10 +15,6 @@ constexpr std::size_t kObservationsAPoint = 10;
 constexpr float kOutlier = 16.F;
 // Minimum number of observations that determine a pose.
 constexpr int kObservationsOfPose = 3;
-// Minimum depth of a point in every camera that sees it, in metres.
-constexpr double kMinDepthOfPoint = 0.05;
-// Depth in metres at which the calibration's depth error is evaluated.
-constexpr double kReferenceDepth = 20.0;
 // Sigma in rad and m of rig parameters that a window does not estimate.
 constexpr double kHeldSigma = 1e-6;
 // Inflation of a variance: an unmodelled lens field of 0.03 px does not average out over 2000
@@ -33,17 +28,11 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options,
   BundleCapacities c;
   c.cameras = static_cast<std::size_t>(rig.cameras);
   c.poses = static_cast<std::size_t>(options.window_keyframes * rig.cameras);
-  c.points = kMaxWindowPoints;
-  c.observations = kMaxWindowPoints * kObservationsAPoint;
+  // At most half of the map's points are old enough to be seen by two keyframes.
+  c.points = kMaxPoints / 2;
+  c.observations = c.points * kObservationsAPoint;
   c.shared = options.extrinsic_rotation_sigma_rad > 0;
   return c;
-}
-
-std::size_t WindowAdjuster::memory_needed(const OdometryOptions& options,
-                                          const RigCalibration& rig) noexcept {
-  const BundleCapacities c = capacities(options, rig);
-  return BundleAdjuster::memory_needed(c) + c.points * (sizeof(Vec3) + sizeof(std::uint16_t)) +
-         c.observations * (sizeof(BundleObservation) + sizeof(float)) + 8 * kCacheLine;
 }
 
 WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig,
@@ -80,8 +69,9 @@ void WindowAdjuster::set_rotation_prior() noexcept {
       return;
     }
     // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
-    const double known = 0.01 * calibration::depth_error_percent(rig_, k, kReferenceDepth) *
-                         t.norm() / kReferenceDepth;
+    const double known = 0.01 *
+                         calibration::depth_error_percent(rig_, k, calibration::kRatingDepth) *
+                         t.norm() / calibration::kRatingDepth;
     const double sigma = known > 0 ? std::min(known, options_.extrinsic_rotation_sigma_rad)
                                    : options_.extrinsic_rotation_sigma_rad;
     const Mat3 turn = sigma * sigma * axis.normalized() * axis.normalized().transpose() +
@@ -116,7 +106,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
   const std::span<MapPoint> all = map.points();
   for (std::size_t i = 0; i < all.size(); ++i) {
     const MapPoint& p = all[i];
-    if (!p.holds_poses()) continue;
+    if (!p.constrains_poses()) continue;
     const std::size_t first = observations_.size();
     int keyframes = 0;
     bool fits = !points_.full();
@@ -130,7 +120,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) 
         const std::size_t pose =
             linked ? frame - oldest_ : (frame - oldest_) * static_cast<std::size_t>(images) + c;
         const Vec3 here = poses_[pose] * p.p_world;
-        if ((linked ? rig_.T_camera_left[c] * here : here).z() < kMinDepthOfPoint) continue;
+        if ((linked ? rig_.T_camera_left[c] * here : here).z() < kMinDepth) continue;
         BundleObservation o;
         o.point = static_cast<std::uint32_t>(points_.size());
         o.pose = static_cast<std::uint16_t>(pose);
@@ -169,16 +159,11 @@ int WindowAdjuster::drop_outliers(Map& map) noexcept {
   return dropped;
 }
 
-WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
-                                    const FrameWorkload& effort) noexcept {
+WindowOutcome WindowAdjuster::solve(bool linked, const FrameWorkload& effort) noexcept {
   WindowOutcome outcome;
-  outcome.points = static_cast<int>(points_.size());
   outcome.observations = static_cast<int>(observations_.size());
   if (poses_.size() < 2 || points_.empty()) return outcome;
   T_camera_left_ = rig_.T_camera_left;
-  if (configuration == BundleConfiguration::stereo_odometry && rotations_free_)
-    configuration = BundleConfiguration::stereo_calibration;
-
   const auto n = static_cast<std::size_t>(rig_.cameras);
   BundleProblem problem;
   problem.cameras = std::span(cameras_).first(n);
@@ -189,37 +174,26 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
   problem.observations = observations_.span();
   problem.squared_residuals = residuals_.first(observations_.size());
   BundleOptions how;
-  how.configuration = configuration;
+  how.configuration = !linked           ? BundleConfiguration::parallel_monocular
+                      : rotations_free_ ? BundleConfiguration::stereo_calibration
+                                        : BundleConfiguration::stereo_odometry;
   how.loss = BundleLoss::huber;
   how.loss_threshold = options_.huber;
   how.max_steps = std::min<int>(options_.window_steps, effort.window_steps);
   how.cost_tolerance = 1e-4;
-  if (configuration == BundleConfiguration::stereo_calibration)
+  if (how.configuration == BundleConfiguration::stereo_calibration)
     how.shared_prior = {&prior_rig_, kInflation};
   const BundleResult result = adjuster_.solve(problem, how);
-  outcome.termination = result.termination;
   outcome.usable = result.usable();
   outcome.steps = result.steps;
-  outcome.rms_px = result.rms_px;
   return outcome;
 }
 
-WindowOutcome WindowAdjuster::adjust(Map& map, const FrameWorkload& effort) noexcept {
-  gather(map, true, effort);
-  WindowOutcome outcome = solve(BundleConfiguration::stereo_odometry, effort);
+WindowOutcome WindowAdjuster::adjust(Map& map, bool linked, const FrameWorkload& effort) noexcept {
+  gather(map, linked, effort);
+  WindowOutcome outcome = solve(linked, effort);
   if (!outcome.usable) return outcome;
-  for (std::size_t i = 0; i < poses_.size(); ++i)
-    map.keyframe(map.order()[oldest_ + i]).T_left_world = {normalised(poses_[i].R), poses_[i].t};
-  for (std::size_t i = 0; i < points_.size(); ++i) map.points()[owner_[i]].p_world = points_[i];
-  outcome.dropped = drop_outliers(map);
-  return outcome;
-}
-
-WindowOutcome WindowAdjuster::adjust_unlinked(Map& map, const FrameWorkload& effort) noexcept {
-  gather(map, false, effort);
-  WindowOutcome outcome = solve(BundleConfiguration::parallel_monocular, effort);
-  if (!outcome.usable) return outcome;
-  const auto images = static_cast<std::size_t>(rig_.cameras);
+  const std::size_t images = linked ? 1 : static_cast<std::size_t>(rig_.cameras);
   for (std::size_t i = 0; oldest_ + i < map.order().size(); ++i) {
     Keyframe& keyframe = map.keyframe(map.order()[oldest_ + i]);
     const Transform& left = poses_[i * images];

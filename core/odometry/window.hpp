@@ -9,13 +9,10 @@ namespace vergence::odometry {
 struct WindowOutcome {
   /// True if poses and points were written back.
   bool usable = false;
-  BundleTermination termination = BundleTermination::invalid_input;
-  int points = 0;
   int observations = 0;
   /// Number of observations that no longer fit.
   int dropped = 0;
   int steps = 0;
-  double rms_px = 0;
 };
 
 /// Adjusts the window's poses and points together; the oldest keyframe is constant.
@@ -29,22 +26,19 @@ struct WindowOutcome {
 class WindowAdjuster {
  public:
   WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
-                                                 const RigCalibration& rig) noexcept;
 
   /// Adjusts the newest keyframes within the limits of `effort`. Writes poses and points back if
   /// the result is usable, and drops observations beyond the robust limit. T_camera_left() has the
   /// transforms.
-  WindowOutcome adjust(Map& map, const FrameWorkload& effort = {}) noexcept;
-  /// Same as adjust() for unlinked cameras: every image has its own pose, in
-  /// Keyframe::T_camera_left. All images of the oldest keyframe are constant; the caller renews the
-  /// scale.
-  WindowOutcome adjust_unlinked(Map& map, const FrameWorkload& effort = {}) noexcept;
+  ///
+  /// With unlinked cameras every image has its own pose, in Keyframe::T_camera_left. All images of
+  /// the oldest keyframe are constant; the caller renews the scale.
+  WindowOutcome adjust(Map& map, bool linked, const FrameWorkload& effort = {}) noexcept;
   /// Call when the owner's rig was changed to another calibration.
   void adopt_rig() noexcept;
   /// Transforms estimated by the last adjustment, one per camera.
-  [[nodiscard]] std::span<const Transform> T_camera_left() const noexcept {
-    return std::span(T_camera_left_).first(static_cast<std::size_t>(rig_.cameras));
+  [[nodiscard]] const std::array<Transform, kMaxCameras>& T_camera_left() const noexcept {
+    return T_camera_left_;
   }
 
  private:
@@ -53,8 +47,7 @@ class WindowAdjuster {
   /// Sets the prior of the additional cameras' rotations from the calibration's covariance.
   void set_rotation_prior() noexcept;
   void gather(Map& map, bool linked, const FrameWorkload& effort) noexcept;
-  [[nodiscard]] WindowOutcome solve(BundleConfiguration configuration,
-                                    const FrameWorkload& effort) noexcept;
+  [[nodiscard]] WindowOutcome solve(bool linked, const FrameWorkload& effort) noexcept;
   [[nodiscard]] int drop_outliers(Map& map) noexcept;
 
   const OdometryOptions& options_;

@@ -9,7 +9,8 @@
 namespace vergence::mock {
 namespace {
 
-constexpr double kLongest = 86400;  // s: a day
+/// One day in s.
+constexpr double kLongest = 86400;
 constexpr FaultParameter kCamera{"camera", -1, -1, 3, "camera index from 0; -1: all"};
 constexpr FaultParameter kCamera1{"camera", 1, 0, 3, "camera index from 0"};
 constexpr FaultParameter kDuration{"duration_s", 5, 0, kLongest, "duration; 0: to the end"};

@@ -59,11 +59,13 @@ InsSample InsModel::sample(std::uint64_t number, Duration time) {
     s.tilt_sigma = wander_[6].sigma;
     s.heading_sigma = wander_[8].sigma;
   } else {
-    constexpr double kSmall = 1e-3;  // m, m/s: a sigma of 0 would mean that none is given
+    // Minimum in m and m/s, because a sigma of 0 would mean that none is given.
+    constexpr double kSmall = 1e-3;
     s.position_sigma = s.height_sigma = s.velocity_sigma = kSmall;
     s.tilt_sigma = s.heading_sigma = 1e-5;
   }
-  std::vector<double> rotation(9);  // v_enu = M · v_local, row-major
+  // Row-major matrix M of v_enu = M · v_local.
+  std::vector<double> rotation(9);
   plane_.Reverse(T_enu_ins.t.x(), T_enu_ins.t.y(), T_enu_ins.t.z(), s.position.latitude_deg,
                  s.position.longitude_deg, s.position.height_m, rotation);
   const Mat3 R_enu_local =

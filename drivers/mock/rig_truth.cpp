@@ -19,7 +19,8 @@ RigTruth::RigTruth(std::shared_ptr<const World> world, const DriveOptions& drive
 }
 
 Transform RigTruth::camera_on_body(int camera, Duration time) const noexcept {
-  Transform T_moved_camera;  // from where it was mounted to where it is
+  // Transform from the mounted pose to the current one.
+  Transform T_moved_camera;
   for (const Fault& f : faults_) {
     if (!f.concerns(camera) || time < f.at) continue;
     double part = 0;
@@ -33,7 +34,8 @@ Transform RigTruth::camera_on_body(int camera, Duration time) const noexcept {
 }
 
 std::optional<Transform> RigTruth::bus_in_enu(Duration time) const noexcept {
-  const Fault* bus = nullptr;  // the last one that was scheduled
+  // The last scheduled occluder.
+  const Fault* bus = nullptr;
   for (const Fault& f : faults_)
     if (f.kind == FaultKind::occluder && f.active(time)) bus = &f;
   if (bus == nullptr) return std::nullopt;

@@ -24,7 +24,7 @@ void Slots::use_buffers(int width, int height, std::size_t stride) {
 void Slots::use_pool(int width, int height) {
   assert(held_ == 0);
   install({});
-  auto arena = std::make_unique<Arena>(FramePool::memory_needed(width, height, kPool) + kCacheLine);
+  auto arena = std::make_unique<Arena>();
   pool_ = std::make_unique<FramePool>(width, height, kPool, *arena);
   arena_ = std::move(arena);
   width_ = width;

@@ -192,8 +192,7 @@ void rendered_stretches(const app::Configuration& c) {
   options.calibration = c.calibration;
   options.monitor = c.monitor;
   const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(Estimator::memory_needed(options, o.rig) +
-              calibration::SegmentSolver::memory_needed(c.calibration, c.monitor, 2, features));
+  Arena arena;
   app::ThreadRunner two;
   ImmediateRunner solver;
   Estimator estimator(options, o.rig, o.rig, arena, two, solver);
@@ -215,8 +214,7 @@ std::array<std::vector<RigSolution>, kStretches.size()> solve_stretches(
     const RecordedSequence& d, app::Configuration c, const StartingCalibration& given) {
   c.calibration.min_frames = std::min<int>(c.calibration.min_frames, kStretches.front());
   const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(kStretches.size() * SegmentSolver::memory_needed(c.calibration, c.monitor,
-                                                               given.file.rig.cameras, features));
+  Arena arena;
   std::deque<SegmentSolver> stretches;
   for (const std::size_t n : kStretches)
     stretches.emplace_back(SegmentSolver::Kind::alone, given.file.rig, given.file.rig, n,

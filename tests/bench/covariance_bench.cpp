@@ -144,7 +144,7 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
   options.odometry = c.odometry;
   options.calibration = c.calibration;
   options.monitor = c.monitor;
-  Arena arena(Estimator::memory_needed(options, drive.rig()));
+  Arena arena;
   SequentialRunner runner;
   ImmediateRunner solver;
   Estimator estimator(options, drive.rig(), drive.rig(), arena, runner, solver);

@@ -116,7 +116,7 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
   EstimatorOptions options;
   options.odometry = configuration.odometry;
   options.online = online;
-  Arena arena(Estimator::memory_needed(options, d.sequence.calibration));
+  Arena arena;
   SequentialRunner one;
   std::optional<app::ThreadRunner> two;
   if (threads == 2) two.emplace();

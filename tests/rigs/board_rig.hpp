@@ -1,10 +1,8 @@
 #pragma once
 #include <fcntl.h>
 
-#include <functional>
 #include <memory>
 #include <mutex>
-#include <string>
 #include <utility>
 #include <vector>
 

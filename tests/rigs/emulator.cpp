@@ -15,7 +15,8 @@
 namespace vergence::test {
 namespace {
 
-constexpr auto kReadyLimit = std::chrono::seconds(10);  // a bus reset takes two
+/// A bus reset takes two seconds.
+constexpr auto kReadyLimit = std::chrono::seconds(10);
 constexpr auto kLook = std::chrono::milliseconds(20);
 
 }  // namespace

@@ -1,7 +1,6 @@
 #pragma once
 #include <sys/types.h>
 
-#include <chrono>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -32,8 +31,10 @@ class Emulator {
 
  private:
   pid_t pid_ = -1;
-  int commands_ = -1;  // its standard input
-  int report_ = -1;    // its standard output
+  /// Standard input of the emulator.
+  int commands_ = -1;
+  /// Standard output of the emulator.
+  int report_ = -1;
 };
 
 /// The number after `word` in the report's line about a camera: count_of(report, 1, "exposed"). −1:

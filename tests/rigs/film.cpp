@@ -20,8 +20,10 @@ std::filesystem::path image_file(const std::filesystem::path& folder, std::size_
 }
 
 constexpr int kPairs = 100;
-constexpr double kRateHz = 10, kSpeed = 6;  // m/s, on the straights
-constexpr double kStart = 2;                // s of the drive, which stands for its first three
+/// Frame rate, and speed in m/s on the straights.
+constexpr double kRateHz = 10, kSpeed = 6;
+/// Time in s into the drive, which stands for its first three seconds.
+constexpr double kStart = 2;
 
 /// Description of the film, in a file that is written last.
 std::string key() {

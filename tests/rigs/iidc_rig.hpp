@@ -11,8 +11,10 @@ namespace vergence::test {
 /// Data that an emulated camera wrote into row 0 of an image.
 struct ImageStamp {
   bool valid = false;
-  std::uint32_t number = 0;    // of the exposure
-  std::int64_t middle_ns = 0;  // of the exposure, CLOCK_MONOTONIC
+  /// Number of the exposure.
+  std::uint32_t number = 0;
+  /// Middle of the exposure on CLOCK_MONOTONIC.
+  std::int64_t middle_ns = 0;
   std::uint64_t guid = 0;
 };
 [[nodiscard]] ImageStamp read_stamp(ImageView image);
@@ -28,10 +30,14 @@ struct ImageStamp {
 /// One camera's account of what it delivered.
 struct Account {
   std::uint64_t complete = 0, torn = 0;
-  std::uint64_t gaps = 0;   // in the counters, after the first
-  std::uint64_t wrong = 0;  // complete, and with pixels, number or GUID that are not its own
-  std::vector<std::int64_t> middles;  // of the exposures, by the emulator
-  std::vector<std::int64_t> starts;   // by the camera's stamp
+  /// Gaps in the counters after the first frame.
+  std::uint64_t gaps = 0;
+  /// Complete frames with pixels, a number or a GUID of another frame.
+  std::uint64_t wrong = 0;
+  /// Middles of the exposures by the emulator.
+  std::vector<std::int64_t> middles;
+  /// Starts of the exposures by the camera's stamps.
+  std::vector<std::int64_t> starts;
 };
 
 /// Takes frames from several cameras in turn, and holds each against what stands in it.

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <stdexcept>
 
 #include "drivers/v4l2/controls.hpp"
@@ -85,7 +84,8 @@ void loop(const std::string& capture, const std::string& output, LoopSize size) 
   set_timings(capture, size);
   set_timings(output, size);
   set_control(capture, "loop_video", 1);
-  set_control(capture, "osd_text_mode", 2);  // else the frame's number is written over the image
+  // With other modes, the frame's number is written over the image.
+  set_control(capture, "osd_text_mode", 2);
 }
 
 VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t interval_ns,

@@ -20,8 +20,10 @@ void set_control(const std::string& node, const std::string& key, std::int64_t v
 
 /// A picture that looped nodes can have.
 enum class LoopSize : std::uint8_t {
-  vga,  // 640 x 480, 59.94 Hz
-  hd,   // 1280 x 720, 30 Hz
+  /// 640 x 480 at 59.94 Hz.
+  vga,
+  /// 1280 x 720 at 30 Hz.
+  hd,
 };
 [[nodiscard]] constexpr int width_of(LoopSize size) noexcept {
   return size == LoopSize::vga ? 640 : 1280;
@@ -56,9 +58,12 @@ class VividPlayer {
 
   /// An image in the place that a looped camera copies from, CLOCK_MONOTONIC.
   struct Showing {
-    std::int64_t number = 0;   // kNoise: the player was late, and the camera makes noise of its own
-    std::int64_t from_ns = 0;  // not earlier
-    std::int64_t until_ns = 0;  // not later
+    /// kNoise if the player was late and the camera shows noise.
+    std::int64_t number = 0;
+    /// The image is not shown earlier.
+    std::int64_t from_ns = 0;
+    /// The image is not shown later.
+    std::int64_t until_ns = 0;
   };
   static constexpr std::int64_t kNoise = -1;
   /// Images shown by an output, in order; neighbours may overlap by the time between two looks at
@@ -71,11 +76,15 @@ class VividPlayer {
   struct Output {
     UniqueFd fd;
     std::vector<std::span<std::uint8_t>> buffers;
-    std::vector<std::int64_t> numbers;  // by buffer; they are shown in the order of buffers
-    std::size_t current = 0;            // the buffer that is shown
+    /// Numbers by buffer; buffers are shown in their order.
+    std::vector<std::int64_t> numbers;
+    /// The buffer that is shown.
+    std::size_t current = 0;
     std::vector<Showing> showings;
-    std::int64_t next_from_ns = 0;  // of the image after the last that came back
-    std::int64_t looked_ns = 0;     // when no other buffer was back
+    /// Start of the image after the last returned one.
+    std::int64_t next_from_ns = 0;
+    /// Last time at which no other buffer was returned.
+    std::int64_t looked_ns = 0;
   };
   void feed();
   [[nodiscard]] bool refill(std::size_t output, std::uint64_t first);

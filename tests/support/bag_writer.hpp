@@ -41,7 +41,8 @@ class RosWriter {
   }
   /// std_msgs/Header.
   RosWriter& header(std::int64_t stamp_ns, std::string_view frame = "f") {
-    if (wire_ == Wire::ros1) put(std::uint32_t{7});  // the publisher's count
+    // The publisher's count.
+    if (wire_ == Wire::ros1) put(std::uint32_t{7});
     put(static_cast<std::int32_t>(stamp_ns / 1'000'000'000))
         .put(static_cast<std::uint32_t>(stamp_ns % 1'000'000'000));
     return text(frame);
@@ -60,6 +61,11 @@ class RosWriter {
   Wire wire_;
   std::string bytes_;
 };
+
+/// A number of `size` bytes, little endian.
+[[nodiscard]] std::string number(std::uint64_t value, int size);
+/// Records packed as one frame of LZ4.
+[[nodiscard]] std::string lz4_frame(const std::string& records);
 
 /// A recording in memory.
 class BagWriter {
@@ -109,13 +115,18 @@ class RosbagWriter final : public BagWriter {
 
  private:
   struct Entry {
-    std::string time;        // 8 bytes
-    std::size_t offset = 0;  // in the chunk
+    /// 8 bytes.
+    std::string time;
+    /// In the chunk.
+    std::size_t offset = 0;
   };
   std::string compression_;
-  std::map<std::uint16_t, std::string> connections_;     // their records
-  std::map<std::uint16_t, std::vector<Entry>> entries_;  // of the open chunk
-  std::int64_t first_ = 0, last_ = 0;                    // ns: log times of the open chunk
+  /// Records of the connections.
+  std::map<std::uint16_t, std::string> connections_;
+  /// Entries of the open chunk.
+  std::map<std::uint16_t, std::vector<Entry>> entries_;
+  /// Log times of the open chunk, ns.
+  std::int64_t first_ = 0, last_ = 0;
   std::string chunk_infos_;
   std::uint32_t chunks_ = 0;
 };
@@ -123,7 +134,8 @@ class RosbagWriter final : public BagWriter {
 /// A kind of recording: the container, what its chunks are packed by, how its messages are
 /// serialised.
 struct BagKind {
-  const char* container;  // "mcap", "rosbag": the words of --format
+  /// "mcap" or "rosbag": the words of --format.
+  const char* container;
   const char* compression;
 
   [[nodiscard]] bool is_mcap() const { return std::string_view(container) == "mcap"; }

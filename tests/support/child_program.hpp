@@ -17,9 +17,12 @@ class ChildProgram {
  public:
   /// Options of the start.
   struct Start {
-    bool terminal = false;  // one of its own, and leader of its session
-    bool session = false;   // leader of a session without a terminal
-    int errors = -1;  // a descriptor that is its standard error; −1: the terminal, or the test's
+    /// Starts as leader of its session, with a terminal of its own.
+    bool terminal = false;
+    /// Starts as leader of a session without a terminal.
+    bool session = false;
+    /// Descriptor that is its standard error; −1: the terminal, or the test's.
+    int errors = -1;
   };
 
   /// `words`: what stands behind the program's name.

@@ -48,8 +48,8 @@ class DeviceOnDescriptor {
       for (auto next = device_->next(); next && *next <= monotonic_now(); next = device_->next())
         device_->produce(monotonic_now(), &out);
       if (!out.empty())
-        (void)!::write(descriptor_, out.data(),
-                       out.size());  // An unread line drops bytes.
+        // An unread line drops bytes.
+        (void)!::write(descriptor_, out.data(), out.size());
       pollfd p{descriptor_, POLLIN, 0};
       if (::poll(&p, 1, patience()) <= 0) continue;
       std::array<std::uint8_t, 512> in{};
@@ -57,13 +57,15 @@ class DeviceOnDescriptor {
       if (n > 0)
         device_->receive(std::span(in).first(static_cast<std::size_t>(n)), monotonic_now());
       else
-        ::usleep(1000);  // While the other end is closed poll() does not wait.
+        // While the other end is closed poll() does not wait.
+        ::usleep(1000);
     }
   }
   /// Until the device has something to say, in ms: a rig's kernel has better to do than to wake it
   /// for nothing.
   [[nodiscard]] int patience() const {
-    constexpr std::int64_t kLongest = 20;  // stop_ is seen
+    // Short enough for stop_ to be seen.
+    constexpr std::int64_t kLongest = 20;
     const auto next = device_->next();
     if (!next) return kLongest;
     return static_cast<int>(

@@ -8,14 +8,22 @@ namespace vergence::test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kHeight = 1.7;         // m, camera above the road
-constexpr double kBlock = 12.0;         // m, of street
-constexpr int kBlocksAhead = 9;         // as far as the backdrop
-constexpr double kAcceleration = 2.0;   // m/s²
-constexpr double kGroundKept = 0.4;     // of features that fall on the road
-constexpr double kBackdropHeight = 15;  // m; above it is sky
-constexpr double kBonnet = 2.0;         // m: nothing nearer is looked at
-constexpr int kTries = 200;             // for one new feature; two in three hit something
+/// Height of the camera above the road, m.
+constexpr double kHeight = 1.7;
+/// Length of a block of the street, m.
+constexpr double kBlock = 12.0;
+/// As far as the backdrop.
+constexpr int kBlocksAhead = 9;
+/// m/s².
+constexpr double kAcceleration = 2.0;
+/// Share of the features on the road that are kept.
+constexpr double kGroundKept = 0.4;
+/// Above it is sky, m.
+constexpr double kBackdropHeight = 15;
+/// Nothing nearer is looked at, m.
+constexpr double kBonnet = 2.0;
+/// Tries for one new feature; two in three hit something.
+constexpr int kTries = 200;
 // Root mean square over the image of 1, x, y, x² − 1/3, xy, y² − 1/3 with x, y in −1 … 1.
 constexpr std::array<double, 6> kFieldRms{1.0, 0.57735, 0.57735, 0.29814, 0.33333, 0.29814};
 
@@ -47,7 +55,8 @@ Stamp FeatureDrive::stamp() const noexcept {
 void FeatureDrive::next() {
   if (started_) ++frame_;
   move();
-  if (!started_) poses_[1] = poses_[0];  // it stood still before the first frame
+  // It stood still before the first frame.
+  if (!started_) poses_[1] = poses_[0];
   wander();
   T_right_left_ = options_.T_right_left;
   for (const RigChange& c : options_.changes) {
@@ -81,8 +90,8 @@ void FeatureDrive::next() {
     FeatureTrack t;
     if (!new_point(&p) || !sight(&p, &t)) continue;
     if (!started_)
-      p.life = 1 + static_cast<int>(random_.below(
-                       static_cast<std::uint32_t>(p.life)));  // not all born in the first frame
+      // Not all are born in the first frame.
+      p.life = 1 + static_cast<int>(random_.below(static_cast<std::uint32_t>(p.life)));
     points_.push_back(p);
     tracks_.push_back(t);
   }
@@ -103,13 +112,15 @@ void FeatureDrive::move() {
   const auto wave = [&](double hertz, std::size_t phase) {
     return std::sin(2 * std::numbers::pi * hertz * rocked_s_ + phases_[phase]);
   };
-  constexpr double kWeave = 0.14;  // Hz
+  // Hz.
+  constexpr double kWeave = 0.14;
   const double a = options_.rocking;
   const double pitch = a * 0.3 * kDegree * (0.6 * wave(1.1, 0) + 0.4 * wave(1.7, 1));
   const double roll = a * 0.35 * kDegree * (0.6 * wave(0.8, 2) + 0.4 * wave(1.4, 3));
   const double heave = a * 0.015 * wave(1.3, 4);
-  const double heading = a * 1.7 * kDegree / (2 * std::numbers::pi * kWeave) * wave(kWeave, 5) -
-                         0.005 * x_;  // back to the middle
+  // The last term leads back to the middle.
+  const double heading =
+      a * 1.7 * kDegree / (2 * std::numbers::pi * kWeave) * wave(kWeave, 5) - 0.005 * x_;
   if (started_) {
     x_ += speed_ * dt * std::sin(heading);
     z_ += speed_ * dt * std::cos(heading);
@@ -192,8 +203,8 @@ bool FeatureDrive::new_point(Point* p) {
 
 bool FeatureDrive::hit(const Vec3& origin, const Vec3& ray, Vec3* p) const noexcept {
   double nearest = 1e9;
-  const auto try_at = [&](double along, double low_z, double high_z,
-                          double height) {  // a wall x = const
+  // A wall x = const.
+  const auto try_at = [&](double along, double low_z, double high_z, double height) {
     if (!(along > 0) || along >= nearest) return;
     const Vec3 q = origin + along * ray;
     if (q.z() < low_z || q.z() > high_z || q.y() > 0 || q.y() < -height) return;
@@ -201,7 +212,8 @@ bool FeatureDrive::hit(const Vec3& origin, const Vec3& ray, Vec3* p) const noexc
   };
   if (ray.y() > 1e-9) nearest = -origin.y() / ray.y();
   const auto first = static_cast<std::int64_t>(std::floor(origin.z() / kBlock));
-  const std::uint64_t side = ray.x() > 0 ? 1 : 0;  // the camera is between the walls
+  // The camera is between the walls.
+  const std::uint64_t side = ray.x() > 0 ? 1 : 0;
   const double sign = side == 1 ? 1.0 : -1.0;
   for (std::int64_t block = first; block < first + kBlocksAhead && std::abs(ray.x()) > 1e-9;
        ++block) {

@@ -14,10 +14,14 @@ namespace vergence::test {
 /// A change of the true T_right_left: R ← Exp(φ) R, t ← t + τ, growing from nothing at `frame` to
 /// the whole `over` frames later.
 struct RigChange {
-  std::uint64_t frame = 0;          // the first frame that is different
-  Vec3 rotation = Vec3::Zero();     // φ, rad
-  Vec3 translation = Vec3::Zero();  // τ, m
-  std::uint64_t over = 0;           // frames; 0: a knock
+  /// The first frame that is different.
+  std::uint64_t frame = 0;
+  /// φ, rad.
+  Vec3 rotation = Vec3::Zero();
+  /// τ, m.
+  Vec3 translation = Vec3::Zero();
+  /// Frames; 0: a knock.
+  std::uint64_t over = 0;
 };
 
 /// From `frame` on the right camera exposes `frames` frames late (negative: the left one does); −1
@@ -28,24 +32,35 @@ struct LagChange {
 };
 
 struct FeatureDriveOptions {
-  int width = 1024, height = 768;          // px
-  Pinhole left{1247, 1247, 511.5, 383.5};  // true; a test of wrong intrinsics computes with others
+  /// px.
+  int width = 1024, height = 768;
+  /// True; a test of wrong intrinsics computes with others.
+  Pinhole left{1247, 1247, 511.5, 383.5};
   Pinhole right{1247, 1247, 511.5, 383.5};
-  Transform T_right_left{exp_so3({5e-3, -8e-3, 3e-3}), {-0.75, 0, 0}};  // true, before any change
-  double rate = 30;                                                     // Hz
-  int tracks = 300;                          // alive in every frame, seen by both cameras
-  int shortest_life = 5, longest_life = 20;  // frames
-  double speed = 8;                          // m/s when driving
-  double drive_s = 0,
-         stop_s = 0;   // drives so long, stands so long, again and again; 0: never stops
-  double rocking = 1;  // of pitch ±0.3°, roll ±0.35°, heave ±15 mm, heading ±1.7°/s
-  double white_px = 0.3, constant_px = 0.3,
-         walk_px = 0.1;    // each camera's coordinate: every frame, every track, a step a frame
-  double sigma_px = 0.5;   // what a track says of itself
-  double outliers = 0.05;  // share of tracks 3 to 30 px off in the right image
-  double movers = 0.03;    // share of tracks on things that move by themselves, up to 10 m/s
-  double bias_px = 0.02,
-         bias_s = 10;  // smooth error field in the right image: rms of a coordinate, time constant
+  /// True, before any change.
+  Transform T_right_left{exp_so3({5e-3, -8e-3, 3e-3}), {-0.75, 0, 0}};
+  /// Hz.
+  double rate = 30;
+  /// Alive in every frame, seen by both cameras.
+  int tracks = 300;
+  /// Frames.
+  int shortest_life = 5, longest_life = 20;
+  /// Speed when driving, m/s.
+  double speed = 8;
+  /// Drives so long, stands so long, again and again; 0: never stops.
+  double drive_s = 0, stop_s = 0;
+  /// Times pitch ±0.3°, roll ±0.35°, heave ±15 mm, heading ±1.7°/s.
+  double rocking = 1;
+  /// Errors of each camera's coordinate: every frame, every track, a step a frame.
+  double white_px = 0.3, constant_px = 0.3, walk_px = 0.1;
+  /// The error that a track states.
+  double sigma_px = 0.5;
+  /// Share of tracks 3 to 30 px off in the right image.
+  double outliers = 0.05;
+  /// Share of tracks on things that move by themselves, up to 10 m/s.
+  double movers = 0.03;
+  /// Smooth error field in the right image: rms of a coordinate, time constant.
+  double bias_px = 0.02, bias_s = 10;
   std::vector<RigChange> changes;
   std::vector<LagChange> lags;
   std::uint64_t seed = 1;
@@ -55,11 +70,15 @@ struct FeatureDriveOptions {
 /// it.
 struct FeatureTrack {
   std::uint32_t id = 0;
-  Vec2 left, right;       // ideal pixels
-  std::uint8_t seen = 3;  // bit 0: left, bit 1: right
+  /// Ideal pixels.
+  Vec2 left, right;
+  /// Bit 0: left, bit 1: right.
+  std::uint8_t seen = 3;
   double sigma_px = 0;
-  Vec3 p_world = Vec3::Zero();  // truth, m
-  bool wrong = false;           // truth: an outlier or a mover
+  /// Truth, m.
+  Vec3 p_world = Vec3::Zero();
+  /// Truth: an outlier or a mover.
+  bool wrong = false;
 };
 
 /// A drive along a street without images: plane of the road, facades, parked cars, backdrop; tracks
@@ -75,29 +94,30 @@ class FeatureDrive {
 
   [[nodiscard]] std::uint64_t frame() const noexcept { return frame_; }
   [[nodiscard]] Stamp stamp() const noexcept;
-  [[nodiscard]] std::span<const FeatureTrack> tracks() const noexcept {
-    return tracks_;
-  }  // until the next call
-  [[nodiscard]] const Transform& T_left_world() const noexcept {
-    return T_left_world_;
-  }  // true, when the left camera exposed
-  [[nodiscard]] const Transform& T_now_previous() const noexcept {
-    return T_now_previous_;
-  }  // true, of the left camera
-  [[nodiscard]] const Transform& T_right_left() const noexcept {
-    return T_right_left_;
-  }                                                               // true, of this frame
-  [[nodiscard]] double speed() const noexcept { return speed_; }  // m/s
+  /// Valid until the next call.
+  [[nodiscard]] std::span<const FeatureTrack> tracks() const noexcept { return tracks_; }
+  /// True, when the left camera exposed.
+  [[nodiscard]] const Transform& T_left_world() const noexcept { return T_left_world_; }
+  /// True, of the left camera.
+  [[nodiscard]] const Transform& T_now_previous() const noexcept { return T_now_previous_; }
+  /// True, of this frame.
+  [[nodiscard]] const Transform& T_right_left() const noexcept { return T_right_left_; }
+  /// m/s.
+  [[nodiscard]] double speed() const noexcept { return speed_; }
   [[nodiscard]] const FeatureDriveOptions& options() const noexcept { return options_; }
 
  private:
   struct Point {
     std::uint32_t id = 0;
-    int life = 0;  // frames left
+    /// Frames left.
+    int life = 0;
     Vec3 p_world = Vec3::Zero();
-    Vec3 velocity = Vec3::Zero();                // m a frame
-    Vec2 offset = Vec2::Zero();                  // px, of an outlier in the right image
-    std::array<double, 4> constant{}, walked{};  // px
+    /// m a frame.
+    Vec3 velocity = Vec3::Zero();
+    /// Offset of an outlier in the right image, px.
+    Vec2 offset = Vec2::Zero();
+    /// px.
+    std::array<double, 4> constant{}, walked{};
     bool wrong = false;
   };
   using Field = std::array<double, 6>;
@@ -116,11 +136,13 @@ class FeatureDrive {
   std::uint64_t frame_ = 0;
   bool started_ = false;
   std::uint32_t next_id_ = 1;
-  double speed_ = 0, phase_s_ = 0,
-         rocked_s_ = 0;   // m/s; s into the cycle of driving and standing; s of rocking
-  double x_ = 0, z_ = 0;  // m, of the left camera
+  /// Speed in m/s, seconds into the cycle of driving and standing, seconds of rocking.
+  double speed_ = 0, phase_s_ = 0, rocked_s_ = 0;
+  /// Position of the left camera, m.
+  double x_ = 0, z_ = 0;
   std::array<double, 8> phases_{};
-  std::array<Transform, 2> poses_{};  // T_left_world of the vehicle's clock: now, one frame ago
+  /// T_left_world of the vehicle's clock: now, one frame ago.
+  std::array<Transform, 2> poses_{};
   Transform T_left_world_, T_right_world_, T_now_previous_, T_right_left_;
   std::array<Field, 2> field_{};
   std::vector<Point> points_;

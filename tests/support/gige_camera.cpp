@@ -6,10 +6,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "drivers/clock.hpp"
-#include "tests/support/detail/gige_camera_impl.hpp"
+#include "tests/support/detail/gvcp.hpp"
 
 namespace vergence::test {
 namespace {
@@ -31,9 +32,9 @@ int datagram_socket(const char* address) {
 
 }  // namespace
 
-GigeCamera::Impl::Impl(const GigeCameraOptions& o)
-    : options(o),
-      sender(o.address, o.extended_ids, o.seed),
+GigeCamera::GigeCamera(const GigeCameraOptions& o)
+    : options_(o),
+      sender_(o.address, o.extended_ids, o.seed),
       memory_(gvcp::kMemory, 0),
       born_(monotonic_now()) {
   control_ = datagram_socket(o.address.c_str());
@@ -48,7 +49,7 @@ GigeCamera::Impl::Impl(const GigeCameraOptions& o)
   (void)pthread_setname_np(exposing_.native_handle(), "simulator-x");
 }
 
-GigeCamera::Impl::~Impl() {
+GigeCamera::~GigeCamera() {
   {
     const std::lock_guard lock(mutex_);
     quit_ = true;
@@ -62,7 +63,7 @@ GigeCamera::Impl::~Impl() {
     if (fd >= 0) (void)::close(fd);
 }
 
-void GigeCamera::Impl::power(bool on) {
+void GigeCamera::power(bool on) {
   {
     const std::lock_guard lock(mutex_);
     if (on && !powered_) reset();
@@ -72,48 +73,26 @@ void GigeCamera::Impl::power(bool on) {
   changed_.notify_all();
 }
 
-GigeCamera::GigeCamera(const GigeCameraOptions& options) : impl_(std::make_unique<Impl>(options)) {}
-GigeCamera::~GigeCamera() = default;
-
 std::string GigeCamera::address(int k) {
   const auto pid = static_cast<unsigned>(::getpid());
   return "127." + std::to_string(1 + (pid >> 8U) % 250) + "." + std::to_string(pid & 0xFFU) + "." +
          std::to_string(k + 2);
 }
 
-void GigeCamera::unplug() { impl_->power(false); }
-void GigeCamera::replug() { impl_->power(true); }
-void GigeCamera::silence(bool silent) {
-  const std::lock_guard lock(impl_->mutex_);
-  impl_->silent_ = silent;
-}
-void GigeCamera::lose_frames(int exposures) {
-  const std::lock_guard lock(impl_->mutex_);
-  impl_->lose_ += exposures;
-}
-void GigeCamera::tear_frames(int exposures) {
-  const std::lock_guard lock(impl_->mutex_);
-  impl_->tear_ += exposures;
-}
-void GigeCamera::set_loss(double share) { impl_->sender.set_loss(share); }
-void GigeCamera::lie_about_size(int width, int height) {
-  const std::lock_guard lock(impl_->mutex_);
-  impl_->lie_width_ = width;
-  impl_->lie_height_ = height;
-}
-void GigeCamera::pulse(std::uint64_t number, HostStamp when) { impl_->pulse(number, 1, when); }
-void GigeCamera::take_control(bool taken) { impl_->take_control(taken); }
 GigeCameraReport GigeCamera::report() const {
   GigeCameraReport r;
-  impl_->sender.add_to(&r);
-  const std::lock_guard lock(impl_->mutex_);
-  r.starts = impl_->starts_;
+  sender_.add_to(&r);
+  r.starts = with_lock([&] { return starts_; });
   return r;
 }
-std::uint32_t GigeCamera::read(std::uint32_t address) const { return impl_->get(address); }
-void GigeCamera::write(std::uint32_t address, std::uint32_t value) { impl_->set(address, value); }
-std::uint64_t GigeCamera::ticks(HostStamp host) const { return impl_->ticks(host); }
-bool GigeCamera::acquiring() const { return impl_->acquiring(); }
-const GigeCameraOptions& GigeCamera::options() const { return impl_->options; }
+
+std::uint64_t GigeCamera::ticks(HostStamp host) const {
+  if (options_.tick_frequency == 0) return 0;
+  const double f = static_cast<double>(options_.tick_frequency) * 1e-9;
+  const double ns =
+      static_cast<double>(host.ns() - born_.ns()) * (1 + options_.clock_drift_ppm * 1e-6);
+  return static_cast<std::uint64_t>(
+      std::llround((static_cast<double>(options_.clock_offset_ns) + ns) * f));
+}
 
 }  // namespace vergence::test

@@ -1,45 +1,45 @@
 #pragma once
+#include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
-#include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
-#include "core/types/time.hpp"
+#include "tests/support/gvsp_sender.hpp"
 
 namespace vergence::test {
 
 /// Properties of a simulated camera.
 struct GigeCameraOptions {
-  std::string address = "127.0.0.2";  // any of 127.0.0.0/8; one camera each
+  /// Any of 127.0.0.0/8; one camera each.
+  std::string address = "127.0.0.2";
   std::string serial = "SIM-1";
-  int sensor_width = 1280, sensor_height = 960;      // px
-  std::uint64_t tick_frequency = 125'000'000;        // Hz of its clock; 0: it has none
-  std::int64_t clock_offset_ns = 7'000'000'000'000;  // its clock at the host's 0
+  /// px.
+  int sensor_width = 1280, sensor_height = 960;
+  /// Rate of its clock, Hz; 0: it has none.
+  std::uint64_t tick_frequency = 125'000'000;
+  /// Its clock at the host's 0.
+  std::int64_t clock_offset_ns = 7'000'000'000'000;
   double clock_drift_ppm = 20;
-  std::uint64_t first_block = 65'500;  // 16-bit ids wrap 35 frames later; 0 is never used
-  bool extended_ids = false;           // 64-bit block ids
-  bool old_names =
-      false;  // ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0
-  bool discoverable = true;   // answers broadcasts
-  std::uint64_t seed = 1;     // of the packets that are lost
-  bool number_images = true;  // the first 8 bytes of an image are its number, little endian
+  /// 16-bit ids wrap 35 frames later; 0 is never used.
+  std::uint64_t first_block = 65'500;
+  /// 64-bit block ids.
+  bool extended_ids = false;
+  /// ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0.
+  bool old_names = false;
+  /// Answers broadcasts.
+  bool discoverable = true;
+  /// Seed of the packets that are lost.
+  std::uint64_t seed = 1;
+  /// The first 8 bytes of an image are its number, little endian.
+  bool number_images = true;
   /// Pixels of image `number`, width × height bytes that stay valid; empty: a pattern of the
   /// simulator's own.
   std::function<const std::uint8_t*(std::uint64_t number)> images{};
-};
-
-/// Exact counts of its exposures. A frame is one exposure since the acquisition's start.
-struct GigeCameraReport {
-  std::uint64_t exposed = 0;   // frames
-  std::uint64_t whole = 0;     // every packet was sent, at first or when asked again
-  std::uint64_t torn = 0;      // the leader was sent, something else was not
-  std::uint64_t headless = 0;  // the leader was not sent, something else was
-  std::uint64_t nothing = 0;   // not one packet was sent
-  std::uint64_t dropped = 0;   // packets, at first
-  std::uint64_t asked = 0;     // packets asked for again
-  std::uint64_t resent = 0;    // of these sent
-  std::uint64_t starts = 0;    // acquisitions
 };
 
 /// A small GigE Vision camera on the loopback: GVCP control, GenICam description, GVSP stream, in
@@ -52,41 +52,102 @@ struct GigeCameraReport {
 /// Threads    Any call from any thread. Errors  The constructor throws std::runtime_error: the
 /// address is in use.
 class GigeCamera {
+  template <class Work>
+  auto with_lock(const Work& work) const {
+    const std::lock_guard lock(mutex_);
+    return work();
+  }
+
  public:
   explicit GigeCamera(const GigeCameraOptions& options);
   ~GigeCamera();
+  GigeCamera(const GigeCamera&) = delete;
+  GigeCamera& operator=(const GigeCamera&) = delete;
 
   /// An address of the loopback that no other program's tests use at the same time; `k` below 250.
   [[nodiscard]] static std::string address(int k);
 
-  void unplug();  // Answers and sends nothing until replug(), after which no program has control.
-  void replug();
-  void silence(bool silent);        // answers, exposes nothing
-  void lose_frames(int exposures);  // the next ones are not sent at all
-  void tear_frames(
-      int exposures);  // of the next ones one packet of data is not sent and not sent again
-  void set_loss(double share);  // of the packets, those sent again too
-  void lie_about_size(
-      int width,
-      int height);  // Sends images of this size instead of the registers'; 0: theirs again.
-  /// A pulse at Line1: one exposure of image `number` where the camera waits for one. `when`: its
-  /// time; 0: now.
+  /// Answers and sends nothing until replug(), after which no program has control.
+  void unplug() { power(false); }
+  void replug() { power(true); }
+  /// While silent, the camera answers but exposes nothing.
+  void silence(bool silent) {
+    with_lock([&] { silent_ = silent; });
+  }
+  /// The next exposures are not sent at all.
+  void lose_frames(int exposures) {
+    with_lock([&] { lose_ += exposures; });
+  }
+  /// One data packet of each of the next exposures is never sent.
+  void tear_frames(int exposures) {
+    with_lock([&] { tear_ += exposures; });
+  }
+  /// Share of the packets that are lost, including those sent again.
+  void set_loss(double share) { sender_.set_loss(share); }
+  /// Sends images of this size instead of the registers'; 0 ends it.
+  void lie_about_size(int width, int height) {
+    with_lock([&] { lie_width_ = width, lie_height_ = height; });
+  }
+  /// A pulse at Line1 exposes image `number` once if the camera waits for a pulse. `when` is its
+  /// time; 0 means now.
   void pulse(std::uint64_t number, HostStamp when = {});
-  /// Somebody else takes control, as another program would; false gives it back.
+  /// Another program takes control; false gives it back.
   void take_control(bool taken);
 
   [[nodiscard]] GigeCameraReport report() const;
   /// A bootstrap register or one of the features.
-  [[nodiscard]] std::uint32_t read(std::uint32_t address) const;
-  void write(std::uint32_t address, std::uint32_t value);
-  /// The device clock at a time of the host's, in its ticks.
+  [[nodiscard]] std::uint32_t read(std::uint32_t address) const {
+    return with_lock([&] { return word(address); });
+  }
+  void write(std::uint32_t address, std::uint32_t value) {
+    with_lock([&] { (void)store(address, value); });
+  }
+  /// The device clock in its ticks at a time of the host.
   [[nodiscard]] std::uint64_t ticks(HostStamp host) const;
-  [[nodiscard]] bool acquiring() const;
-  [[nodiscard]] const GigeCameraOptions& options() const;
+  [[nodiscard]] bool acquiring() const {
+    return with_lock([&] { return acquiring_; });
+  }
+  [[nodiscard]] const GigeCameraOptions& options() const { return options_; }
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  void power(bool on);
+  void answer();
+  void handle(int fd, const std::uint8_t* bytes, std::size_t length, const sockaddr_in& from);
+  std::uint32_t write_registers(const std::uint8_t* payload, std::uint32_t length,
+                                const sockaddr_in& from);
+  std::uint32_t store(std::uint32_t address, std::uint32_t value);
+  [[nodiscard]] bool value_fits(std::uint32_t address, std::uint32_t value) const;
+  void expose();
+  GvspFrame make_frame(std::uint64_t number, HostStamp when);
+  void follow_registers();
+  [[nodiscard]] bool may_write(const sockaddr_in& from, std::uint32_t address) const;
+  [[nodiscard]] std::uint32_t word(std::uint32_t address) const;
+  [[nodiscard]] float real(std::uint32_t address) const;
+  [[nodiscard]] std::uint32_t payload() const;
+  void put(std::uint32_t address, std::uint32_t value);
+  void put_text(std::uint32_t address, const std::string& text, std::size_t room);
+  void reset();
+
+  const GigeCameraOptions options_;
+  GvspSender sender_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  bool silent_ = false;
+  int lose_ = 0, tear_ = 0, lie_width_ = 0, lie_height_ = 0;
+  std::uint64_t starts_ = 0;
+  std::vector<std::uint8_t> memory_;
+  HostStamp born_{};
+  int control_ = -1, broadcast_ = -1, wake_ = -1;
+  bool quit_ = false, powered_ = true, acquiring_ = false, foreign_ = false;
+  sockaddr_in controller_{};
+  /// Time of the controller's last message.
+  HostStamp heard_{};
+  /// Triggers that are not served yet: number of the image and time.
+  std::deque<std::pair<std::uint64_t, HostStamp>> pulses_;
+  /// Number of software triggers.
+  std::uint64_t triggered_ = 0;
+  std::uint64_t block_ = 0;
+  std::thread answering_, exposing_;
 };
 
 /// Addresses of the features' registers.

@@ -2,13 +2,17 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
-#include <cstdio>
+#include <cstring>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include "drivers/clock.hpp"
-#include "tests/support/detail/gige_camera_impl.hpp"
+#include "tests/support/detail/gvcp.hpp"
+#include "tests/support/gige_camera.hpp"
 
 /// The simulated camera's registers, and the thread that answers for them.
 namespace vergence::test {
@@ -28,15 +32,32 @@ std::uint32_t from_wire16(const std::uint8_t* p) {
 
 }  // namespace
 
-/// As after power on. Precondition: mutex_ held, or no thread yet.
-void GigeCamera::Impl::reset() {
+std::uint32_t GigeCamera::word(std::uint32_t address) const {
+  return address + 4 <= kMemory ? from_wire(&memory_[address]) : 0;
+}
+
+float GigeCamera::real(std::uint32_t address) const { return std::bit_cast<float>(word(address)); }
+
+void GigeCamera::put(std::uint32_t address, std::uint32_t value) {
+  for (std::uint32_t i = 0; i < 4; ++i)
+    memory_[address + i] = static_cast<std::uint8_t>(value >> (24U - 8U * i));
+}
+
+void GigeCamera::put_text(std::uint32_t address, const std::string& text, std::size_t room) {
+  std::memcpy(&memory_[address], text.data(), std::min(text.size(), room - 1));
+}
+
+/// Sets all registers as after power-on. Precondition: mutex_ held, or no thread yet.
+void GigeCamera::reset() {
   std::fill(memory_.begin(), memory_.end(), std::uint8_t{0});
   in_addr own{};
-  (void)::inet_pton(AF_INET, options.address.c_str(), &own);
+  (void)::inet_pton(AF_INET, options_.address.c_str(), &own);
   put(0x00, 0x00010002);
-  put(0x04, 0x80000001);  // big endian, UTF-8
+  // Big endian, UTF-8.
+  put(0x04, 0x80000001);
   put(0x08, 0x0000'0200);
-  put(0x0C, ntohl(own.s_addr));  // a hardware address of its own
+  // A hardware address of its own.
+  put(0x0C, ntohl(own.s_addr));
   put(0x10, 0x7);
   put(0x14, 0x5);
   put(0x24, ntohl(own.s_addr));
@@ -45,17 +66,10 @@ void GigeCamera::Impl::reset() {
   put_text(0x68, "Simulator", 32);
   put_text(0x88, "1", 32);
   put_text(0xA8, "a GigE camera for tests", 48);
-  put_text(0xD8, options.serial, 16);
-  const std::string description = gige_description(options);
-  put_text(
-      0x200,
-      "Local:simulator.xml;" +
-          [&] {
-            char hex[32];
-            (void)std::snprintf(hex, sizeof hex, "%X;%zX", kDescription, description.size());
-            return std::string(hex);
-          }(),
-      512);
+  put_text(0xD8, options_.serial, 16);
+  const std::string description = gige_description(options_);
+  put_text(0x200, fmt::format("Local:simulator.xml;{:X};{:X}", kDescription, description.size()),
+           512);
   if (kDescription + description.size() > kMemory)
     throw std::runtime_error("simulated camera: the description is too long");
   std::memcpy(&memory_[kDescription], description.data(), description.size());
@@ -63,14 +77,15 @@ void GigeCamera::Impl::reset() {
   put(0x900, 0);
   put(0x904, 1);
   put(0x934, 4U | 2U | 1U);
-  put(kHeartbeat, 3000);  // ms
-  put(kTicksHigh, static_cast<std::uint32_t>(options.tick_frequency >> 32U));
-  put(kTicksLow, static_cast<std::uint32_t>(options.tick_frequency));
+  // ms.
+  put(kHeartbeat, 3000);
+  put(kTicksHigh, static_cast<std::uint32_t>(options_.tick_frequency >> 32U));
+  put(kTicksLow, static_cast<std::uint32_t>(options_.tick_frequency));
   put(kPacketSize, 1500);
-  put(sensor_width, static_cast<std::uint32_t>(options.sensor_width));
-  put(sensor_height, static_cast<std::uint32_t>(options.sensor_height));
-  put(width, static_cast<std::uint32_t>(options.sensor_width));
-  put(height, static_cast<std::uint32_t>(options.sensor_height));
+  put(sensor_width, static_cast<std::uint32_t>(options_.sensor_width));
+  put(sensor_height, static_cast<std::uint32_t>(options_.sensor_height));
+  put(width, static_cast<std::uint32_t>(options_.sensor_width));
+  put(height, static_cast<std::uint32_t>(options_.sensor_height));
   put(pixel_format, 0x01080001);
   put(payload_size, payload());
   put(acquisition_mode, 2);
@@ -78,29 +93,31 @@ void GigeCamera::Impl::reset() {
   put(exposure_time, std::bit_cast<std::uint32_t>(5000.0F));
   put(trigger_selector, 1);
   put(exposure_mode, 1);
-  put(exposure_auto, 2);  // as many cameras come: on
+  // On, as many cameras come.
+  put(exposure_auto, 2);
   put(gain_auto, 2);
   put(line_selector, 1);
   put(ptp_status, 3);
   acquiring_ = false;
   controller_ = {};
-  block_ = options.first_block;
+  block_ = options_.first_block;
   pulses_.clear();
 }
 
-std::uint32_t GigeCamera::Impl::payload() const {
+std::uint32_t GigeCamera::payload() const {
   return word(width) * word(height) * (word(pixel_format) >> 16U & 0xFFU) / 8;
 }
 
-void GigeCamera::Impl::take_control(bool taken) {
+void GigeCamera::take_control(bool taken) {
   const std::lock_guard lock(mutex_);
   controller_ = {};
   foreign_ = taken;
   put(kControl, taken ? 2 : 0);
-  acquiring_ = false;  // as whenever its controller changes
+  // As whenever its controller changes.
+  acquiring_ = false;
 }
 
-void GigeCamera::Impl::answer() {
+void GigeCamera::answer() {
   std::array<std::uint8_t, 2048> bytes{};
   for (;;) {
     std::array<pollfd, 3> fds{{{wake_, POLLIN, 0}, {control_, POLLIN, 0}, {broadcast_, POLLIN, 0}}};
@@ -110,7 +127,8 @@ void GigeCamera::Impl::answer() {
     const bool silent_for_long =
         !foreign_ && word(kControl) != 0 &&
         monotonic_now() - heard_ > Duration::milliseconds(word(kHeartbeat));
-    if (silent_for_long) {  // its controller is gone
+    // Its controller is gone.
+    if (silent_for_long) {
       put(kControl, 0);
       controller_ = {};
       acquiring_ = false;
@@ -126,7 +144,7 @@ void GigeCamera::Impl::answer() {
   }
 }
 
-bool GigeCamera::Impl::may_write(const sockaddr_in& from, std::uint32_t address) const {
+bool GigeCamera::may_write(const sockaddr_in& from, std::uint32_t address) const {
   if (foreign_) return false;
   const bool in_control = word(kControl) != 0;
   const bool theirs =
@@ -134,8 +152,8 @@ bool GigeCamera::Impl::may_write(const sockaddr_in& from, std::uint32_t address)
   return in_control ? theirs : address == kControl;
 }
 
-void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t length,
-                              const sockaddr_in& from) {
+void GigeCamera::handle(int fd, const std::uint8_t* bytes, std::size_t length,
+                        const sockaddr_in& from) {
   if (bytes[0] != 0x42) return;
   const bool wants_answer = (bytes[1] & 1U) != 0, extended = (bytes[1] & 0x10U) != 0;
   const std::uint32_t command = from_wire16(bytes + 2), size = from_wire16(bytes + 4),
@@ -147,31 +165,36 @@ void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t len
   Wire body;
   std::uint32_t status = kOk;
   switch (command) {
-    case 0x02:  // discovery
+    // Discovery.
+    case 0x02:
       for (std::uint32_t i = 0; i < 0xF8; ++i) body.u8(memory_[i]);
       break;
-    case 0x40:  // resend; never answered
+    // Resend; never answered.
+    case 0x40:
       if (size >= 12) {
         std::uint64_t block = from_wire(payload) & 0xFFFFU;
         if (extended && size >= 20)
           block =
               static_cast<std::uint64_t>(from_wire(payload + 12)) << 32U | from_wire(payload + 16);
-        sender.resend(block, from_wire(payload + 4) & (extended ? ~0U : 0xFFFFFFU),
-                      from_wire(payload + 8) & (extended ? ~0U : 0xFFFFFFU));
+        sender_.resend(block, from_wire(payload + 4) & (extended ? ~0U : 0xFFFFFFU),
+                       from_wire(payload + 8) & (extended ? ~0U : 0xFFFFFFU));
       }
       return;
-    case 0x80:  // read registers
+    // Read registers.
+    case 0x80:
       for (std::uint32_t i = 0; i + 4 <= size; i += 4) {
         const std::uint32_t address = from_wire(payload + i);
         if (address + 4 > kMemory) status = kInvalidAddress;
         body.u32(word(address));
       }
       break;
-    case 0x82:  // write registers
+    // Write registers.
+    case 0x82:
       status = write_registers(payload, size, from);
       body.u16(0).u16(status == kOk ? size / 8 : 0);
       break;
-    case 0x84: {  // read memory
+    // Read memory.
+    case 0x84: {
       const std::uint32_t address = from_wire(payload), count = from_wire16(payload + 6);
       if (size < 8 || address > kMemory || count > 536 || address + count > kMemory) {
         status = kInvalidAddress;
@@ -181,7 +204,8 @@ void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t len
       for (std::uint32_t i = 0; i < count; ++i) body.u8(memory_[address + i]);
       break;
     }
-    case 0x86: {  // write memory: registers in a row
+    // Write memory: registers in a row.
+    case 0x86: {
       const std::uint32_t address = from_wire(payload);
       for (std::uint32_t i = 4; i + 4 <= size && status == kOk; i += 4)
         status =
@@ -201,8 +225,8 @@ void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t len
                  sizeof from);
 }
 
-std::uint32_t GigeCamera::Impl::write_registers(const std::uint8_t* payload, std::uint32_t size,
-                                                const sockaddr_in& from) {
+std::uint32_t GigeCamera::write_registers(const std::uint8_t* payload, std::uint32_t size,
+                                          const sockaddr_in& from) {
   for (std::uint32_t i = 0; i + 8 <= size; i += 8) {
     const std::uint32_t address = from_wire(payload + i), value = from_wire(payload + i + 4);
     if (!may_write(from, address)) return kDenied;
@@ -216,9 +240,9 @@ std::uint32_t GigeCamera::Impl::write_registers(const std::uint8_t* payload, std
   return kOk;
 }
 
-bool GigeCamera::Impl::value_fits(std::uint32_t address, std::uint32_t value) const {
-  const auto w = static_cast<std::uint32_t>(options.sensor_width),
-             h = static_cast<std::uint32_t>(options.sensor_height);
+bool GigeCamera::value_fits(std::uint32_t address, std::uint32_t value) const {
+  const auto w = static_cast<std::uint32_t>(options_.sensor_width),
+             h = static_cast<std::uint32_t>(options_.sensor_height);
   switch (address) {
     case width:
       return value >= 16 && value % 8 == 0 && value + word(offset_x) <= w;
@@ -242,7 +266,7 @@ bool GigeCamera::Impl::value_fits(std::uint32_t address, std::uint32_t value) co
 }
 
 /// Precondition: mutex_ held.
-std::uint32_t GigeCamera::Impl::store(std::uint32_t address, std::uint32_t value) {
+std::uint32_t GigeCamera::store(std::uint32_t address, std::uint32_t value) {
   if (address + 4 > kDescription) return kInvalidAddress;
   if (!value_fits(address, value)) return kInvalidParameter;
   switch (address) {
@@ -274,7 +298,7 @@ std::uint32_t GigeCamera::Impl::store(std::uint32_t address, std::uint32_t value
     case kPacketSize:
       put(address, value & ~kFireTest);
       follow_registers();
-      if ((value & kFireTest) != 0) sender.fire_test_packet(value & 0xFFFFU);
+      if ((value & kFireTest) != 0) sender_.fire_test_packet(value & 0xFFFFU);
       return kOk;
     default:
       break;
@@ -285,13 +309,13 @@ std::uint32_t GigeCamera::Impl::store(std::uint32_t address, std::uint32_t value
 }
 
 /// Precondition: mutex_ held.
-void GigeCamera::Impl::follow_registers() {
+void GigeCamera::follow_registers() {
   sockaddr_in target{};
   target.sin_family = AF_INET;
   target.sin_port = htons(static_cast<std::uint16_t>(word(kStreamPort)));
   target.sin_addr.s_addr = htonl(word(kStreamTarget));
-  const std::uint64_t f = options.tick_frequency;
-  sender.aim(
+  const std::uint64_t f = options_.tick_frequency;
+  sender_.aim(
       target, word(kPacketSize) & 0xFFFFU,
       f == 0 ? Duration{}
              : Duration::seconds(static_cast<double>(word(kPacketDelay)) / static_cast<double>(f)));

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "tests/support/detail/gige_camera_impl.hpp"
+#include "tests/support/detail/gvcp.hpp"
 #include "tests/support/gige_camera.hpp"
 
 namespace vergence::test {

@@ -1,9 +1,10 @@
-#include <bit>
+#include <algorithm>
 #include <chrono>
 #include <tuple>
 
 #include "drivers/clock.hpp"
-#include "tests/support/detail/gige_camera_impl.hpp"
+#include "tests/support/detail/gvcp.hpp"
+#include "tests/support/gige_camera.hpp"
 
 /// The simulated camera's exposures: when, with what in them, and what becomes of them.
 namespace vergence::test {
@@ -12,24 +13,24 @@ namespace {
 using namespace gige_register;
 using namespace gvcp;
 
-constexpr std::size_t kLatchedPulses = 256;  // exposed one after the other, stamped with their own
-                                             // time: a busy machine's delays are none
+/// Exposed one after the other, stamped with their own time: a busy machine's delays are none.
+constexpr std::size_t kLatchedPulses = 256;
 }  // namespace
 
-void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source, HostStamp when) {
+void GigeCamera::pulse(std::uint64_t number, HostStamp when) {
   const std::lock_guard lock(mutex_);
-  if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != source ||
+  if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != 1 ||
       pulses_.size() >= kLatchedPulses)
     return;
   pulses_.emplace_back(number, when.ns() != 0 ? when : monotonic_now());
   changed_.notify_all();
 }
 
-GvspFrame GigeCamera::Impl::make_frame(std::uint64_t number, HostStamp when) {
+GvspFrame GigeCamera::make_frame(std::uint64_t number, HostStamp when) {
   GvspFrame f;
   f.number = number;
   f.block = block_++;
-  if (!options.extended_ids && block_ > 0xFFFFU) block_ = 1;
+  if (!options_.extended_ids && block_ > 0xFFFFU) block_ = 1;
   f.ticks = ticks(when);
   f.pixel_format = word(pixel_format);
   f.width = static_cast<int>(word(width));
@@ -42,18 +43,19 @@ GvspFrame GigeCamera::Impl::make_frame(std::uint64_t number, HostStamp when) {
   }
   const std::size_t bytes = static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) *
                             (f.pixel_format >> 16U & 0xFFU) / 8;
-  const std::uint8_t* given = options.images ? options.images(number) : nullptr;
+  const std::uint8_t* given = options_.images ? options_.images(number) : nullptr;
   if (given != nullptr) {
     f.pixels.assign(given, given + bytes);
   } else {
-    f.pixels.assign(bytes, static_cast<std::uint8_t>(31 * number));  // every byte tells its image
+    // Every byte tells its image.
+    f.pixels.assign(bytes, static_cast<std::uint8_t>(31 * number));
   }
-  if (options.number_images)
+  if (options_.number_images)
     for (std::size_t i = 0; i < 8; ++i) f.pixels[i] = static_cast<std::uint8_t>(number >> (8 * i));
   return f;
 }
 
-void GigeCamera::Impl::expose() {
+void GigeCamera::expose() {
   std::unique_lock lock(mutex_);
   HostStamp last{};
   for (;;) {
@@ -91,7 +93,7 @@ void GigeCamera::Impl::expose() {
       fate = GvspSender::Fate::torn;
     }
     lock.unlock();
-    sender.send(std::move(frame), fate);
+    sender_.send(std::move(frame), fate);
     lock.lock();
   }
 }

@@ -27,8 +27,10 @@ struct PvtBytes {
     put(11, 1, 7), put(20, 1, 3), put(21, 1, 1), put(23, 1, 17);
     put(24, 4, 1530137000), put(28, 4, -274975000), put(32, 4, 60000);
     put(40, 4, 1414), put(44, 4, 2000), put(68, 4, 100), put(76, 2, 120);
-    put(48, 4, 3000), put(52, 4, 4000), put(56, 4, -500);  // north, east, down, mm/s
-    put(60, 4, 5000), put(64, 4, 5313010);                 // 5 m/s at 53.1301°
+    // North, east, down in mm/s.
+    put(48, 4, 3000), put(52, 4, 4000), put(56, 4, -500);
+    // 5 m/s at 53.1301°.
+    put(60, 4, 5000), put(64, 4, 5313010);
   }
   void put(std::size_t at, std::size_t size, std::int64_t value) {
     for (std::size_t i = 0; i < size; ++i)

@@ -15,7 +15,10 @@ namespace vergence::test {
 namespace {
 
 constexpr std::uint32_t kLeader = 1, kTrailer = 2, kData = 3;
-constexpr std::uint32_t kUnavailable = 0x800C;  // GEV_STATUS_PACKET_UNAVAILABLE
+/// Payload type of an image.
+constexpr std::uint32_t kImage = 1;
+/// GEV_STATUS_PACKET_UNAVAILABLE.
+constexpr std::uint32_t kUnavailable = 0x800C;
 
 }  // namespace
 
@@ -32,10 +35,8 @@ GvspSender::GvspSender(const std::string& address, bool extended_ids, std::uint6
   if (socket_ < 0 || ::inet_pton(AF_INET, address.c_str(), &own.sin_addr) != 1 ||
       ::bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0)
     throw std::runtime_error("simulated camera: no stream socket on " + address);
-  socklen_t length = sizeof own;
-  (void)::getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &length);
-  port_ = ntohs(own.sin_port);
-  const int room = 4 << 20;  // its own queue is not what is tested
+  // Its own queue is not what is tested.
+  const int room = 4 << 20;
   (void)::setsockopt(socket_, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
 }
 
@@ -87,20 +88,20 @@ void GvspSender::packet(const Record& record, std::uint32_t id, bool again) {
   const GvspFrame& f = record.frame;
   if (id == 0) {
     Wire w = header(f.block, kLeader, id, 0);
-    w.u16(0).u16(f.payload_type).u64(f.ticks);
-    if (f.payload_type != 4)
-      w.u32(f.pixel_format)
-          .u32(static_cast<std::uint32_t>(f.width))
-          .u32(static_cast<std::uint32_t>(f.height))
-          .u32(static_cast<std::uint32_t>(f.offset_x))
-          .u32(static_cast<std::uint32_t>(f.offset_y))
-          .u16(0)
-          .u16(0);
+    w.u16(0)
+        .u16(kImage)
+        .u64(f.ticks)
+        .u32(f.pixel_format)
+        .u32(static_cast<std::uint32_t>(f.width))
+        .u32(static_cast<std::uint32_t>(f.height))
+        .u32(static_cast<std::uint32_t>(f.offset_x))
+        .u32(static_cast<std::uint32_t>(f.offset_y))
+        .u16(0)
+        .u16(0);
     transmit(w.bytes(), {});
   } else if (id + 1 == record.packets) {
     Wire w = header(f.block, kTrailer, id, 0);
-    w.u32(f.payload_type);
-    if (f.payload_type != 4) w.u32(static_cast<std::uint32_t>(f.height));
+    w.u32(kImage).u32(static_cast<std::uint32_t>(f.height));
     transmit(w.bytes(), {});
   } else {
     const std::size_t begin = static_cast<std::size_t>(id - 1) * record.data_bytes;
@@ -134,7 +135,8 @@ void GvspSender::send(GvspFrame frame, Fate fate) {
     packet(record, id, false);
     due = due + packet_delay_;
     const Duration ahead = due - monotonic_now();
-    lock.unlock();  // requests to send again are answered between packets, as a camera does
+    // Requests to send again are answered between packets, as a camera does.
+    lock.unlock();
     if (ahead > Duration::microseconds(60)) sleep_until(due);
     lock.lock();
   }

@@ -4,16 +4,35 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <mutex>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/math/random.hpp"
-#include "tests/support/gige_camera.hpp"
+#include "core/types/time.hpp"
 
 namespace vergence::test {
+
+/// Exact counts of the simulated camera's exposures. A frame is one exposure since the
+/// acquisition's start.
+struct GigeCameraReport {
+  std::uint64_t exposed = 0;
+  /// Frames of which every packet was sent, at first or on request.
+  std::uint64_t whole = 0;
+  /// Frames of which the leader was sent, but not every other packet.
+  std::uint64_t torn = 0;
+  /// Frames of which the leader was not sent, but another packet was.
+  std::uint64_t headless = 0;
+  /// Frames of which no packet was sent.
+  std::uint64_t nothing = 0;
+  /// Packets that were not sent at first.
+  std::uint64_t dropped = 0;
+  /// Packets requested again, and those of them that were sent.
+  std::uint64_t asked = 0, resent = 0;
+  /// Number of acquisition starts.
+  std::uint64_t starts = 0;
+};
 
 /// Bytes in network order, appended.
 class Wire {
@@ -36,10 +55,10 @@ class Wire {
 /// One frame to be sent.
 struct GvspFrame {
   std::uint64_t number = 0, block = 0, ticks = 0;
-  std::uint32_t payload_type = 1;  // 4: the leader does not tell what image it is
   std::uint32_t pixel_format = 0;
   int width = 0, height = 0, offset_x = 0, offset_y = 0;
-  std::vector<std::uint8_t> pixels;  // and the chunk data behind them
+  /// Pixels, and the chunk data behind them.
+  std::vector<std::uint8_t> pixels;
 };
 
 /// The stream channel of the simulated camera: packets, their loss, what is sent again, and the
@@ -64,20 +83,23 @@ class GvspSender {
 
   void add_to(GigeCameraReport* report) const;
   [[nodiscard]] std::vector<std::uint64_t> whole() const;
-  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
 
  private:
-  static constexpr std::size_t kHistory = 8;  // frames that can be asked for again
+  /// Frames that can be asked for again.
+  static constexpr std::size_t kHistory = 8;
   struct Record {
     GvspFrame frame;
-    std::uint32_t data_bytes = 0,
-                  packets = 0;  // of a packet; of the frame, leader and trailer among them
+    /// Bytes of a packet; packets of the frame, leader and trailer among them.
+    std::uint32_t data_bytes = 0, packets = 0;
     std::size_t account = 0;
   };
   struct Account {
-    std::uint64_t number = 0;  // of the image
-    std::vector<bool> went;    // by packet
-    bool never = false;        // torn on purpose: packet `hole` is not sent again either
+    /// Number of the image.
+    std::uint64_t number = 0;
+    /// By packet.
+    std::vector<bool> went;
+    /// Torn on purpose: packet `hole` is not sent again either.
+    bool never = false;
     std::uint32_t hole = 0;
   };
   void packet(const Record& record, std::uint32_t id, bool again);
@@ -86,9 +108,9 @@ class GvspSender {
                             std::uint32_t status) const;
 
   int socket_ = -1;
-  std::uint16_t port_ = 0;
   bool extended_;
-  mutable std::mutex mutex_;  // held for one packet at a time while a frame goes out
+  /// Held for one packet at a time while a frame goes out.
+  mutable std::mutex mutex_;
   double loss_ = 0;
   Random random_;
   sockaddr_in target_{};

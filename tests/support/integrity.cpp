@@ -4,8 +4,6 @@
 #include <optional>
 #include <utility>
 
-#include "core/math/so3.hpp"
-
 namespace vergence::test {
 namespace {
 
@@ -93,7 +91,8 @@ NormalError normal_error_there(std::vector<EvaluatedPose> poses, app::Trajectory
 Integrity evaluate_integrity(std::span<const EvaluatedPose> poses, const NormalError& normal,
                              const app::Trajectory& truth) {
   Integrity h;
-  std::size_t posed_since = 0, ok_since = 0;  // indices of the first pose of the run
+  // Indices of the first pose of the run.
+  std::size_t posed_since = 0, ok_since = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (poses[i].status == PoseStatus::lost) posed_since = i + 1, ++h.lost;
     if (poses[i].status != PoseStatus::ok) {

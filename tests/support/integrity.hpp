@@ -17,7 +17,8 @@
 /// than the rest: a focal length that is off turns every corner too far.
 namespace vergence::test {
 
-inline constexpr std::size_t kIntegrityFrames = 20;  // fewer at the beginning
+/// Fewer at the beginning.
+inline constexpr std::size_t kIntegrityFrames = 20;
 /// Frames of the untouched drive that what is normal is known over: those between 20 of a drive
 /// that has every third.
 inline constexpr std::size_t kLongestNormal = 3 * kIntegrityFrames;
@@ -53,16 +54,21 @@ using NormalError = std::function<MotionError(Stamp from, Stamp to)>;
 
 struct Integrity {
   int ok = 0, lost = 0;
-  int wrong = 0;           // `ok`, and wrong over its frames since the last that was not `ok`
-  int wrong_over_all = 0;  // `ok`, and wrong over its frames since the last that was `lost`
-  int not_evaluated = 0;   // `ok`, and at its stamp or at that of the first pose it is held against
-                           // there is no truth: it says where the rig was at another time
-  std::size_t first_wrong =
-      0;  // index; with it what its motion is off by, and over how many frames
+  /// `ok`, and wrong over its frames since the last that was not `ok`.
+  int wrong = 0;
+  /// `ok`, and wrong over its frames since the last that was `lost`.
+  int wrong_over_all = 0;
+  /// `ok`, without truth at its stamp or at that of the first pose it is held against: it says
+  /// where the rig was at another time.
+  int not_evaluated = 0;
+  /// Index of the first wrong pose; then the error of its motion, and over how many frames.
+  std::size_t first_wrong = 0;
   MotionError first_error{};
   std::size_t first_over = 0;
-  double most = 0;      // times the normal error, of those that `wrong` counts among
-  double max_full = 0;  // the same of those over all kIntegrityFrames
+  /// Most times the normal error among those that `wrong` counts.
+  double most = 0;
+  /// The same among those over all kIntegrityFrames.
+  double max_full = 0;
 };
 /// `poses` in order, one for each frame, also the lost ones. The first `ok` pose after one that is
 /// not has no motion that is claimed, and is judged by `wrong_over_all` alone.

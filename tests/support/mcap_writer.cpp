@@ -1,4 +1,3 @@
-#include <lz4frame.h>
 #include <zlib.h>
 #include <zstd.h>
 
@@ -6,12 +5,6 @@
 
 namespace vergence::test {
 namespace {
-
-std::string number(std::uint64_t value, int size) {
-  std::string out;
-  for (int i = 0; i < size; ++i) out.push_back(static_cast<char>(value >> (8 * i) & 0xFFU));
-  return out;
-}
 
 std::string text(std::string_view s) { return number(s.size(), 4).append(s); }
 
@@ -25,11 +18,7 @@ std::string packed(const std::string& compression, const std::string& records) {
     out.resize(ZSTD_compress(out.data(), out.size(), records.data(), records.size(), 1));
     return out;
   }
-  if (compression == "lz4") {
-    std::string out(LZ4F_compressFrameBound(records.size(), nullptr), '\0');
-    out.resize(LZ4F_compressFrame(out.data(), out.size(), records.data(), records.size(), nullptr));
-    return out;
-  }
+  if (compression == "lz4") return lz4_frame(records);
   return records;
 }
 

@@ -16,8 +16,8 @@ namespace vergence::test {
   };
   const std::size_t changes = 1 + any(4);
   for (std::size_t i = 0; i < changes && file.size() > 16; ++i) {
-    const std::size_t at = any(any(3) == 0 ? std::min<std::size_t>(file.size(), 80)
-                                           : file.size());  // Headers are damaged more often.
+    // Headers are damaged more often.
+    const std::size_t at = any(any(3) == 0 ? std::min<std::size_t>(file.size(), 80) : file.size());
     const auto place = file.begin() + static_cast<std::ptrdiff_t>(at);
     switch (any(5)) {
       case 0:

@@ -48,19 +48,29 @@ inline constexpr std::array kRecordedDrives = {"kitti06_51",     "kitti01_51",  
 /// Result of one pass. Frames count from 0; −1: never.
 struct DriveOutcome {
   int frames = 0, ok = 0, degraded = 0, lost = 0;
-  int knocks = 0;  // told before `knock_at`
+  /// Told before `knock_at`.
+  int knocks = 0;
   int verified_at = -1, since_verified = 0, ok_since_verified = 0;
   int contradicted_at = -1, ok_before_verified = 0;
-  int reported_at = -1, mended_at = -1, ok_before_mended = 0;  // of a knock
+  /// After a knock.
+  int reported_at = -1, mended_at = -1, ok_before_mended = 0;
   double contradicted_percent = 0;
-  double ate_m = 0, ate_scaled_m = 0, scale = 1;  // ate_scaled_m: after one scale
-  double segments_percent = -1;                   // −1: too short for segments of 10 to 50 m
-  double held_out_px = 0;                         // of the last decision that had frames held out
-  FocalMeasurement focal;                         // the newest
-  std::optional<RigCalibration> rig;              // in use at the end
-  std::vector<PoseSample> samples;                // one a frame
-  int adopted = 0, adopted_at = -1;               // calibrations, and the first of them
-  double points_kept_percent = 100;  // of the scene's points, at the adoption that cost most
+  /// ate_scaled_m: after one scale.
+  double ate_m = 0, ate_scaled_m = 0, scale = 1;
+  /// −1: too short for segments of 10 to 50 m.
+  double segments_percent = -1;
+  /// Error of the last decision that had frames held out.
+  double held_out_px = 0;
+  /// The newest.
+  FocalMeasurement focal;
+  /// In use at the end.
+  std::optional<RigCalibration> rig;
+  /// One a frame.
+  std::vector<PoseSample> samples;
+  /// Number of adopted calibrations, and frame of the first.
+  int adopted = 0, adopted_at = -1;
+  /// Share of the scene's points, at the adoption that cost most.
+  double points_kept_percent = 100;
 };
 
 /// `knock_at`: the frame from which on the images are of a turned camera, if any.

@@ -9,7 +9,8 @@
 namespace vergence::test {
 
 struct ReadMessage {
-  std::string topic, type;  // as ROS 1 writes it
+  /// The type as ROS 1 writes it.
+  std::string topic, type;
   std::string content;
 };
 

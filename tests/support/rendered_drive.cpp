@@ -1,8 +1,6 @@
 #include "tests/support/rendered_drive.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
 #include <thread>
 
 #include "core/camera/camera.hpp"

@@ -19,10 +19,13 @@ namespace vergence::test {
 [[nodiscard]] RigCalibration nominal_rig();
 
 struct RenderedDriveOptions {
-  RigCalibration rig = paper_rig();  // true
+  /// True.
+  RigCalibration rig = paper_rig();
   mock::DriveOptions drive{};
-  double from_s = 8;  // into the drive, of frame 0
-  double rate = 30;   // Hz
+  /// Time of frame 0 in the drive.
+  double from_s = 8;
+  /// Hz.
+  double rate = 30;
   /// The true T_camera_left of camera k in frame i; empty: the rig's.
   std::function<Transform(int k, std::uint64_t frame)> placed;
 };

@@ -40,7 +40,8 @@ std::string camera_info_message(Wire wire, std::int64_t stamp, const CameraInfoM
       .put_all<double>({info.fx, 0, info.cx, 0, info.fy, info.cy, 0, 0, 1})
       .put_all<double>({1, 0, 0, 0, 1, 0, 0, 0, 1})
       .put_all<double>({info.fx, 0, info.cx, info.fx_times_b, 0, info.fx, info.cy, 0, 0, 0, 1, 0})
-      .put_all<std::uint32_t>({0, 0, 0, 0, 0, 0})  // binning and region of interest
+      // Binning and region of interest.
+      .put_all<std::uint32_t>({0, 0, 0, 0, 0, 0})
       .put(std::uint8_t{0})
       .bytes();
 }
@@ -61,8 +62,8 @@ std::string imu_message(Wire wire, std::int64_t stamp, const std::array<double, 
   RosWriter w(wire);
   w.header(stamp).put_all<double>({q[0], q[1], q[2], q[3]});
   w.put_all(diagonal({variance, variance, variance}));
-  for (int i = 0; i < 2; ++i)  // angular velocity and acceleration
-    w.put_all<double>({0, 0, 0}).put_all(diagonal({0, 0, 0}));
+  // Angular velocity and acceleration.
+  for (int i = 0; i < 2; ++i) w.put_all<double>({0, 0, 0}).put_all(diagonal({0, 0, 0}));
   return w.bytes();
 }
 

@@ -11,8 +11,10 @@
 namespace vergence::test {
 
 struct ImageMessage {
-  std::uint32_t width = 0, height = 0;  // px
-  std::uint32_t step = 0;               // bytes a row
+  /// px.
+  std::uint32_t width = 0, height = 0;
+  /// Bytes a row.
+  std::uint32_t step = 0;
   std::string encoding = "mono8";
   std::string data{};
   bool big_endian = false;
@@ -25,16 +27,20 @@ struct CameraInfoMessage {
   std::uint32_t width = 0, height = 0;
   std::string model = "plumb_bob";
   std::vector<double> d{0, 0, 0, 0, 0};
-  double fx = 0, fy = 0, cx = 0, cy = 0;  // of K and, fy = fx, of P
-  double fx_times_b = 0;                  // px·m: fourth number of P
+  /// Numbers of K and, with fy = fx, of P.
+  double fx = 0, fy = 0, cx = 0, cy = 0;
+  /// Fourth number of P, px·m.
+  double fx_times_b = 0;
 };
 [[nodiscard]] std::string camera_info_message(Wire wire, std::int64_t stamp,
                                               const CameraInfoMessage& info);
 
 struct FixMessage {
   std::int8_t status = 0;
-  double latitude = 0, longitude = 0, altitude = 0;  // deg, m
-  double variance = 0;                               // m², east and north; up four times
+  /// deg, m.
+  double latitude = 0, longitude = 0, altitude = 0;
+  /// East and north, m²; up four times.
+  double variance = 0;
 };
 [[nodiscard]] std::string fix_message(Wire wire, std::int64_t stamp, const FixMessage& fix);
 

@@ -8,13 +8,8 @@
 namespace vergence::test {
 namespace {
 
-constexpr std::size_t kBagHeader = 4096;  // bytes of the first record, padded
-
-std::string number(std::uint64_t value, int size) {
-  std::string out;
-  for (int i = 0; i < size; ++i) out.push_back(static_cast<char>(value >> (8 * i) & 0xFFU));
-  return out;
-}
+/// Bytes of the first record, padded.
+constexpr std::size_t kBagHeader = 4096;
 
 std::string fields_of(const RosbagWriter::Fields& fields) {
   std::string out;
@@ -52,17 +47,25 @@ std::string packed(const std::string& compression, const std::string& records) {
     out.resize(size);
     return out;
   }
-  if (compression == "lz4") {
-    std::string out(LZ4F_compressFrameBound(records.size(), nullptr), '\0');
-    out.resize(LZ4F_compressFrame(out.data(), out.size(), records.data(), records.size(), nullptr));
-    return out;
-  }
+  if (compression == "lz4") return lz4_frame(records);
   return records;
 }
 
 constexpr const char* kMagic = "#ROSBAG V2.0\n";
 
 }  // namespace
+
+std::string number(std::uint64_t value, int size) {
+  std::string out;
+  for (int i = 0; i < size; ++i) out.push_back(static_cast<char>(value >> (8 * i) & 0xFFU));
+  return out;
+}
+
+std::string lz4_frame(const std::string& records) {
+  std::string out(LZ4F_compressFrameBound(records.size(), nullptr), '\0');
+  out.resize(LZ4F_compressFrame(out.data(), out.size(), records.data(), records.size(), nullptr));
+  return out;
+}
 
 RosbagWriter::RosbagWriter(std::string compression) : compression_(std::move(compression)) {
   file_ = kMagic + bag_header(0, 0, 0);

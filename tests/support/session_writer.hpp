@@ -1,26 +1,28 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <numbers>
 #include <string>
 
 #include <fmt/format.h>
 
+#include "app/session/calibration_writer.hpp"
+#include "app/session/records.hpp"
 #include "core/math/random.hpp"
 
 namespace vergence::test {
 
-/// Writes a session folder as a drive of a kilometre or more around blocks leaves it: an INS from
-/// the start, a placement after 100 m, growing drift, a covered lens (degraded, then lost), a
-/// rejected and an accepted calibration.
+/// Writes the session folder of a run in a circle: an INS from the start, an ENU alignment after
+/// 100 m, growing drift, a covered lens (degraded, then lost), a rejected and accepted
+/// calibrations.
 struct SessionWriter {
   std::size_t frames = 3000;
-  double rate = 20;  // Hz
   bool ins = true;
   bool faults = true;
-  std::uint64_t seed = 1;
   std::int64_t first_stamp_ns = 1'772'360'100'000'000'000;
 
   void write(const std::filesystem::path& folder) {
@@ -38,17 +40,9 @@ struct SessionWriter {
            "     T_camera_left: [1, 0, 0, -0.75, 0, 1, 0, 0, 0, 0, 1, 0]}\n";
   }
 
-  static constexpr const char* kHead =
-      "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_"
-      "deg,height_m,heading_deg,ins_east,ins_"
-      "north,"
-      "ins_up,ins_latitude_deg,ins_longitude_deg,ins_height_m,ins_heading_deg,error_east_m,error_"
-      "north_m,error_up_m,error_heading_deg,"
-      "inliers,reprojection_px,estimate_ms\n";
-
  private:
   [[nodiscard]] std::int64_t stamp(std::size_t i) const {
-    return first_stamp_ns + static_cast<std::int64_t>(static_cast<double>(i) / rate * 1e9);
+    return first_stamp_ns + static_cast<std::int64_t>(i) * 50'000'000;
   }
   [[nodiscard]] std::size_t part(double share) const {
     return static_cast<std::size_t>(share * static_cast<double>(frames));
@@ -59,101 +53,71 @@ struct SessionWriter {
   [[nodiscard]] bool degraded(std::size_t i) const {
     return faults && i >= part(0.60) && i < part(0.66) && !lost(i);
   }
+  /// Appends numbers, or as many empty fields if they are not known.
+  static void add(std::string* line, bool known, std::initializer_list<double> numbers) {
+    for (const double n : numbers) *line += known ? fmt::format(",{:.6f}", n) : ",";
+  }
 
-  /// Around blocks: straight stretches with rounded corners, a closed way.
+  /// A circle at 0.44 m per frame, over a hill.
   void write_frames(const std::filesystem::path& folder) {
     std::ofstream poses(folder / "poses.csv"), trajectory(folder / "trajectory.tum"),
         reference(folder / "reference.tum");
-    poses << kHead;
-    Random random(seed);
-    double east = 0, north = 0, driven = 0, wander_east = 0, wander_north = 0;
-    const double way = 2.2 * static_cast<double>(frames) / 20;
+    poses << app::kPosesHeader << '\n';
+    constexpr double kStep = 0.44;
+    const double turn = 2 * std::numbers::pi / static_cast<double>(frames);
+    Random random(1);
     for (std::size_t i = 0; i < frames; ++i) {
-      const double s = static_cast<double>(i) / static_cast<double>(frames);
-      const double speed =
-          s < 0.02 || (s > 0.4 && s < 0.43) ? 0.5 : way / static_cast<double>(frames) * 4;
-      const double yaw =
-          0.6 +
-          2 * std::numbers::pi * (s + 0.11 * std::sin(8 * std::numbers::pi * s));  // ccw from east
-      east += speed * std::cos(yaw), north += speed * std::sin(yaw), driven += speed;
-      const double up = 6 * std::sin(4 * std::numbers::pi * s);
-      wander_east = 0.995 * wander_east + 0.08 * random.normal(),
-      wander_north = 0.995 * wander_north + 0.08 * random.normal();
-      const double drift = 0.006 * std::max(0.0, driven - 100);
-      write_frame(i, driven, {east + drift, north - 0.4 * drift, up + 0.3 * drift},
-                  {east + wander_east, north + wander_north, up}, yaw, random, poses, trajectory,
-                  reference);
+      const double yaw = turn * static_cast<double>(i);
+      driven_ = kStep * static_cast<double>(i);
+      const double drift = 0.006 * std::max(0.0, driven_ - 100);
+      const Vec3 ins_enu(kStep / turn * std::sin(yaw), -kStep / turn * std::cos(yaw),
+                         6 * std::sin(2 * yaw)),
+          error = drift * Vec3(1, -0.4, 0.3), enu = ins_enu + error;
+      write_frame(i, enu, ins_enu, yaw, random, poses, trajectory, reference);
     }
-    driven_ = driven;
   }
 
-  struct Place {
-    double east, north, up;
-  };
-
-  void write_frame(std::size_t i, double driven, const Place& ours, const Place& theirs, double yaw,
-                   Random& random, std::ofstream& poses, std::ofstream& trajectory,
+  void write_frame(std::size_t i, const Vec3& enu, const Vec3& ins_enu, double yaw, Random& random,
+                   std::ofstream& poses, std::ofstream& trajectory,
                    std::ofstream& reference) const {
-    const double t = static_cast<double>(stamp(i) - first_stamp_ns) * 1e-9;
-    const std::string seconds =
-        fmt::format("{}.{:09}", stamp(i) / 1'000'000'000, stamp(i) % 1'000'000'000);
-    const double half = -yaw / 2;  // about y, which points down
-    const std::string quaternion = fmt::format("0,{:.9f},0,{:.9f}", std::sin(half), std::cos(half));
-    const char* status = lost(i) ? "lost" : degraded(i) ? "degraded" : "ok";
-    const char* reason = lost(i) ? "no_pose" : degraded(i) ? "image_no_contrast" : "";
+    const bool posed = !lost(i), placed = ins && driven_ > 100 && posed, weak = degraded(i);
     const char* state = lost(i)          ? "lost"
                         : i < part(0.03) ? "initialising"
                         : i < part(0.08) ? "parallel_monocular"
                                          : "stereo_odometry";
-    std::string line = fmt::format("{},{},{},{},{}", i, stamp(i), state, status, reason);
-    // The odometry's world: x right, y down, z forward of a rig that started looking east.
-    if (lost(i))
-      line += ",,,,,,,";
-    else
-      line += fmt::format(",{:.9f},{:.9f},{:.9f},{}", -ours.north, -ours.up, ours.east, quaternion);
-    const bool placed = ins && driven > 100 && !lost(i);
-    if (placed)
-      line += fmt::format(",{:.4f},{:.4f},{:.4f},-27.49,153.01,60,{:.3f}", ours.east, ours.north,
-                          ours.up, 90 - yaw * 57.29577951);
-    else
-      line += ",,,,,,,";
-    if (ins)
-      line += fmt::format(",{:.4f},{:.4f},{:.4f},-27.49,153.01,60,{:.3f}", theirs.east,
-                          theirs.north, theirs.up, 90 - yaw * 57.29577951);
-    else
-      line += ",,,,,,,";
-    if (placed)
-      line += fmt::format(",{:.4f},{:.4f},{:.4f},{:.4f}", ours.east - theirs.east,
-                          ours.north - theirs.north, ours.up - theirs.up,
-                          0.5 * std::sin(t / 30) + 0.1 * random.normal());
-    else
-      line += ",,,,";
-    const double dip = degraded(i) || lost(i) ? 0.2 : 1.0;
-    line += fmt::format(",{:.0f},0.3,{:.3f}\n",
-                        dip * (230 + 40 * std::sin(t / 7) + 15 * random.normal()),
+    std::string line = fmt::format("{},{},{},{},{}", i, stamp(i), state,
+                                   lost(i) ? "lost"
+                                   : weak  ? "degraded"
+                                           : "ok",
+                                   lost(i) ? "no_pose"
+                                   : weak  ? "image_no_contrast"
+                                           : "");
+    // The odometry's world has x right, y down and z forward of a rig that started looking east. A
+    // yaw of the vehicle is a negative rotation about y.
+    const double s = -std::sin(yaw / 2), c = std::cos(yaw / 2), heading = 90 - yaw * 57.29577951;
+    add(&line, posed, {-enu.y(), -enu.z(), enu.x(), 0, s, 0, c});
+    add(&line, placed, {enu.x(), enu.y(), enu.z(), -27.49, 153.01, 60, heading});
+    add(&line, ins, {ins_enu.x(), ins_enu.y(), ins_enu.z(), -27.49, 153.01, 60, heading});
+    const Vec3 error = enu - ins_enu;
+    add(&line, placed, {error.x(), error.y(), error.z(), 0.5 * std::sin(driven_ / 300)});
+    line += fmt::format(",{:.0f},0.3,{:.3f}\n", (posed && !weak ? 230 : 46) + 15 * random.normal(),
                         12 + 3 * std::abs(random.normal()) + (i % 997 == 500 ? 45 : 0));
     poses << line;
-    if (lost(i)) return;
-    trajectory << fmt::format("{} {:.9f} {:.9f} {:.9f} 0 {:.9f} 0 {:.9f}\n", seconds, -ours.north,
-                              -ours.up, ours.east, std::sin(half), std::cos(half));
+    if (!posed) return;
+    const std::string seconds =
+        fmt::format("{}.{:09}", stamp(i) / 1'000'000'000, stamp(i) % 1'000'000'000);
+    trajectory << fmt::format("{} {:.9f} {:.9f} {:.9f} 0 {:.9f} 0 {:.9f}\n", seconds, -enu.y(),
+                              -enu.z(), enu.x(), s, c);
     if (!ins) return;
-    // About up by the yaw, after the axes of a camera that looks east.
-    const double c = 0.5 * std::cos(yaw / 2), d = 0.5 * std::sin(yaw / 2);
+    // Axes of a camera that looks east, rotated about up by the yaw.
     reference << fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", seconds,
-                             theirs.east, theirs.north, theirs.up, -c - d, c - d, d - c, c + d);
+                             ins_enu.x(), ins_enu.y(), ins_enu.z(), (s - c) / 2, (c + s) / 2,
+                             (-s - c) / 2, (c - s) / 2);
   }
 
   void write_calibrations(const std::filesystem::path& folder) const {
     std::ofstream out(folder / "calibrations.csv");
-    out << "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_"
-           "out_before_px,held_out_after_px,scale_"
-           "sigma,"
-           "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,sigma_"
-           "total_rx,"
-           "sigma_total_ry,sigma_total_rz,sigma_total_tx,sigma_total_ty,sigma_total_tz,"
-           "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,"
-           "sigma_d3,"
-           "reference_depth_m,depth_sigma_percent,depth_error_percent,verified\n";
+    out << app::kCalibrationsHeader << '\n';
     const auto row = [&](double share, const char* outcome, const char* cause, const char* reason,
                          double off, double sigma) {
       out << fmt::format(
@@ -165,7 +129,7 @@ struct SessionWriter {
           out << fmt::format(",{:.6f}", scale * sigma * (k < 3 ? 1.0 : 2.0));
       out << fmt::format(",{:.3f},450,{:.3f},240,{:.3f},{:.3f},{:.3f},0", 450 + 100 * off,
                          318 + 900 * off, 300 * sigma, 300 * sigma, 900 * sigma);
-      out << fmt::format(",{:.6f},0,0,0,{:.6f},0,0,0,20,{:.4f},{:.4f},1\n", 2 * off, sigma,
+      out << fmt::format(",{:.6f},0,0,0,{:.6f},0,0,0,,,,,,,,,20,{:.4f},{:.4f},1\n", 2 * off, sigma,
                          500 * sigma, 300 * off);
     };
     row(0.08, "accepted", "from_scratch", "", 0.0006, 0.0009);

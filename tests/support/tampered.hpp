@@ -14,8 +14,8 @@ namespace vergence::test {
 /// A device whose bytes a test changes or drops on their way to the host.
 class Tampered final : public DeviceModel {
  public:
-  using Tamper =
-      std::function<void(HostStamp at, std::vector<std::uint8_t>* frame)>;  // whole, as it was made
+  /// Gets the whole frame, as it was made.
+  using Tamper = std::function<void(HostStamp at, std::vector<std::uint8_t>* frame)>;
   explicit Tampered(std::shared_ptr<DeviceModel> device, Tamper tamper = {})
       : device_(std::move(device)), tamper_(std::move(tamper)) {}
   void tamper(Tamper tamper) { tamper_ = std::move(tamper); }

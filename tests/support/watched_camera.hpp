@@ -40,11 +40,12 @@ class WatchedCamera final : public CameraDevice {
   void stop() noexcept override { camera_->stop(); }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
 
-  std::array<HostStamp, 64>
-      edge_of_slot{};  // not before the true edge, and at most 1.9 ms after it: the mock's jitter
+  /// Not before the true edge, and at most 1.9 ms after it: the mock's jitter.
+  std::array<HostStamp, 64> edge_of_slot{};
 
   static constexpr HostStamp kNever{std::numeric_limits<std::int64_t>::max()};
-  HostStamp hangs_from = kNever;  // gives nothing from then on, until it is started again
+  /// Gives nothing from then on, until it is started again.
+  HostStamp hangs_from = kNever;
   int starts = 0;
 
  private:

@@ -62,14 +62,14 @@ void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t s
 
 /// Prior in addition to the tracks: its information, and its contribution to the gradient's
 /// variance as a separate cluster.
-struct KnownBeside {
+struct PriorInformation {
   Shared information, variance;
 };
 
-KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem,
-                         const BundleOptions& options, const BundleState& state,
-                         const System& system) noexcept {
-  KnownBeside known{Shared::Zero(s.size, s.size), Shared::Zero(s.size, s.size)};
+PriorInformation prior_information(const SharedLayout& s, const BundleProblem& problem,
+                                   const BundleOptions& options, const BundleState& state,
+                                   const System& system) noexcept {
+  PriorInformation known{Shared::Zero(s.size, s.size), Shared::Zero(s.size, s.size)};
   for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
     if (s.extrinsic[k] >= 0 && options.length[k].kind == BundleLength::measured) {
       const Transform& T = state.T_camera_left[k];
@@ -91,33 +91,21 @@ KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem,
   return known;
 }
 
-/// Matrix from the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ;
-/// only its first columns are used.
-Mat6 to_published(const SharedLayout& s, const KernelCamera& camera, const Transform& T,
-                  int k) noexcept {
-  Mat6 turn = Mat6::Zero();
-  turn.topRightCorner<3, 3>() = T.R;
-  turn.bottomLeftCorner<3, 3>() = T.R;
-  return turn * extrinsic_basis(s, camera, k);
-}
-
 Mat6 published(const Shared& estimated, const SharedLayout& s, const KernelCamera& camera,
                const Transform& T, int k) noexcept {
   const int size = s.exact[k] ? 5 : 6;
   Mat6 rows = Mat6::Zero();
   rows.topLeftCorner(size, size) = estimated.block(s.extrinsic[k], s.extrinsic[k], size, size);
-  const Mat6 to = to_published(s, camera, T, k);
+  // (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ.
+  Mat6 turn = Mat6::Zero();
+  turn.topRightCorner<3, 3>() = T.R;
+  turn.bottomLeftCorner<3, 3>() = T.R;
+  const Mat6 to = turn * extrinsic_basis(s, camera, k);
   return to * rows * to.transpose();
 }
 
-/// A row of θ_S as a combination of rows of RigCovariance.
-struct PublishedRow {
-  int first = 0, count = 0;
-  double factor[6]{};
-};
-
 /// Writes the joint covariance of estimated and fixed parameters in RigCovariance's order.
-void publish_all(const Shared& joint, const PublishedRow* rows, RigCovariance* out) noexcept {
+void publish_all(const Shared& joint, const Combination* rows, RigCovariance* out) noexcept {
   const auto n = static_cast<int>(joint.rows());
   for (int a = 0; a < n; ++a)
     for (int b = 0; b < n; ++b)
@@ -172,7 +160,7 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem,
 
   poses_to_shared(A, ld, first, size);
   const Shared meat = track_variance(w, problem, options, state, system);
-  const KnownBeside known = known_beside(layout, problem, options, state, system);
+  const PriorInformation known = prior_information(layout, problem, options, state, system);
   Shared own_meat(p.estimated_count, p.estimated_count);
   double clustered = 0, believed = 0;
   for (int r = 0; r < p.estimated_count; ++r)
@@ -212,16 +200,13 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem,
     result->covariance_noise[k] = published(noise, layout, camera, T, number);
     result->covariance_total[k] = published(wide, layout, camera, T, number);
   }
-  PublishedRow rows[kMaxShared];
+  Combination rows[kMaxShared];
   for (std::size_t k = 1; k < problem.cameras.size(); ++k) {
     const int number = static_cast<int>(k);
-    const Mat6 to = to_published(layout, system.job().cameras[k], state.T_camera_left[k], number);
-    for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) {
-      PublishedRow& row = rows[layout.extrinsic[k] + i];
-      row.first = extrinsic_row(number);
-      row.count = 6;
-      for (int j = 0; j < 6; ++j) row.factor[j] = to(j, i);
-    }
+    const Mat6 basis = extrinsic_basis(layout, system.job().cameras[k], number);
+    for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i)
+      rows[layout.extrinsic[k] + i] =
+          extrinsic_combination(basis, state.T_camera_left[k].R, number, i);
   }
   for (int i = 0; i < all; ++i) {
     const bool estimated = i < p.estimated_count;

@@ -96,28 +96,20 @@ bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult
   return true;
 }
 
-/// Numbers the free poses, each of which must be determined by observations or a prior.
+/// Numbers the free poses, each of which must be determined by observations.
 bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o,
                  BundleResult* r) noexcept {
   w.free_poses = 0;
-  bool anchored = !p.pose_priors.empty();
+  bool anchored = false;
   for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
     const bool constant = p.pose_constant.empty() ? i == 0 : p.pose_constant[i] != 0;
     anchored = anchored || constant;
     w.poses[i].block = constant ? -1 : w.free_poses++;
   }
   if (!anchored) return refuse(r, BundleTermination::invalid_input);
-  for (std::size_t i = 0; i < p.pose_priors.size(); ++i) {
-    const BundlePosePrior& prior = p.pose_priors[i];
-    if (prior.pose >= p.T_left_world.size()) return refuse(r, BundleTermination::invalid_input);
-    if (!rigid(prior.T_left_world) || !prior.information.allFinite())
-      return refuse(r, BundleTermination::invalid_input);
-  }
   for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
-    if (w.poses[i].block < 0 || w.pose_observations[i] > 0) continue;
-    const bool held = std::any_of(p.pose_priors.begin(), p.pose_priors.end(),
-                                  [&](const BundlePosePrior& q) { return q.pose == i; });
-    if (!held) return refuse(r, BundleTermination::rank_deficient);
+    if (w.poses[i].block >= 0 && w.pose_observations[i] == 0)
+      return refuse(r, BundleTermination::rank_deficient);
   }
   if (static_cast<std::size_t>(w.free_poses) * kBlock +
               static_cast<std::size_t>(shared_layout(p, o, false).blocks) * kBlock ==

@@ -15,13 +15,17 @@ using Index = Eigen::Index;
 // Added to a unit variance, to keep covariances written with few digits positive definite.
 constexpr double kRidge = 1e-9;
 
-/// One row of the layout as a combination of at most six published parameters.
-struct Combination {
-  int first = 0, count = 0;
-  double factor[6]{};
-};
+double combined_covariance(const RigCovariance& C, const Combination& a,
+                           const Combination& b) noexcept {
+  double sum = 0;
+  for (int i = 0; i < a.count; ++i)
+    for (int j = 0; j < b.count; ++j)
+      sum += a.factor[i] * b.factor[j] * C(a.first + i, b.first + j);
+  return sum;
+}
 
-/// Row of (τ, φ) of camera k at the mean from the published (φ, τ): row r of Bᵀ [R₀ᵀ τ; R₀ᵀ φ].
+}  // namespace
+
 Combination extrinsic_combination(const Mat6& basis, const Mat3& R, int k, int row) noexcept {
   Combination c;
   c.first = extrinsic_row(k);
@@ -33,16 +37,6 @@ Combination extrinsic_combination(const Mat6& basis, const Mat3& R, int k, int r
   }
   return c;
 }
-
-double covariance_of(const RigCovariance& C, const Combination& a, const Combination& b) noexcept {
-  double sum = 0;
-  for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j < b.count; ++j)
-      sum += a.factor[i] * b.factor[j] * C(a.first + i, b.first + j);
-  return sum;
-}
-
-}  // namespace
 
 SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& layout,
                          std::size_t cameras) noexcept
@@ -61,7 +55,7 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
     for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) {
       rows[n] = extrinsic_combination(basis, T.R, number, i);
       // If the transform is unknown, so is the rest.
-      if (!(covariance_of(prior.rig->covariance, rows[n], rows[n]) > 0)) return;
+      if (!(combined_covariance(prior.rig->covariance, rows[n], rows[n]) > 0)) return;
       place[n++] = layout.extrinsic[k] + i;
     }
   }
@@ -80,11 +74,11 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
   SharedMatrix C(n, n);
   SharedVector scale(n);
   for (int i = 0; i < n; ++i)
-    scale[i] = 1.0 / std::sqrt(covariance_of(prior.rig->covariance, rows[i], rows[i]));
+    scale[i] = 1.0 / std::sqrt(combined_covariance(prior.rig->covariance, rows[i], rows[i]));
   for (int i = 0; i < n; ++i)
     for (int j = 0; j <= i; ++j)
       C(i, j) = C(j, i) =
-          scale[i] * scale[j] * covariance_of(prior.rig->covariance, rows[i], rows[j]);
+          scale[i] * scale[j] * combined_covariance(prior.rig->covariance, rows[i], rows[j]);
   C.diagonal().array() += kRidge;
   const Eigen::LLT<SharedMatrix> factor(C);
   if (factor.info() != Eigen::Success) return;

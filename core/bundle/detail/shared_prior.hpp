@@ -3,6 +3,15 @@
 
 namespace vergence::detail {
 
+/// One row of the layout as a combination of at most six published parameters.
+struct Combination {
+  int first = 0, count = 0;
+  double factor[6]{};
+};
+/// Row of (τ, φ) of camera k at the mean from the published (φ, τ): row r of Bᵀ [R₀ᵀ τ; R₀ᵀ φ].
+[[nodiscard]] Combination extrinsic_combination(const Mat6& basis, const Mat3& R, int k,
+                                                int row) noexcept;
+
 /// BundleSharedPrior in the rows of one layout: ½ δᵀ Λ δ with δ the difference from the prior's
 /// mean in the rows' coordinates.
 ///

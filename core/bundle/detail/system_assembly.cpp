@@ -33,19 +33,6 @@ void unpack(const double* sums, Mat6* H, Vec6* e) noexcept {
   for (int i = 0; i < 6; ++i) (*e)[i] = s[21 + i];
 }
 
-/// Computes the prior's δ = (φ, τ) at T, and its derivative ∂δ/∂(τ, φ) by the pose.
-void prior_residual(const BundlePosePrior& prior, const Transform& T, Vec6* delta,
-                    Mat6* J) noexcept {
-  const Mat3 turn = T.R * prior.T_left_world.R.transpose();
-  const Vec3 phi = log_so3(turn);
-  const Vec3 tau = T.t - turn * prior.T_left_world.t;
-  *delta << phi, tau;
-  J->setZero();
-  J->topRightCorner<3, 3>() = left_jacobian_so3(phi).inverse();
-  J->bottomLeftCorner<3, 3>().setIdentity();
-  J->bottomRightCorner<3, 3>() = -skew(tau);
-}
-
 }  // namespace
 
 /// Adds undamped information; its diagonal is multiplied by 1 + λ.
@@ -142,22 +129,6 @@ void System::assemble_intrinsics() noexcept {
 }
 
 void System::add_priors(const BundleState& state) noexcept {
-  for (const BundlePosePrior& prior : problem_.pose_priors) {
-    const std::int32_t block = w_.poses[prior.pose].block;
-    if (block < 0) continue;
-    Vec6 delta;
-    Mat6 J;
-    prior_residual(prior, state.poses[prior.pose], &delta, &J);
-    const Mat6 H = J.transpose() * prior.information * J;
-    const Vec6 e = -J.transpose() * (prior.information * delta);
-    const auto first = static_cast<std::size_t>(block) * kBlock;
-    for (std::size_t r = 0; r < kBlock; ++r) {
-      w_.rhs[first + r] += e[static_cast<Eigen::Index>(r)];
-      for (std::size_t c = 0; c <= r; ++c)
-        add_information(first + r, first + c,
-                        H(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
-    }
-  }
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
     const SharedLayout& s = job_.shared;
     if (s.extrinsic[k] >= 0 && options_.length[k].kind == BundleLength::measured) {
@@ -200,13 +171,6 @@ void System::add_priors(const BundleState& state) noexcept {
 
 double System::prior_cost(const BundleState& state) const noexcept {
   double cost = 0;
-  for (const BundlePosePrior& prior : problem_.pose_priors) {
-    if (w_.poses[prior.pose].block < 0) continue;
-    Vec6 delta;
-    Mat6 J;
-    prior_residual(prior, state.poses[prior.pose], &delta, &J);
-    cost += 0.5 * delta.dot(prior.information * delta);
-  }
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
     if (job_.shared.extrinsic[k] >= 0 && options_.length[k].kind == BundleLength::measured) {
       const double r =

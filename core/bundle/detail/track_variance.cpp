@@ -46,8 +46,8 @@ class TrackGradient {
       const std::int32_t block = w_.poses[w_.blocks[b].pose].block;
       if (block < 0) continue;
       const double* y = job_.y + b * kYTop + lane;
-      const Vec3 of_position(product(y), product(y + 3 * kBatch), product(y + 6 * kBatch));
-      subtract_pose(block, of_pose(-of_position, state_.poses[w_.blocks[b].pose] * X), &s);
+      const Vec3 point_gradient(product(y), product(y + 3 * kBatch), product(y + 6 * kBatch));
+      subtract_pose(block, pose_gradient(-point_gradient, state_.poses[w_.blocks[b].pose] * X), &s);
     }
     const double* rows =
         job_.y_shared + batch * static_cast<std::size_t>(layout.blocks) * kYSize + lane;
@@ -63,7 +63,7 @@ class TrackGradient {
   }
 
   /// Gradient with respect to (τ, φ), where q is that with respect to the point in the base camera.
-  static Vec6 of_pose(const Vec3& q, const Vec3& Xi) noexcept {
+  static Vec6 pose_gradient(const Vec3& q, const Vec3& Xi) noexcept {
     Vec6 gradient;
     gradient << q, Xi.cross(q);
     return gradient;
@@ -94,7 +94,7 @@ class TrackGradient {
     const Vec2 miss(o.x - pixel.x(), o.y - pixel.y());
     const Vec2 weighted = weight(miss.squaredNorm() * information) * information * miss;
     const Vec3 q = (G * T.R).transpose() * weighted;
-    const Vec6 gradient = of_pose(q, Xi);
+    const Vec6 gradient = pose_gradient(q, Xi);
     const std::int32_t block = w_.poses[o.pose].block;
     if (block >= 0) subtract_pose(block, gradient, s);
     const int k = o.camera;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace vergence::features::detail {
 namespace {
@@ -14,12 +13,8 @@ constexpr int kParts = 4;
 constexpr int kSamples = 5;
 // Number of samples per side.
 constexpr int kSide = kParts * kSamples;
-// Sigmas and radius in units of the scale s.
+// Sigma in units of the scale s.
 constexpr float kDescriptorSigma = 3.3F;
-constexpr int kReach = 6;
-constexpr float kOrientationSigma = 2.F;
-constexpr float kSector = std::numbers::pi_v<float> / 3;
-constexpr std::size_t kMaxDirections = (2 * kReach + 1) * (2 * kReach + 1);
 
 struct Gradient {
   float x = 0, y = 0;
@@ -63,82 +58,18 @@ std::array<float, kSide> descriptor_weights() noexcept {
 
 const std::array<float, kSide> kWeights = descriptor_weights();
 
-/// Weights by squared distance, in s².
-std::array<float, kReach * kReach> circle_weights() noexcept {
-  std::array<float, kReach * kReach> w{};
-  for (int r2 = 0; r2 < kReach * kReach; ++r2)
-    w[static_cast<std::size_t>(r2)] =
-        std::exp(-0.5F * static_cast<float>(r2) / (kOrientationSigma * kOrientationSigma));
-  return w;
-}
-
-const std::array<float, kReach* kReach> kCircleWeights = circle_weights();
-
-struct Direction {
-  float angle = 0;
-  Gradient g;
-};
-
 }  // namespace
-
-float surf_orientation(const IntegralImage& image, float x, float y, float scale) noexcept {
-  std::array<Direction, kMaxDirections> directions;
-  std::size_t n = 0;
-  const int h = half_side(2.F * scale);
-  for (int j = -kReach; j <= kReach; ++j) {
-    for (int i = -kReach; i <= kReach; ++i) {
-      const int r2 = i * i + j * j;
-      if (r2 >= kReach * kReach) continue;
-      Gradient g =
-          haar(image, x + scale * static_cast<float>(i), y + scale * static_cast<float>(j), h);
-      if (g.x == 0 && g.y == 0) continue;
-      const float w = kCircleWeights[static_cast<std::size_t>(r2)];
-      g = {w * g.x, w * g.y};
-      directions[n++] = {std::atan2(g.y, g.x), g};
-    }
-  }
-  if (n == 0) return 0.F;
-  std::sort(directions.begin(), directions.begin() + static_cast<std::ptrdiff_t>(n),
-            [](const Direction& a, const Direction& b) {
-              if (a.angle != b.angle) return a.angle < b.angle;
-              // A unique order gives a unique sum.
-              return a.g.x != b.g.x ? a.g.x < b.g.x : a.g.y < b.g.y;
-            });
-  // Each sector begins at a direction, because no other start can contain more. Its end only
-  // advances.
-  float best = -1.F, angle = 0.F;
-  Gradient sum;
-  // Index of the first direction beyond the sector, which continues after a full turn.
-  std::size_t end = 0;
-  for (std::size_t first = 0; first < n; ++first) {
-    const auto beyond = [&](std::size_t i) noexcept {
-      return directions[i % n].angle - directions[first].angle +
-                 (i >= n ? 2 * std::numbers::pi_v<float> : 0.F) >=
-             kSector;
-    };
-    for (; end < first + n && !beyond(end); ++end)
-      sum = {sum.x + directions[end % n].g.x, sum.y + directions[end % n].g.y};
-    const float length = sum.x * sum.x + sum.y * sum.y;
-    if (length > best) {
-      best = length;
-      angle = std::atan2(sum.y, sum.x);
-    }
-    sum = {sum.x - directions[first].g.x, sum.y - directions[first].g.y};
-  }
-  return angle;
-}
 
 SurfDescriptor surf_descriptor(const IntegralImage& image, const SurfPoint& p) noexcept {
   SurfDescriptor d;
   const int h = half_side(p.scale);
-  const float c = std::cos(p.angle), s = std::sin(p.angle);
   for (int j = 0; j < kSide; ++j) {
     for (int i = 0; i < kSide; ++i) {
       const float u = p.scale * (static_cast<float>(i) - 0.5F * (kSide - 1)),
                   v = p.scale * (static_cast<float>(j) - 0.5F * (kSide - 1));
-      const Gradient g = haar(image, p.x + c * u - s * v, p.y + s * u + c * v, h);
+      const Gradient g = haar(image, p.x + u, p.y + v, h);
       const float w = kWeights[static_cast<std::size_t>(i)] * kWeights[static_cast<std::size_t>(j)];
-      const float along = w * (c * g.x + s * g.y), stereo = w * (c * g.y - s * g.x);
+      const float along = w * g.x, stereo = w * g.y;
       float* part = d.values.data() + 4 * (j / kSamples * kParts + i / kSamples);
       part[0] += along;
       part[1] += stereo;

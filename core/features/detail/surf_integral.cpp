@@ -13,10 +13,6 @@ std::size_t numbers(int width, int height) noexcept {
 
 }  // namespace
 
-std::size_t IntegralImage::memory_needed(int max_width, int max_height) noexcept {
-  return numbers(max_width, max_height) * sizeof(std::uint32_t) + kCacheLine;
-}
-
 IntegralImage::IntegralImage(int max_width, int max_height, Arena& arena)
     : sums_(arena.make<std::uint32_t>(numbers(max_width, max_height), "integral image")) {}
 

@@ -16,7 +16,6 @@ class IntegralImage {
  public:
   IntegralImage() noexcept = default;
   IntegralImage(int max_width, int max_height, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
   /// Precondition: the image is not larger than given to the constructor.
   void build(const ImageView& image) noexcept;

@@ -14,12 +14,6 @@ constexpr double kBehindCost = 1e4;
 
 }  // namespace
 
-std::size_t PoseProblem::memory_needed(std::size_t capacity) noexcept {
-  const std::size_t n = padded(capacity, kDoubleBlock);
-  return static_cast<std::size_t>(kMaxCameras) *
-         (8 * (n * sizeof(double) + kCacheLine) + n * sizeof(std::uint32_t) + kCacheLine);
-}
-
 PoseProblem::PoseProblem(std::size_t capacity, Arena& arena, const char* who) {
   const std::size_t n = padded(capacity, kDoubleBlock);
   for (Set& s : sets_) {

@@ -31,7 +31,6 @@ class PoseProblem {
     double cost;
   };
 
-  [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   PoseProblem(std::size_t capacity, Arena& arena, const char* who);
 
   /// Preconditions: consistent, size() ≤ capacity.

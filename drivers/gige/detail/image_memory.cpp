@@ -25,7 +25,7 @@ void ImageMemory::allocate(const GreyFormat& format, int width, int height, std:
   stride_ = converts_ ? FramePool::stride(width) : static_cast<std::size_t>(width);
   slot_bytes_ = converts_ ? stride_ * static_cast<std::size_t>(height) : padded(payload);
   wire_bytes_ = converts_ ? padded(payload) : 0;
-  arena_ = std::make_unique<Arena>(slots_ * slot_bytes_ + kWireBuffers * wire_bytes_);
+  arena_ = std::make_unique<Arena>();
   pixels_ = arena_->make<std::uint8_t>(slots_ * slot_bytes_, "slots");
   wire_ = arena_->make<std::uint8_t>(kWireBuffers * wire_bytes_, "packets");
   // Exactly the payload: Aravis counts the packets of a frame by it.

@@ -82,8 +82,8 @@ void DeliveryQueue::hand_out_in_time() {
       continue;
     }
     const HostStamp now = monotonic_now();
-    const bool end = parcels_.top().frame.what ==
-                     Delivery<Frame>::What::end;  // after the last delivery nothing is waited for
+    // Nothing is awaited after the last delivery.
+    const bool end = parcels_.top().frame.what == Delivery<Frame>::What::end;
     if (parcels_.top().arrival > now && !end) {
       (void)posted_.wait_for(lock, std::chrono::nanoseconds((parcels_.top().arrival - now).ns()));
       continue;

@@ -41,14 +41,14 @@ void MockCamera::allocate(const Intrinsics& lens) {
                                          rig_->options.pattern);
   if (rig_->options.pattern == Pattern::gbrg && !rig_->options.raw)
     mosaic_.resize(FramePool::stride(lens.width) * static_cast<std::size_t>(lens.height));
-  arena_ = std::make_unique<Arena>(
-      FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
+  arena_ = std::make_unique<Arena>();
   pool_ = std::make_unique<FramePool>(lens.width, lens.height, MockRig::kSlots, *arena_);
 }
 
 DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
-  constexpr double kMaxGain = 40;  // dB
+  // Limit in dB.
+  constexpr double kMaxGain = 40;
   if (!stream.streaming()) return DeviceStatus::stopped;
   if (requested.exposure <= Duration{} ||
       requested.exposure.to_seconds() * configuration_.rate_hz > 1)
@@ -208,7 +208,8 @@ DeviceStatus MockTrigger::start(Notifier* ready) noexcept {
   if (status != DeviceStatus::ok || (was && !disconnected_)) return status;
   starts_.fetch_add(1, std::memory_order_relaxed);
   disconnected_ = false;
-  if (was) return status;  // it is back; its pulses go on by themselves
+  // The trigger board is back, and its pulses have continued.
+  if (was) return status;
   try {
     listener_->begin(configuration_);
   } catch (const std::exception&) {
@@ -233,7 +234,8 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   {
     const std::lock_guard lock(asking_);
     if (!any_)
-      pause_boot_ = d.value.pulse.boot;  // of a pause that was asked for before the first report
+      // The pause was requested before the first report.
+      pause_boot_ = d.value.pulse.boot;
     any_ = true;
     newest_ = d.value.slot;
     boot_ = d.value.pulse.boot;

@@ -129,7 +129,7 @@ class MockCamera final : public CameraDevice {
   }
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
   /// Image memory in bytes.
-  [[nodiscard]] std::size_t bytes() const noexcept { return arena_ ? arena_->capacity() : 0; }
+  [[nodiscard]] std::size_t bytes() const noexcept { return arena_ ? arena_->used() : 0; }
   /// Renders the image through this camera's lens and sensor into width x height bytes, in rows of
   /// the pool's stride.
   void take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus,

@@ -39,8 +39,8 @@ bool down_by(const std::vector<Fault>& faults, Duration time) noexcept {
 PulsePlan::PulsePlan(const TriggerConfiguration& c, Duration length,
                      const std::vector<Fault>& faults)
     : period_(Duration::seconds(1 / c.rate_hz)), boots_{Duration{}} {
-  std::uint64_t in_boot =
-      0;  // intervals since the boot's first pulse, and by how much they were longer than even ones
+  // Intervals since the boot's first pulse, and how much longer they were than even ones.
+  std::uint64_t in_boot = 0;
   Duration first{}, longer{};
   for (;;) {
     // From the boot's first pulse: an even train has no sum of rounded intervals.

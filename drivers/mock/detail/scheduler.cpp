@@ -36,8 +36,8 @@ void choose_image(const RigTruth& truth, const PulseAt& pulse, Exposure* e) noex
 
 Exposure make_exposure(const RigTruth& truth, std::uint64_t seed, const PulseAt& pulse,
                        int camera) noexcept {
-  constexpr std::uint64_t kEveryCamera =
-      77;  // stream of the draws that are one for the whole pulse
+  // Random stream of the draws that are made once per pulse.
+  constexpr std::uint64_t kEveryCamera = 77;
   Exposure e;
   e.camera = camera;
   e.pulse = pulse.number;
@@ -75,7 +75,8 @@ Exposure make_exposure(const RigTruth& truth, std::uint64_t seed, const PulseAt&
 namespace {
 
 constexpr Duration kJitterMean = Duration::microseconds(150);
-constexpr Duration kMaxJitter = Duration::microseconds(1900);  // below DeviceTiming::delay_spread
+/// The jitter stays below DeviceTiming::delay_spread.
+constexpr Duration kMaxJitter = Duration::microseconds(1900);
 
 }  // namespace
 
@@ -93,8 +94,8 @@ void Scheduler::begin(const TriggerConfiguration& c) {
   board_ = c;
   plan_ = make_plan(c);
   stop_ = false;
-  constexpr Duration kLead =
-      Duration::milliseconds(100);  // the first pictures are rendered before they are due
+  // The first images are rendered before they are due.
+  constexpr Duration kLead = Duration::milliseconds(100);
   if (rig_.options.real_time) start_ = monotonic_now() + kLead;
   rig_.pulsing = true;
   queue_.begin();
@@ -236,7 +237,8 @@ void Scheduler::make_report(std::uint64_t pulse) {
     report.edge = DeviceStamp(
         (report.edge - trigger_->clock().read(booted, slot.time, rig_.truth->faults())).ns());
   if (slot.boot > 0 && slot.number == 0) trigger_->reboots.fetch_add(1, std::memory_order_relaxed);
-  Duration reported{};  // after the edge
+  // Delay after the edge.
+  Duration reported{};
   for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
     if ((board_.feedback >> static_cast<unsigned>(k) & 1U) == 0) continue;
     PulseExposure& e = report.exposure[static_cast<std::size_t>(k)];
@@ -245,9 +247,10 @@ void Scheduler::make_report(std::uint64_t pulse) {
         std::max(reported, e.seen ? e.end : plan_.at(pulse + 1).time - slot.time - kReportLatency);
   }
   p.arrival = jittered(edge + std::max(reported, Duration{}) + kReportLatency, 20, pulse);
-  if (board_.feedback !=
-      0) {  // the report waits for exposures of any length, so the board is asked for its time
-    constexpr double kKnown = 20e3;  // ns
+  // The report waits for exposures of any length, so the board's time is requested.
+  if (board_.feedback != 0) {
+    // Uncertainty in ns.
+    constexpr double kKnown = 20e3;
     Random random(mixed(rig_.options.seed, pulse), 21);
     report.mapped = true;
     report.host = edge + Duration::nanoseconds(std::llround(random.uniform(-kKnown, kKnown)));
@@ -315,7 +318,8 @@ bool Scheduler::present(std::uint64_t pulse, int k) {
   if (gone != sender.unplugged) {
     QueuedDelivery p;
     p.device = k;
-    p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
+    // The transfer starts after the one in progress and before the next frame.
+    p.arrival = host_of(pulse) + kTransfer;
     p.frame.what = gone ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
     queue_.post(p);
     sender.unplugged = gone;
@@ -403,7 +407,8 @@ void Scheduler::render(const Shooting& shooting) {
     way.push_back(rig_.truth->camera_in_enu(exposure.camera, at).inverse());
     if (const auto T_enu_bus = rig_.truth->bus_in_enu(at)) bus.push_back(way.back() * *T_enu_bus);
   }
-  if (bus.size() != way.size()) bus.clear();  // it comes or goes amid the exposure
+  // The bus appears or disappears during the exposure.
+  if (bus.size() != way.size()) bus.clear();
   RenderRequest shot;
   shot.exposure = exposure.brightness * c.exposure.to_seconds() / kNominalExposure.to_seconds() *
                   std::pow(10.0, c.gain_db / 20);

@@ -11,15 +11,20 @@ namespace vergence::mock {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kLane = 1.9;         // m left of the centreline: traffic keeps left
-constexpr double kArcStep = 0.1;      // m between samples of the speed profile
-constexpr double kTurnRadius = 10.0;  // m
+/// Distance in m left of the centreline, as traffic keeps left.
+constexpr double kLane = 1.9;
+/// Distance in m between samples of the speed profile.
+constexpr double kArcStep = 0.1;
+/// Radius in m.
+constexpr double kTurnRadius = 10.0;
 
 // ---- the path
 
 struct Route {
-  std::vector<Vec2> corners;  // of the polyline; turned with kTurnRadius
-  std::vector<double> stops;  // m of path where the vehicle stops
+  /// Corners of the polyline, rounded with kTurnRadius.
+  std::vector<Vec2> corners;
+  /// Distances in m along the path at which the vehicle stops.
+  std::vector<double> stops;
 };
 
 Route make_route(DriveKind kind) {
@@ -74,8 +79,10 @@ class Path {
 
   struct Point {
     Vec2 position;
-    double heading;    // not wrapped: continuous along the path
-    double curvature;  // 1/m, left positive
+    /// The heading is not wrapped, so it is continuous along the path.
+    double heading;
+    /// Curvature in 1/m, positive to the left.
+    double curvature;
   };
   [[nodiscard]] Point at(double s) const {
     s = std::clamp(s, 0.0, length_);
@@ -109,7 +116,8 @@ class Path {
 
 // ---- the driver
 
-constexpr double kLongestEnd = 60;  // s, of the standing start and end, however long stops are
+/// Maximum time in s of standing at the start and at the end, however long stops are.
+constexpr double kLongestEnd = 60;
 
 /// Distance driven at every kDriveStep: the fastest way along the path within the limits, with
 /// pauses.
@@ -133,7 +141,8 @@ std::vector<double> distances(const Path& path, const std::vector<double>& stops
 
   const double dt = kDriveStep.to_seconds(), ends = std::min(o.stop_s, kLongestEnd);
   std::vector<double> out;
-  double time = 0;  // at sample i of the path
+  // Time at sample i of the path.
+  double time = 0;
   const auto emit_until = [&](double until, double s0, double s1, double t0, double v0, double v1) {
     while (static_cast<double>(out.size()) * dt < until) {
       const double t = static_cast<double>(out.size()) * dt - t0, span = until - t0;
@@ -223,7 +232,8 @@ Drive::Drive(const DriveOptions& options, const World& world) : options_(checked
   if (options_.kind == DriveKind::still) {
     s.assign(static_cast<std::size_t>(30.0 / kDriveStep.to_seconds()) + 1, 0.0);
   } else {
-    constexpr double kFoot = 0.30;  // s: how fast a foot moves the pedal
+    // Time in s that a foot needs to move the pedal.
+    constexpr double kFoot = 0.30;
     s = smoothed(distances(path, route.stops, options_), kFoot);
     length_ = path.length();
   }
@@ -236,7 +246,8 @@ Drive::Drive(const DriveOptions& options, const World& world) : options_(checked
     yaw[i] = p.heading;
     curvature[i] = p.curvature;
   }
-  constexpr double kHands = 0.25;  // s: how fast hands turn the wheel
+  // Time in s that hands need to turn the wheel.
+  constexpr double kHands = 0.25;
   x = smoothed(x, kHands);
   y = smoothed(y, kHands);
   yaw = smoothed(yaw, kHands);
@@ -251,7 +262,8 @@ Drive::Drive(const DriveOptions& options, const World& world) : options_(checked
   const Disturbance shake_pitch(&random, 6, 12, 0.018 * degree * options_.vibration),
       shake_roll(&random, 6, 12, 0.018 * degree * options_.vibration);
   const Disturbance shake_heave(&random, 6, 12, 0.0006 * options_.vibration);
-  constexpr double kSpring = 0.0055;  // rad per m/s²: how far the body leans
+  // Lean of the body in rad per m/s².
+  constexpr double kSpring = 0.0055;
 
   const double dt = kDriveStep.to_seconds();
   control_.resize(n);
@@ -259,7 +271,8 @@ Drive::Drive(const DriveOptions& options, const World& world) : options_(checked
     const std::size_t a = i == 0 ? 0 : i - 1, b = std::min(i + 1, n - 1);
     const double t = static_cast<double>(i) * dt, v = (s[b] - s[a]) / (2 * dt),
                  forward = (s[b] - 2 * s[i] + s[a]) / (dt * dt);
-    const double lively = v * v / (v * v + 4.0);  // nothing shakes a standing body
+    // A standing body is not shaken.
+    const double lively = v * v / (v * v + 4.0);
     const double c = std::cos(yaw[i]), sn = std::sin(yaw[i]), slope = world.ground_slope(x[i]);
     // Across the lane the driver wanders a little.
     const double across = lively * wander.at(t);
@@ -291,7 +304,8 @@ BodyState Drive::at(Duration time) const noexcept {
   Control p = Control::Zero(), d1 = Control::Zero(), d2 = Control::Zero();
   for (int k = 0; k < 6; ++k) {
     double w = 0, w1 = 0, w2 = 0;
-    for (int j = 5; j >= 0; --j) {  // Horner for value, slope and half the curvature
+    // Evaluates value, slope and half the curvature by Horner's method.
+    for (int j = 5; j >= 0; --j) {
       w2 = w2 * u + w1;
       w1 = w1 * u + w;
       w = w * u + kBasis[k][j];
@@ -321,10 +335,10 @@ BodyState Drive::at(Duration time) const noexcept {
 }
 
 Transform camera_mount(const Vec3& position_body, double tilt_down) noexcept {
-  Mat3 R;  // columns: the camera's right, down, forward in body axes
-  R << 0, -std::sin(tilt_down), std::cos(tilt_down),  //
-      -1, 0, 0,                                       //
-      0, -std::cos(tilt_down), -std::sin(tilt_down);
+  // The columns are the camera's right, down and forward in body axes.
+  Mat3 R;
+  R << 0, -std::sin(tilt_down), std::cos(tilt_down), -1, 0, 0, 0, -std::cos(tilt_down),
+      -std::sin(tilt_down);
   return {R, position_body};
 }
 

@@ -11,8 +11,10 @@
 namespace vergence::mock {
 namespace {
 
-constexpr float kHazePerMetre = 1.0F / 1200.0F;  // a clear day: half the contrast is left at 1.2 km
-constexpr float kHaze = 205.0F;                  // grey levels, the sky above the horizon
+/// On a clear day, half the contrast is left at 1.2 km.
+constexpr float kHazePerMetre = 1.0F / 1200.0F;
+/// Grey level of the sky above the horizon.
+constexpr float kHaze = 205.0F;
 
 }  // namespace
 
@@ -53,7 +55,8 @@ struct Renderer::Impl {
   Pattern pattern;
   RayTiles tiles;
   Projection projection;
-  std::ptrdiff_t stride = 0;  // of brightness, floats
+  /// Floats per row of brightness.
+  std::ptrdiff_t stride = 0;
   std::vector<float> brightness;
 };
 

@@ -59,8 +59,9 @@ std::optional<World::Hit> World::cast(const Vec3& origin, const Vec3& direction)
   double solid = kNothing, veil = kNothing;
   for (const Object& object : scene_->objects) {
     const Vec3 to = object.centre - origin;
+    // The ray passes by.
     if (to.cross(direction).squaredNorm() > object.radius * object.radius * direction.squaredNorm())
-      continue;  // the ray passes by
+      continue;
     for (std::size_t i = object.first; i < object.first + object.count; ++i) {
       const Polygon& p = scene_->polygons[i];
       const double approach = p.normal.dot(direction);

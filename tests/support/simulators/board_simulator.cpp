@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/math/random.hpp"
+
 namespace vergence::test {
 namespace {
 
@@ -88,7 +90,8 @@ HostStamp BoardSimulator::next_inside() const {
 }
 
 void BoardSimulator::advance(HostStamp until) {
-  while (!ended_) {  // every turn handles something, and time goes on
+  // Every turn handles something, and time goes on.
+  while (!ended_) {
     const HostStamp at = std::max(now_, next_inside());
     if (at > until) break;
     now_ = at;

@@ -3,11 +3,9 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
-#include "core/math/random.hpp"
 #include "firmware_iface/trigger/board/board.h"
 #include "tests/support/simulators/device_model.hpp"
 
@@ -16,8 +14,10 @@ namespace vergence::test {
 /// A pulse that left the board.
 struct SimulatedPulse {
   std::uint32_t boot = 0, number = 0;
-  HostStamp edge{};        // its true time
-  std::uint8_t lines = 0;  // mask of those that were pulsed
+  /// Its true time.
+  HostStamp edge{};
+  /// Mask of the lines that were pulsed.
+  std::uint8_t lines = 0;
 };
 
 /// Exposure-active output of a camera after a pulse, by the host's clock. No earlier than
@@ -34,21 +34,28 @@ using PulseSource = std::function<SimulatedExposures(const SimulatedPulse& pulse
 
 struct BoardSimulatorOptions {
   std::uint32_t baud = 921600;
-  std::uint32_t counts_hz = 84'000'000;  // of its timer, by its crystal …
-  double clock_ppm = 20;                 // … which is this fast against the host's clock …
-  double wander_ppm = 0;                 // … and swings by this …
-  Duration wander_period = Duration::seconds(600);  // … in this time
+  /// Rate of its timer, by its crystal.
+  std::uint32_t counts_hz = 84'000'000;
+  /// The crystal is this fast against the host's clock, and swings by `wander_ppm` in
+  /// `wander_period`.
+  double clock_ppm = 20;
+  double wander_ppm = 0;
+  Duration wander_period = Duration::seconds(600);
   std::uint8_t lines = 4, feedback_inputs = 4;
   bool has_pps = true, has_ins = true;
   std::array<std::uint8_t, 12> serial{0x30, 0,    0x2B, 0,    0x0B, 0x51,
                                       0x33, 0x36, 0x34, 0x39, 0x31, 0x38};
   HostStamp power_on{};
-  Duration duration = Duration::seconds(7 * 86400);  // nothing is sent and no pulse made after it
-  Duration boot_time = Duration::milliseconds(20);   // deaf and mute after a start
-  std::vector<HostStamp>
-      reboots{};     // it begins again, by itself, in mid-frame if need be; ascending
-  bool pps = false;  // a GNSS receiver is wired: an edge every whole second of the host's clock
-  Duration ins_interval{};  // of the INS' SyncOut; 0: not wired
+  /// Nothing is sent and no pulse made after it.
+  Duration duration = Duration::seconds(7 * 86400);
+  /// Deaf and mute so long after a start.
+  Duration boot_time = Duration::milliseconds(20);
+  /// It begins again, by itself, in mid-frame if need be; ascending.
+  std::vector<HostStamp> reboots{};
+  /// A GNSS receiver is wired: an edge every whole second of the host's clock.
+  bool pps = false;
+  /// Interval of the INS' SyncOut; 0: not wired.
+  Duration ins_interval{};
   std::uint64_t seed = 1;
 };
 
@@ -99,12 +106,15 @@ class BoardSimulator final : public DeviceModel {
   PulseSource pulses_;
   BoardSimulatorOptions options_;
   TriggerBoard board_{};
-  double zero_counts_ = 0;  // of the crystal at the board's start
-  HostStamp awake_{};       // from then on it hears and speaks
+  /// Count of the crystal at the board's start.
+  double zero_counts_ = 0;
+  /// From then on it hears and speaks.
+  HostStamp awake_{};
   HostStamp now_{}, line_free_{}, end_;
   std::optional<BoardPulse> armed_{};
   HostStamp armed_at_{};
-  std::deque<Edge> edges_;  // to come, in order
+  /// Edges to come, in order.
+  std::deque<Edge> edges_;
   std::size_t reboots_done_ = 0;
   int boots_ = 0;
   std::uint64_t made_ = 0;

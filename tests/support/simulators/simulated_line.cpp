@@ -282,13 +282,16 @@ class SimulatedLinkFactory::World {
   HostStamp line_free_{}, host_line_free_{}, last_arrival_{};
   std::uint32_t host_baud_ = LineSettings{}.baud;
   bool open_ = false;
-  std::size_t outage_ = 0;  // of the options: the one that has begun or will be next
+  /// Index in the options: the outage that has begun or will be next.
+  std::size_t outage_ = 0;
   bool in_outage_ = false;
   std::deque<Chunk> to_device_, arriving_;
   std::deque<Byte> on_wire_;
-  UsbConverter converter_;          // used with options_.converter,
-  std::vector<std::uint8_t> fifo_;  // this without
-  std::deque<std::uint8_t> ready_;  // to be read
+  /// Used with options_.converter, `fifo_` without.
+  UsbConverter converter_;
+  std::vector<std::uint8_t> fifo_;
+  /// Bytes to be read.
+  std::deque<std::uint8_t> ready_;
 };
 
 namespace {
@@ -350,7 +353,8 @@ class SimulatedLine final : public SerialLink {
   [[nodiscard]] bool gone() const noexcept { return world_->outages_begun() != outages_; }
 
   std::shared_ptr<SimulatedLinkFactory::World> world_;
-  std::size_t outages_;  // that had begun when it was opened: one more, and this line is dead
+  /// Outages that had begun when it was opened: one more, and this line is dead.
+  std::size_t outages_;
 };
 
 }  // namespace

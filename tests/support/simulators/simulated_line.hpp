@@ -16,7 +16,8 @@ namespace vergence::test {
 /// The line is unplugged for a while.
 struct Outage {
   HostStamp from{}, to{};
-  bool device_powered = true;  // false: the device is off, too
+  /// False: the device is off, too.
+  bool device_powered = true;
 };
 
 /// A serial to USB converter of FTDI's kind, from the bytes of its line to complete transfers of
@@ -56,27 +57,38 @@ class UsbConverter {
   Duration timer_;
   HostStamp next_frame_, last_packet_;
   bool timer_ran_out_ = false;
-  std::deque<std::uint8_t> chip_;           // received, in no packet yet
-  std::vector<std::uint8_t> short_packet_;  // waits for a frame
-  std::vector<std::uint8_t> transfer_;      // gathered by the host's controller
+  /// Received, in no packet yet.
+  std::deque<std::uint8_t> chip_;
+  /// Waits for a frame.
+  std::vector<std::uint8_t> short_packet_;
+  /// Gathered by the host's controller.
+  std::vector<std::uint8_t> transfer_;
   std::size_t transfer_packets_ = 0;
 };
 
 struct SimulatedLineOptions {
-  bool converter = true;  // a USB converter of FTDI's kind; false: bytes go straight into the host
+  /// A USB converter of FTDI's kind; false: bytes go straight into the host.
+  bool converter = true;
   Duration latency_timer = Duration::milliseconds(16);
-  std::size_t fifo = 14;  // without a converter: bytes that come at once, at the latest; 64:
-                          // packets of a device's own USB
-  double converter_clock_ppm = 20;  // of its timer against the host's USB frames
-  Duration transfer =
-      Duration::microseconds(125);  // from the USB frame to the reading program at best
-  double late_fraction = 0.01;      // of the arrivals: the reading program is late …
-  Duration late_mean = Duration::milliseconds(4);  // … by an exponential time of this mean
-  double sent_late_fraction = 0;                   // of what the host writes: it leaves late …
-  Duration sent_late_mean = Duration::milliseconds(4);  // … by an exponential time of this mean
-  double corrupt = 0;             // of the bytes from the device: one bit flips
-  std::vector<Outage> outages{};  // in order
-  HostStamp start{};              // of virtual time
+  /// Most bytes that come at once without a converter; 64: packets of a device's own USB.
+  std::size_t fifo = 14;
+  /// Error of the converter's timer against the host's USB frames.
+  double converter_clock_ppm = 20;
+  /// From the USB frame to the reading program at best.
+  Duration transfer = Duration::microseconds(125);
+  /// Share of the arrivals that the reading program takes late, by an exponential time of mean
+  /// `late_mean`.
+  double late_fraction = 0.01;
+  Duration late_mean = Duration::milliseconds(4);
+  /// Share of the host's writes that leave late, by an exponential time of mean `sent_late_mean`.
+  double sent_late_fraction = 0;
+  Duration sent_late_mean = Duration::milliseconds(4);
+  /// Share of the bytes from the device in which one bit flips.
+  double corrupt = 0;
+  /// In order.
+  std::vector<Outage> outages{};
+  /// Start of virtual time.
+  HostStamp start{};
   std::uint64_t seed = 1;
 };
 
@@ -100,7 +112,8 @@ class SimulatedLinkFactory final : public SerialLinkFactory {
   [[nodiscard]] Duration latency_timer() const override;
   [[nodiscard]] bool pass(Duration time) override;
 
-  class World;  // what is between device and host; lives as long as the place or a line of it
+  /// State between device and host; lives as long as the place or a line of it.
+  class World;
 
  private:
   std::shared_ptr<World> world_;

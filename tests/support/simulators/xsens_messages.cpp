@@ -216,7 +216,8 @@ XsensMessages::Message XsensMessages::fix() {
   p.speed_accuracy_mm_s = accuracy(s.velocity_sigma);
   std::array<std::uint8_t, kMaxPayload> buffer{};
   PacketWriter packets(buffer);
-  packets.put_pvt(p);  // in these messages the data stands before the stamps
+  // In these messages the data stands before the stamps.
+  packets.put_pvt(p);
   put_stamps(then.device_ns, &packets);
   return message(MessageId::mtdata2, packets.payload());
 }

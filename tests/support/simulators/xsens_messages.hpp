@@ -52,8 +52,8 @@ class XsensMessages {
   XsensSimulatorOptions options_;
   const XsensSettings& settings_;
   std::uint32_t first_sample_time_;
-  std::int64_t clock_zero_ns_ =
-      0;  // of SampleTimeFine and the sample counter: moves at a power cycle
+  /// Zero of SampleTimeFine and of the sample counter: moves at a power cycle.
+  std::int64_t clock_zero_ns_ = 0;
   std::uint16_t counter_;
   std::int64_t next_fix_ns_ = 0;
   std::uint8_t fix_age_ = 0;

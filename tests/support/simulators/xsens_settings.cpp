@@ -9,8 +9,9 @@ namespace {
 
 using namespace xbus;
 
-constexpr std::array<std::uint16_t, 15> kRates{
-    1, 2, 4, 5, 8, 10, 16, 20, 25, 40, 50, 80, 100, 200, 400};  // Hz, of an MTi-G-700/710
+/// Hz, of an MTi-G-700/710.
+constexpr std::array<std::uint16_t, 15> kRates{1,  2,  4,  5,  8,   10,  16, 20,
+                                               25, 40, 50, 80, 100, 200, 400};
 
 /// The rate that the device takes for the one asked for.
 std::uint16_t rate_taken(std::uint16_t asked) noexcept {
@@ -48,7 +49,8 @@ XsensSettings::XsensSettings(const XsensSimulatorOptions& options)
       outputs_(options.outputs.count > 0 ? options.outputs : factory_outputs()),
       layout_(options.layout),
       period_(options.period) {
-  sync_.entries[sync_.count++] = {14, 1, 1, 0, 0, 0, 0, 0};  // the receiver's clock, on by default
+  // The receiver's clock, on by default.
+  sync_.entries[sync_.count++] = {14, 1, 1, 0, 0, 0, 0, 0};
 }
 
 std::int64_t XsensSettings::period_ns() const noexcept {

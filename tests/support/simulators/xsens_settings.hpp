@@ -1,7 +1,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "firmware_iface/xbus/xbus.hpp"
@@ -13,8 +12,10 @@ namespace vergence::test {
 /// zero the second time.
 struct XsensWrites {
   int outputs = 0, layout = 0, period = 0, skip = 0, sync_out = 0, sync_settings = 0, baud = 0;
-  int heading = 0;  // message D6 taken as the heading: meant for the other generation
-  int refused = 0;  // messages answered with an error
+  /// Message D6 taken as the heading: meant for the other generation.
+  int heading = 0;
+  /// Messages answered with an error.
+  int refused = 0;
 };
 
 /// Settings of a simulated XSens INS and its answers to requests: the
@@ -69,7 +70,8 @@ class XsensSettings {
   xbus::MtdataLayout layout_;
   std::uint16_t period_, skip_ = 0, scenario_ = 6, string_output_ = 0;
   xbus::SyncSettings sync_;
-  std::array<std::uint32_t, 4> legacy_sync_out_{0, 0, 0, 29491};  // by parameter
+  /// By parameter.
+  std::array<std::uint32_t, 4> legacy_sync_out_{0, 0, 0, 29491};
   XsensWrites writes_;
 };
 

@@ -10,8 +10,10 @@ namespace {
 
 using namespace xbus;
 
-constexpr Duration kWakeTime = Duration::milliseconds(500);  // that a host has to answer a wake-up
-constexpr Duration kStartTime = Duration::milliseconds(20);  // from power to the first byte
+/// Time that a host has to answer a wake-up.
+constexpr Duration kWakeTime = Duration::milliseconds(500);
+/// Time from power to the first byte.
+constexpr Duration kStartTime = Duration::milliseconds(20);
 
 }  // namespace
 
@@ -51,7 +53,8 @@ void XsensSimulator::wake(HostStamp at) {
 void XsensSimulator::measure(HostStamp at) {
   mode_ = Mode::measuring;
   const std::int64_t period = settings_.period_ns();
-  sample_ns_ = (device_ns(at) / period + 2) * period;  // on the device's own grid
+  // On the device's own grid.
+  sample_ns_ = (device_ns(at) / period + 2) * period;
   plan_sample();
   messages_.begin(sample_ns_);
 }
@@ -103,7 +106,8 @@ void XsensSimulator::handle(const Message& m) {
   }
   if (m.is(MessageId::reset)) {
     answer(m.id + 1, {});
-    reset_at_ = now_ + kAnswerTime * 5;  // the answer still goes out at the old baud rate
+    // The answer still goes out at the old baud rate.
+    reset_at_ = now_ + kAnswerTime * 5;
     return;
   }
   if (mode_ != Mode::configuring) return;

@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -82,13 +81,15 @@ class XsensSimulator final : public DeviceModel {
   xbus::FrameStream in_;
   HostStamp now_{};
   Mode mode_ = Mode::waking;
-  HostStamp starts_at_{};  // it hears nothing before
+  /// It hears nothing before.
+  HostStamp starts_at_{};
   HostStamp waits_for_host_until_{};
   std::optional<HostStamp> reset_at_{};
   std::deque<Outgoing> outgoing_;
   std::uint32_t baud_;
-  HostStamp sample_at_{};       // of the next sample; while measuring
-  std::int64_t sample_ns_ = 0;  // the same by the device's clock
+  /// Time of the next sample while measuring, then the same by the device's clock.
+  HostStamp sample_at_{};
+  std::int64_t sample_ns_ = 0;
   std::uint64_t samples_ = 0;
   std::size_t silences_done_ = 0;
   std::deque<std::int64_t> sample_times_;

@@ -3,15 +3,12 @@
 #include <dlfcn.h>
 #include <errno.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <fstream>
 #include <map>
 #include <string_view>
-#include <thread>
 
 #include "drivers/serial/serial.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
@@ -95,8 +92,8 @@ TEST_F(BoardRig, everyPulseIsReportedWithEitherLatencyTimer) {
     std::ofstream("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer") << timer << std::flush;
     ASSERT_EQ(read_latency_timer_ms("/dev/ttyUSB0"), timer);
     ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->last_error();
-    const std::uint64_t before =
-        device->statistics().malformed;  // heard at other rates, when the board was looked for
+    // The search for the board received bytes at other baud rates.
+    const std::uint64_t before = device->statistics().malformed;
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
     const auto reported = take(*device, 90);
     ASSERT_EQ(reported.size(), 90U) << device->last_error();
@@ -118,7 +115,8 @@ TEST_F(BoardRig, portRemovedDuringListingIsLeftOut) {
   };
   ASSERT_TRUE(within(10, there));
   for (const bool seen_by_the_library : {false, true}) {
-    looks_left = seen_by_the_library ? 1 : 0;  // a second look would be in vain
+    // A second look would fail.
+    looks_left = seen_by_the_library ? 1 : 0;
     const bool listed = there();
     looks_left = kNever;
     EXPECT_EQ(listed, seen_by_the_library);

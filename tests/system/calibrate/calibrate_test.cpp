@@ -104,8 +104,8 @@ TEST_F(Calibrate, pairIsCalibratedFromFilesForAReplay) {
   const Outcome replay = run_vergence("replay '" + folder_->path().string() +
                                       "' --format folder --quiet --calibration '" + out.string() +
                                       "' --out '" + file("session").string() + "'");
-  EXPECT_NE(replay.code, 2)
-      << replay.err;  // boards that leap make no drive, but the calibration is taken
+  // The calibration is accepted, although boards that jump make no sequence.
+  EXPECT_NE(replay.code, 2) << replay.err;
   EXPECT_TRUE(fs::exists(file("session") / "summary.json")) << replay.err;
 }
 

@@ -2,7 +2,6 @@
 // simulated cameras.
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <thread>
 
 #include <fmt/format.h>
@@ -20,9 +19,10 @@ namespace vergence::test {
 namespace {
 
 const app::BoardPattern kBoard = app::parse_checkerboard("9x6", 0.04);
-constexpr double kRate = 5;  // Hz
-constexpr std::uint64_t kHeldFor =
-    8;  // images of one pose: time to find the board twice on a busy machine
+/// Trigger rate in Hz.
+constexpr double kRate = 5;
+/// Images of one pose: enough time to find the checkerboard twice on a busy machine.
+constexpr std::uint64_t kHeldFor = 8;
 
 TEST(CalibrateLive, movedCheckerboardGivesCompleteCalibration) {
   if (const std::string why = socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;

@@ -18,7 +18,8 @@ constexpr std::uint64_t kShared = 60, kRecalibrate = 90, kAfter = 20;
 struct Knock {
   const char* name;
   Vec3 turn_deg, shift_mm;
-  int frames;  // within which it is detected
+  /// Maximum number of frames until detection.
+  int frames;
   // False: no matches across are left, so that the left camera continues alone for a while with the
   // scale as it was.
   bool matches = true;
@@ -145,7 +146,8 @@ TEST(Knock, undetectableShiftAlongViewIsEstimated) {
 TEST(Knock, slowPitchDriftIsDetectedAndRecalibrated) {
   RenderedDriveOptions options;
   const Transform T = options.rig.T_camera_left[1];
-  const double rate = 0.02 * (std::numbers::pi / 180) / 60;  // rad/s
+  // Rate in rad/s.
+  const double rate = 0.02 * (std::numbers::pi / 180) / 60;
   const auto pitched = [&](std::uint64_t i) {
     return rate * static_cast<double>(i) / options.rate;
   };

@@ -1,75 +1,63 @@
-// Recorded excerpts, calibrated from nothing but the baseline's length.
+// Recorded excerpts with their own calibration, and with nothing but the baseline's length.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstdio>
 #include <numbers>
-#include <optional>
 
-#include "core/comparison/trajectory_metrics.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/recorded_sequence.hpp"
 #include "tests/support/shared_data.hpp"
-#include "tests/system/odometry/estimator_run.hpp"
-#include "tests/system/odometry/recorded_drive.hpp"
 
 namespace vergence::test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr int kFrames = 45;  // nearly all there are of the shorter excerpt
 
-/// The whole of it.
-std::optional<StereoDrive> excerpt(Excerpt which) {
-  const auto folder = shared_data(which.folder);
-  if (!folder) return std::nullopt;
-  which.frames = std::numeric_limits<std::size_t>::max();
-  return load(which, *folder);
+struct Excerpt {
+  const char* name;
+  double ate_m;
+};
+
+class RecordedExcerpt : public testing::TestWithParam<Excerpt> {};
+
+TEST_P(RecordedExcerpt, suppliedCalibrationIsUsableAndAccurate) {
+  const auto d = open_recorded(GetParam().name);
+  if (!d) GTEST_SKIP() << shared_data_missing(GetParam().name);
+  const app::Configuration c = app::load_configuration(std::nullopt, {});
+  const DriveOutcome o =
+      drive_recorded(*d, d->sequence, c, app::replayed_calibration(c, d->sequence, false));
+  std::printf("%s: ATE %.4f m\n", GetParam().name, o.ate_m);
+  EXPECT_LT(o.ate_m, GetParam().ate_m);
+  EXPECT_TRUE(std::all_of(o.samples.begin(), o.samples.end(), [](const PoseSample& s) {
+    return s.status == PoseStatus::ok || s.reason == Reason::unverified_calibration;
+  }));
 }
 
-/// The calibration found from so many frames or more, decided at the end of the drive at the
-/// latest. Intrinsics held.
-std::optional<RigCalibration> calibrate(const StereoDrive& drive, int frames) {
-  EstimatorRunOptions setting = from_scratch(drive.rig);
-  setting.options.calibration.min_frames = frames;
-  EstimatorRun run(setting);
-  run.process(drive);
-  if (run.accepted() == nullptr) run.finish();
-  EXPECT_NE(run.accepted(), nullptr) << run.describe();
-  for (const FrameResult& a : run.results())
-    EXPECT_NE(a.sample.status, PoseStatus::lost) << a.sample.frame;
-  if (run.accepted() == nullptr) return std::nullopt;
-  return run.accepted()->calibration;
-}
-
-/// Rotation vector in degrees from one calibration to another.
-Vec3 turned(const RigCalibration& to, const Mat3& from) {
-  return log_so3(to.T_camera_left[1].R * from.transpose()) / kDegree;
-}
-
-void print(const char* name, const RigCalibration& rig) {
-  const Vec3 r = log_so3(rig.T_camera_left[1].R) / kDegree, t = rig.T_camera_left[1].t;
-  std::printf("%s: rotation vector %.4f %.4f %.4f deg, t %.5f %.5f %.5f m, from %d frames\n", name,
-              r.x(), r.y(), r.z(), t.x(), t.y(), t.z(), rig.frames);
-}
-
-/// ATE in m of the sequence with this calibration.
-double ate_with(const StereoDrive& drive, const RigCalibration& rig) {
-  EstimatorRun run(with_supplied(rig));
-  run.process(drive);
-  return evaluate_results(run.results(), {10}).ate_se3.rmse;
-}
+INSTANTIATE_TEST_SUITE_P(All, RecordedExcerpt,
+                         testing::Values(Excerpt{"kitti06_51", 0.062},
+                                         Excerpt{"euroc_mh01", 0.0048}),
+                         [](const auto& excerpt) { return std::string(excerpt.param.name); });
 
 TEST(RecordedFromScratch, eurocTransformIsFoundFromBaselineLength) {
-  const auto drive = excerpt(kEuroc);
-  if (!drive) GTEST_SKIP() << shared_data_missing(kEuroc.folder);
-  const auto found = calibrate(*drive, kFrames);
-  ASSERT_TRUE(found);
-  print("euroc", *found);
-  const Transform& published = drive->rig.T_camera_left[1];
-  EXPECT_LT(turned(*found, published.R).norm(), 0.08);
-  const Vec3 &a = found->T_camera_left[1].t, &b = published.t;
-  EXPECT_LT(std::atan2(a.cross(b).norm(), a.dot(b)) / kDegree, 0.5);
-  EXPECT_NEAR(a.norm(), 0.11007784, 1e-6);
-  const double found_m = ate_with(*drive, *found), published_m = ate_with(*drive, drive->rig);
+  const auto d = open_recorded("euroc_mh01");
+  if (!d) GTEST_SKIP() << shared_data_missing("data/euroc_mh01");
+  const app::Configuration c = app::load_configuration(
+      std::nullopt, {"calibration.intrinsics=fixed", "calibration.min_frames=45"});
+  const auto published = app::replayed_calibration(c, d->sequence, false);
+  const DriveOutcome scratch = drive_recorded(*d, d->sequence, c, blank(published));
+  EXPECT_EQ(scratch.lost, 0);
+  ASSERT_TRUE(scratch.rig && scratch.adopted > 0);
+  const Transform &found = scratch.rig->T_camera_left[1],
+                  &real = published.file.rig.T_camera_left[1];
+  EXPECT_LT(log_so3(found.R * real.R.transpose()).norm() / kDegree, 0.08);
+  EXPECT_LT(std::atan2(found.t.cross(real.t).norm(), found.t.dot(real.t)) / kDegree, 0.5);
+  EXPECT_NEAR(found.t.norm(), 0.11007784, 1e-6);
+  auto begin = published;
+  begin.file.rig = *scratch.rig;
+  const double found_m = drive_recorded(*d, d->sequence, c, begin).ate_m,
+               published_m = drive_recorded(*d, d->sequence, c, published).ate_m;
   std::printf("euroc: ATE %.2f mm with it, %.2f mm with the published one\n", 1e3 * found_m,
               1e3 * published_m);
   EXPECT_LT(found_m, published_m + 1e-3);

@@ -5,16 +5,18 @@
 #include <cmath>
 
 #include "core/calibration/gates.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/system/odometry/estimator_run.hpp"
 
 namespace vergence::test {
 namespace {
 
-constexpr int kFrames = 60;                     // that a calibration is found from
-constexpr double kSpeed = 3.0, kSeconds = 5.0;  // m/s for so long: the drives looked at
+/// Number of frames that a calibration is found from.
+constexpr int kFrames = 60;
+/// The drives are at least this fast in m/s for this time.
+constexpr double kSpeed = 3.0, kSeconds = 5.0;
 // The largest errors allowed from 60 frames.
-constexpr double kRotation = 0.15e-3, kAcross = 1.8e-3, kAlong = 4.5e-3;  // rad; m of t_y; m of t_z
+/// Rotation in rad, t_y in m and t_z in m.
+constexpr double kRotation = 0.15e-3, kAcross = 1.8e-3, kAlong = 4.5e-3;
 
 std::vector<double> starts(int count = 3) {
   return RenderedDrive::starts({}, count, kSpeed, kSeconds);
@@ -74,7 +76,8 @@ void expect_poses_all_the_time(const EstimatorRun& run) {
 
 TEST(FromScratch, transformIsFoundAtTwentyPlaces) {
   const Transform truth = paper_rig().T_camera_left[1];
-  Vec3 squares = Vec3::Zero();  // rotation, t_y, t_z
+  // Sums for the rotation, t_y and t_z.
+  Vec3 squares = Vec3::Zero();
   const std::vector<double> places = starts(20);
   for (const double start : places) {
     SCOPED_TRACE(start);
@@ -161,8 +164,8 @@ TEST(ThreeCameras, bothTransformsOfThreeCamerasAreFound) {
   options.rig = rig;
   RenderedDrive drive(options);
   EstimatorRunOptions setting = from_sixty(rig);
-  setting.nominal.T_camera_left[2] = {
-      Mat3::Identity(), {-0.25, -0.05, 0}};  // where it is mounted, as one would measure it
+  // The nominal position is a rough measurement.
+  setting.nominal.T_camera_left[2] = {Mat3::Identity(), {-0.25, -0.05, 0}};
   EstimatorRun run(setting);
   // Pixels twice as wide as the paper's: the sigmas that are enough are as much larger.
   for (std::uint64_t i = 0; i < 110 && run.accepted() == nullptr; ++i)

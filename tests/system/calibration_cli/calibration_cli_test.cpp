@@ -60,8 +60,8 @@ class CalibrationCli : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-constexpr const char* kLongEnough =
-    "--duration 9";  // three seconds of standing, a calibration needs some two of motion
+/// The rig stands for three seconds, and a calibration needs about two of motion.
+constexpr const char* kLongEnough = "--duration 9";
 
 TEST_F(CalibrationCli, fromScratchCalibrationIsInEveryFile) {
   const Outcome o = drive("s", std::string("--from-scratch ") + kLongEnough);

@@ -50,7 +50,8 @@ int main(int count, char** words) {
     return 1;
   }
   (void)::fcntl(line, F_SETFL, O_NONBLOCK);
-  ::signal(SIGPIPE, SIG_IGN);  // the machine's power may be cut amid a message
+  // The machine's power may be cut in the middle of a message.
+  ::signal(SIGPIPE, SIG_IGN);
   const vergence::test::DeviceOnDescriptor sensor(line, vergence::test::resting_xsens());
   pollfd closed{line, 0, 0};
   while (::poll(&closed, 1, -1) < 0 || (closed.revents & (POLLHUP | POLLERR)) == 0) {

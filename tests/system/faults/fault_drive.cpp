@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -18,10 +17,12 @@
 namespace vergence::test {
 namespace {
 
-constexpr Stamp kStart{1'577'836'800'000'000'000};  // of every --fast drive
+/// Start of every --fast run.
+constexpr Stamp kStart{1'577'836'800'000'000'000};
 constexpr Duration kLongestDrive = Duration::seconds(86400.0);
 constexpr double kMinute = 60;
-constexpr double kStarting = 6;  // s of a drive in real time that may be gone before its first pose
+/// A run in real time may be this old in s before its first pose.
+constexpr double kStarting = 6;
 
 /// Ground truth of the drive with this first pose: in real time it begins there.
 Stamp start_of(Stamp first) { return first - kStart > kLongestDrive ? first : kStart; }
@@ -41,8 +42,10 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
   enum Column : std::size_t { stamp_ns = 1, status = 3, reason = 4, x = 5, columns = 12 };
   std::ifstream in(file);
   std::string line;
-  Stamp start = kStart;    // in real time it is the first pose's
-  std::getline(in, line);  // the head
+  // In real time, the run starts at its first pose.
+  Stamp start = kStart;
+  // The first line is the header.
+  std::getline(in, line);
   while (std::getline(in, line)) {
     const std::vector<std::string> cells = cells_of(line);
     if (cells.size() < columns) continue;
@@ -182,7 +185,8 @@ bool is_bad(const FaultDrive& drive, const FaultResult& result) {
 }
 
 EvaluatedDrive drive_until_recovered(FaultCase c, const NormalError& normal) {
-  for (;;) {  // twice at most
+  // The loop runs twice at most.
+  for (;;) {
     EvaluatedDrive d;
     d.drive = drive_with_faults(c);
     d.result = evaluate(c, d.drive, normal);

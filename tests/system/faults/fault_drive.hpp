@@ -12,31 +12,42 @@ namespace vergence::test {
 /// Faults of a drive.
 struct FaultCase {
   std::string name;
-  std::vector<std::string> faults{};  // as --fault takes them
-  double from_s = 0, until_s = 0;     // of the drive: first fault's start, last one's end
+  /// Faults as `--fault` takes them.
+  std::vector<std::string> faults{};
+  /// Start of the first fault and end of the last one, in s of the drive.
+  double from_s = 0, until_s = 0;
   /// Expected evidence of the faults: kinds of events, reasons of frames, counters of summary.json
   /// ("/devices/clock_resets") that are not 0, or lines on the terminal. None: poses that are not
   /// those of the untouched drive.
   std::vector<std::string> said{};
-  std::string more{};    // further arguments
-  std::string system{};  // what goes wrong below the program, in real time (faulty_system.c)
+  /// Kinds of events that must not occur.
+  std::vector<std::string> unsaid{};
+  /// Further arguments.
+  std::string more{};
+  /// Faults below the program, in real time (faulty_system.c).
+  std::string system{};
   double duration_s = 20;
   double recovers_within_s = 0;
 };
 
 /// A drive as its session has it.
 struct FaultDrive {
-  int code = -1;  // the program's
+  /// Exit code of the program.
+  int code = -1;
   std::string err{};
   /// summary.json and report.html are there, and poses to the end of the drive with the truth
   /// beside them.
   bool whole = false;
   std::vector<EvaluatedPose> poses{};
-  std::vector<double> at_s{};  // of each pose, since the drive's start
+  /// Time of each pose since the start.
+  std::vector<double> at_s{};
   app::Trajectory truth{};
-  std::map<std::string, int> events{};   // by kind
-  std::map<std::string, int> reasons{};  // frames from the fault's start on that are not `ok`
-  std::string summary{};                 // summary.json
+  /// Number of events by kind.
+  std::map<std::string, int> events{};
+  /// Number of frames that are not `ok` after the fault's start, by reason.
+  std::map<std::string, int> reasons{};
+  /// Content of summary.json.
+  std::string summary{};
 };
 
 struct FaultResult {

@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <iterator>
+#include <sstream>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -9,73 +12,61 @@
 namespace vergence::test {
 namespace {
 
-constexpr double kAt = 9;  // s: the calibration is confirmed by then
+/// Time in s at which the calibration is verified.
+constexpr double kAt = 9;
 
 /// A fault without its times.
 struct Kind {
   const char* name;
-  const char* what;               // of --fault, before the @
-  const char* parameters;         // but duration_s
-  double seconds;                 // 0: none, it is done at once and stays
-  std::vector<std::string> said;  // FaultCase::said
-  // s, within which poses are `ok` again for good: pairing verified, the calibration confirmed anew
+  /// Kind of the fault, as `--fault` takes it before the @.
+  const char* what;
+  /// Parameters other than duration_s.
+  const char* parameters;
+  /// Duration in s; 0 for a fault that is injected once and stays.
+  double seconds;
+  /// Words of FaultCase::said.
+  const char* said;
+  /// Time in s within which poses are permanently `ok` again: the pairing is verified, and so is
+  /// the calibration.
   double recovers = 3;
 };
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all{
-      {"one camera disconnected",
-       "camera_gone",
-       "camera=1",
-       3,
-       {"camera_disconnected", "camera_reconnected", "no_image"}},
-      {"both cameras disconnected",
-       "camera_gone",
-       "camera=-1",
-       3,
-       {"camera_disconnected", "camera_reconnected"}},
-      {"both cameras blink",
-       "camera_gone",
-       "camera=-1",
-       0.1,
-       {"camera_disconnected", "camera_reconnected"}},
-      {"INS disconnected", "ins_gone", "", 3, {"ins_timeout", "ins_recovered"}},
-      {"no fix", "no_fix", "", 5, {"ins_no_fix", "ins_recovered"}},
-      {"INS position jumps", "position_jump", "east_m=100", 3, {"ins_jump"}},
-      {"trigger board disconnected",
-       "board_gone",
-       "",
-       3,
-       {"trigger_board_disconnected", "trigger_board_reconnected"}},
-      {"trigger board disconnected, pulses continue",
-       "board_gone",
-       "powered=1",
-       3,
-       {"trigger_board_disconnected", "trigger_board_reconnected"}},
-      {"board restarts", "board_reboot", "", 0.5, {"trigger_board_restarted"}},
-      {"knock", "knock", "camera=1 pitch_deg=0.2", 0, {"rig_changed", "recalibrating"}, 4},
-      {"one lens covered", "cover", "camera=1", 3, {"image_no_contrast"}},
-      {"both lenses covered", "cover", "camera=-1", 3, {"image_no_contrast"}},
-      {"night", "night", "", 5, {"image_no_contrast"}},
-      {"tunnel", "night", "factor=0.1", 5, {"weak_geometry"}},
-      {"exposure stuck, too bright", "exposure", "factor=6", 5, {"few_inliers"}},
-      {"one side dark", "exposure", "camera=1 factor=0.1", 5, {}},
-      {"30 % of the frames lost", "lose_frames", "share=0.3", 5, {"no_image"}},
-      {"30 % of the frames late", "late_frames", "share=0.3", 5, {"no_image"}},
-      {"30 % of the frames twice",
-       "duplicate_frames",
-       "share=0.3",
-       5,
-       {"/devices/camera0_duplicate", "/devices/camera1_duplicate"}},
-      {"pairs broken", "break_pairs", "share=1", 3, {"no_image"}},
-      {"one camera a frame late", "lag", "camera=1", 3, {"out_of_sync", "cameras_in_sync"}, 5},
-      {"cables exchanged", "swap_cables", "", 3, {"cameras_swapped", "rig_changed"}, 9},
-      {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0, {"no_image"}},
-      {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0, {"no_image"}},
-      {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0, {"/devices/clock_resets"}},
-      {"a bus in the way", "occluder", "", 5, {"no_pose", "map_reset"}, 9},
-      {"disk full", "disk_full", "", 3, {"disk_full", "disk_recovered"}},
-      {"recalibration requested", "recalibrate", "", 0, {"rig_changed", "recalibrating"}, 6},
+      {"one camera disconnected", "camera_gone", "camera=1", 3,
+       "camera_disconnected camera_reconnected no_image"},
+      {"both cameras disconnected", "camera_gone", "camera=-1", 3,
+       "camera_disconnected camera_reconnected"},
+      {"both cameras blink", "camera_gone", "camera=-1", 0.1,
+       "camera_disconnected camera_reconnected"},
+      {"INS disconnected", "ins_gone", "", 3, "ins_timeout ins_recovered"},
+      {"no fix", "no_fix", "", 5, "ins_no_fix ins_recovered"},
+      {"INS position jumps", "position_jump", "east_m=100", 3, "ins_jump"},
+      {"trigger board disconnected", "board_gone", "", 3,
+       "trigger_board_disconnected trigger_board_reconnected"},
+      {"trigger board disconnected, pulses continue", "board_gone", "powered=1", 3,
+       "trigger_board_disconnected trigger_board_reconnected"},
+      {"board restarts", "board_reboot", "", 0.5, "trigger_board_restarted"},
+      {"knock", "knock", "camera=1 pitch_deg=0.2", 0, "rig_changed recalibrating", 4},
+      {"one lens covered", "cover", "camera=1", 3, "image_no_contrast"},
+      {"both lenses covered", "cover", "camera=-1", 3, "image_no_contrast"},
+      {"night", "night", "", 5, "image_no_contrast"},
+      {"tunnel", "night", "factor=0.1", 5, "weak_geometry"},
+      {"exposure stuck, too bright", "exposure", "factor=6", 5, "few_inliers"},
+      {"one side dark", "exposure", "camera=1 factor=0.1", 5, ""},
+      {"30 % of the frames lost", "lose_frames", "share=0.3", 5, "no_image"},
+      {"30 % of the frames late", "late_frames", "share=0.3", 5, "no_image"},
+      {"30 % of the frames twice", "duplicate_frames", "share=0.3", 5,
+       "/devices/camera0_duplicate /devices/camera1_duplicate"},
+      {"pairs broken", "break_pairs", "share=1", 3, "no_image"},
+      {"one camera a frame late", "lag", "camera=1", 3, "out_of_sync cameras_in_sync", 5},
+      {"cables exchanged", "swap_cables", "", 3, "cameras_swapped rig_changed", 9},
+      {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0, "no_image"},
+      {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0, "no_image"},
+      {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0, "/devices/clock_resets"},
+      {"a bus in the way", "occluder", "", 5, "no_pose map_reset", 9},
+      {"disk full", "disk_full", "", 3, "disk_full disk_recovered"},
+      {"recalibration requested", "recalibrate", "", 0, "rig_changed recalibrating", 6},
   };
   return all;
 }
@@ -93,7 +84,8 @@ void add(const Kind& kind, double at_s, FaultCase* c) {
   c->from_s = first ? at_s : std::min(c->from_s, at_s);
   c->until_s = std::max(c->until_s, at_s + kind.seconds);
   c->recovers_within_s = std::max(c->recovers_within_s, kind.recovers);
-  c->duration_s = c->until_s + c->recovers_within_s + 2;  // twenty frames and some
+  // Two seconds are more than twenty frames.
+  c->duration_s = c->until_s + c->recovers_within_s + 2;
 }
 
 }  // namespace
@@ -109,7 +101,11 @@ const std::vector<FaultCase>& single_faults() {
     for (const Kind& kind : alone) {
       FaultCase c;
       c.name = kind.name;
-      c.said = kind.said;
+      std::istringstream said(kind.said);
+      c.said.assign(std::istream_iterator<std::string>(said), {});
+      // The end of a lag neither verifies the calibration in use nor contradicts it.
+      if (std::string_view(kind.what) == "lag")
+        c.unsaid = {"calibration_verified", "calibration_contradicted"};
       add(kind, kAt, &c);
       cases.push_back(c);
     }
@@ -167,7 +163,8 @@ FaultCase random_faults(std::uint64_t seed) {
     kind.seconds = static_cast<double>(static_cast<int>(kind.seconds * 1000)) / 1000;
     add(kind, static_cast<double>(1000 + random.below(13'000)) / 1000, &c);
   }
-  c.duration_s = std::max(c.duration_s, 12.0);  // the calibration is confirmed at 6 s
+  // The calibration is verified at 6 s.
+  c.duration_s = std::max(c.duration_s, 12.0);
   return c;
 }
 

@@ -12,7 +12,8 @@ namespace {
 
 // A drift of millimetres a second is normal on the way and a hundred metres in an hour's stand.
 TEST(LongFaults, tenMinutesOfStandingMovePoseByCentimetres) {
-  constexpr double kMax = 0.1;  // m
+  // Limit in m.
+  constexpr double kMax = 0.1;
   const FaultCase& c = long_faults().front();
   ASSERT_EQ(c.name, "standing 10 minutes");
   const FaultDrive drive = drive_with_faults(c);

@@ -11,7 +11,8 @@ namespace vergence::test {
 
 /// Empty: a socket may hold enough here. Else the message to skip with.
 inline std::string socket_buffer_obstacle() {
-  constexpr std::int64_t kEnough = 2 << 20;  // bytes: two images of 1280 x 960 and some
+  // These bytes hold two images of 1280 x 960 and more.
+  constexpr std::int64_t kEnough = 2 << 20;
   const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const std::int64_t got = fd < 0 ? 0 : gige::set_receive_buffer(fd, kEnough);
   if (fd >= 0) (void)::close(fd);

@@ -2,7 +2,6 @@
 #include <chrono>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/camera_options.hpp"
@@ -16,7 +15,8 @@ class BusConformance final : public ConformanceRig {
   BusConformance(std::unique_ptr<CameraDriver> driver, const std::string& program,
                  std::string unplug, std::string replug)
       : driver_(std::move(driver)), unplug_(std::move(unplug)), replug_(std::move(replug)) {
-    const bool none = await_cameras(driver_.get(), 0);  // those of the rig before
+    // Waits until the cameras of the previous rig have disappeared.
+    const bool none = await_cameras(driver_.get(), 0);
     emulator_ = std::make_unique<Emulator>(
         program, std::vector<std::string>{"--cameras", "1", "--trigger-hz", "20"});
     DeviceStatus status = DeviceStatus::not_found;

@@ -9,8 +9,8 @@ namespace vergence::test {
 struct BusUnderTest {
   static constexpr const char* kEmulator = "sim_1394";
   static constexpr const char* kSent = "transmitted";
-  static constexpr std::uint64_t kLostWithTorn =
-      1;  // the torn frame's buffer swallows the beginning of the next one
+  /// The truncated frame's buffer swallows the beginning of the next one.
+  static constexpr std::uint64_t kLostWithTorn = 1;
   static std::unique_ptr<CameraDriver> driver() { return iidc::make_1394_driver(); }
   // Nodes are numbered along the bus: the last one goes.
   static void unplug(Emulator* e, unsigned camera) { e->command("plug " + std::to_string(camera)); }
@@ -30,7 +30,8 @@ TEST_F(IidcRig, missingBusBandwidthIsReported) {
   CameraConfiguration wide = usual();
   wide.width = 1280;
   wide.height = 960;
-  wide.rate_hz = 20;  // at S400 3064 of 4915 units each
+  // At S400, each camera needs 3064 of 4915 units.
+  wide.rate_hz = 20;
   wide.sharing = 2;
   ASSERT_NO_FATAL_FAILURE(begin(wide));
   EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::ok) << cameras_[0]->last_error();

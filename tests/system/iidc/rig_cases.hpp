@@ -168,7 +168,8 @@ TEST_F(IidcRig, replugWhileStreamingLeaksNothing) {
     taker_->restarted(1);
     ASSERT_TRUE(taker_->take(10)) << "camera 1 after the replug, camera 0 all along: "
                                   << cameras_[1]->last_error();
-    cameras_[1]->stop();  // what waited for the last image to be released goes now
+    // This frees what waited for the release of the last image.
+    cameras_[1]->stop();
     taker_->restarted(1);
     ASSERT_EQ(cameras_[1]->start(nullptr), DeviceStatus::ok) << cameras_[1]->last_error();
     ASSERT_TRUE(taker_->take(3));

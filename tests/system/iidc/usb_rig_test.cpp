@@ -6,8 +6,8 @@ namespace vergence::test {
 struct BusUnderTest {
   static constexpr const char* kEmulator = "sim_usb_iidc";
   static constexpr const char* kSent = "delivered";
-  static constexpr std::uint64_t kLostWithTorn =
-      0;  // a short packet ends the frame, the next is whole
+  /// A short packet ends the frame, and the next one is complete.
+  static constexpr std::uint64_t kLostWithTorn = 0;
   static std::unique_ptr<CameraDriver> driver() { return iidc::make_usb_driver(); }
   static void unplug(Emulator* e, unsigned camera) {
     e->command("unplug " + std::to_string(camera));

@@ -3,10 +3,8 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <filesystem>
 #include <fstream>
-#include <thread>
 
 #include "drivers/serial/serial.hpp"
 #include "drivers/xsens/xsens.hpp"
@@ -52,7 +50,8 @@ class InsRig : public ::testing::Test {
     o.baud = baud;
     DeviceStatus status = DeviceStatus::ok;
     const auto driver = xsens::make_driver(o);
-    auto device = driver->open("", &status);  // the only converter there is
+    // The converter is the only one.
+    auto device = driver->open("", &status);
     EXPECT_EQ(status, DeviceStatus::ok) << driver->last_error();
     return device;
   }

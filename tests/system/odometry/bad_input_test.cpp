@@ -12,7 +12,8 @@ namespace {
 
 /// The image of a camera in the dark: black level and a grey level of noise.
 OwnedImage dark_image(std::uint64_t seed) {
-  constexpr double kBlackLevel = 6.0, kNoise = 1.0;  // grey levels
+  // Both are in grey levels.
+  constexpr double kBlackLevel = 6.0, kNoise = 1.0;
   OwnedImage p(640, 480);
   Random random(seed);
   for (std::uint8_t& b : p.bytes)
@@ -39,7 +40,8 @@ TEST(OdometryInBadConditions, cameraCoveredForGoodIsNeverOkAgain) {
 
 TEST(OdometryInBadConditions, camerasSwappedFromTheStartGiveNoPose) {
   EstimatorRunOptions options = with_supplied(brief_drive().rig);
-  options.options.online = false;  // else the rig would be calibrated as it is now
+  // Online calibration would calibrate the swapped rig.
+  options.options.online = false;
   EstimatorRun run(options);
   run.process(brief_drive(), 0, brief_drive().size(), [](std::size_t, RigFrame* f) {
     std::swap(f->images[0], f->images[1]);

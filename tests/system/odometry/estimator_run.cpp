@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <optional>
 
 #include <fmt/format.h>
@@ -66,8 +65,7 @@ EstimatorRunOptions with_calibration(const RigCalibration& rig) {
 }
 
 struct EstimatorRun::Parts {
-  explicit Parts(const EstimatorRunOptions& s)
-      : arena(Estimator::memory_needed(s.options, s.initial)) {
+  explicit Parts(const EstimatorRunOptions& s) {
     if (s.threads > 1) {
       two.emplace();
       beside.emplace();

@@ -14,9 +14,13 @@ namespace vergence::test {
 
 struct EstimatorRunOptions {
   EstimatorOptions options{};
-  RigCalibration initial;  // what the estimator is handed
-  RigCalibration nominal;  // what the gates compare with
-  int threads = 2;  // 1: everything on the caller's; 2: front end on two, the solver on a third
+  /// Calibration that the estimator receives.
+  RigCalibration initial;
+  /// Calibration that the gates compare with.
+  RigCalibration nominal;
+  /// 1 runs everything on the caller's thread; 2 runs the front end on two and the solver on a
+  /// third.
+  int threads = 2;
 };
 
 /// The rig's own calibration, as a user supplies it.
@@ -39,7 +43,8 @@ struct TimedEvent {
 struct FrameResult {
   PoseSample sample;
   Transform T_reference_left{};
-  bool map_reset = false;  // reported with this frame
+  /// True if a map reset is reported with this frame.
+  bool map_reset = false;
 };
 
 /// A change of one frame before the estimator sees it. False: the frame is left out.
@@ -97,17 +102,22 @@ class EstimatorRun {
 
 /// Difference of two relative motions over the same pair of frames.
 struct MotionError {
-  double translation = 0;  // m
-  double rotation = 0;     // rad
+  /// Error in m.
+  double translation = 0;
+  /// Error in rad.
+  double rotation = 0;
 };
 [[nodiscard]] MotionError motion_error(const FrameResult& from, const FrameResult& to);
 
 /// Maximum error of a usable pose relative to the first one since the drive's start or the last
 /// reported map reset.
 struct OkBound {
-  double translation = 0.05;  // m
-  double per_metre = 0.015;   // m of the path driven since
-  double rotation = 0.01;     // rad
+  /// Constant part in m.
+  double translation = 0.05;
+  /// Part in m per metre of the path since then.
+  double per_metre = 0.015;
+  /// Limit in rad.
+  double rotation = 0.01;
 };
 /// Describes the worst usable pose beyond the bound; empty if there is none.
 [[nodiscard]] std::string false_ok(const std::vector<FrameResult>& results,
@@ -119,7 +129,8 @@ struct OkBound {
 
 /// Difference of a calibration from the true one.
 struct RigError {
-  double rotation = 0;  // rad, the largest about an axis
+  /// Largest rotation about an axis in rad.
+  double rotation = 0;
   Vec3 t = Vec3::Zero();
   // The largest of the six in its noise-only sigma. t_x of camera 1, whose length is supplied, is
   // left out.

@@ -28,7 +28,8 @@ struct StereoDrive {
   RigCalibration rig;
   std::vector<Stamp> stamps;
   std::vector<std::array<OwnedImage, 2>> pairs;
-  std::vector<Transform> truth;  // T_reference_left
+  /// T_reference_left of every frame.
+  std::vector<Transform> truth;
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size(); }
   /// Frame i as a camera driver delivers it; the images live as long as the drive.

@@ -23,7 +23,8 @@ TEST_F(ReplayedFolder, bagGivesThePosesOfTheSameImages) {
         bag->message(
             static_cast<std::uint16_t>(k + 1), ns,
             compressed_message(kind.wire(), ns, "png", read_file(data() / image_name(k, pair))));
-      bag->close_chunk();  // never finished: as a recorder that was killed leaves it
+      // The bag is never finished, as after the kill of a recorder.
+      bag->close_chunk();
     }
     ASSERT_EQ(pair, kFrames);
     const std::string name = "drive" + kind.ending();

@@ -23,18 +23,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kStart = 1'403'636'584'763'555'584, kStep = 50'000'000;  // ns
+/// Times in ns.
+constexpr std::int64_t kStart = 1'403'636'584'763'555'584, kStep = 50'000'000;
 constexpr int kWidth = 96, kHeight = 72, kFrames = 6;
 constexpr double kFocal = 80, kBaseline = 0.11;
-constexpr int kRead = -1;  // an exit code of 0 or 1: tiny images have poses or none
+/// Stands for an exit code of 0 or 1, as tiny images may have no pose.
+constexpr int kRead = -1;
 
 /// One input. `build` writes it and gives the command's words; @ stands for its folder.
 struct Case {
   const char* name;
   std::function<std::string(const TemporaryFolder&)> build;
   int code = 0;
-  std::string mentions{};  // parts of the output, separated by bars
-  int frames = kFrames;    // that a replay reads
+  /// Parts of the output, separated by bars.
+  std::string mentions{};
+  /// Number of frames that a replay reads.
+  int frames = kFrames;
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -107,7 +111,8 @@ const std::string kTum = "{s} {p}";
 std::vector<Case> trajectories() {
   struct Row {
     const char* name;
-    std::string estimate, reference;  // patterns
+    /// Patterns of the two files.
+    std::string estimate, reference;
     std::string mentions;
     int code = 0;
     const char* options = "";
@@ -402,7 +407,8 @@ std::string image_name(const std::string& pattern, int i, int c, std::int64_t la
 
 struct Images {
   std::string name = "{side}/{i:06}.png";
-  std::array<int, 2> lost{-1, -1};  // frames
+  /// Lost frame of each camera.
+  std::array<int, 2> lost{-1, -1};
   std::int64_t later = 0;
   int channels = 1, depth = CV_8U;
 };
@@ -423,8 +429,10 @@ void write_images(const TemporaryFolder& f, const Images& images) {
 struct Folder {
   const char* name;
   Images images{};
-  std::string times = "{ns}";  // the pattern of times.txt; empty: there is none
-  std::string mentions{};      // with `!` before it: of a refusal
+  /// Pattern of times.txt; empty for no file.
+  std::string times = "{ns}";
+  /// Parts of the output; a leading `!` expects a refusal.
+  std::string mentions{};
   Files more{{"calibration.yaml", kOwn}};
   std::string options{};
 };
@@ -522,7 +530,8 @@ std::vector<Case> folders() {
   struct Euroc {
     const char* name;
     std::int64_t later;
-    std::string list;  // pattern; empty: there is none
+    /// Pattern of the list; empty for no list.
+    std::string list;
     std::string mentions;
   };
   for (const Euroc& e :

@@ -9,7 +9,6 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"

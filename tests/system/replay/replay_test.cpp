@@ -29,7 +29,8 @@ TEST_F(ReplayedFolder, everyFrameIsPosedAndSessionIsComplete) {
   EXPECT_EQ(s["frames"]["posed"], kFrames);
   EXPECT_EQ(s["frames"]["skipped"], 0);
   EXPECT_EQ(s["runtime_allocations"], 0);
-  EXPECT_TRUE(s["metrics"].is_null());  // a plain folder has no truth
+  // A plain folder has no ground truth.
+  EXPECT_TRUE(s["metrics"].is_null());
 }
 
 TEST_F(ReplayedFolder, shortSequenceReportsUnverifiedCalibration) {

@@ -18,7 +18,8 @@ namespace vergence::test {
 
 namespace fs = std::filesystem;
 
-inline constexpr std::size_t kFrames = 24;  // of a straight stretch at 9 m/s: 10 m
+/// Frames of a straight stretch of 10 m at 9 m/s.
+inline constexpr std::size_t kFrames = 24;
 
 inline std::string image_name(int camera, std::size_t pair) {
   return fmt::format("{}/{:03d}.png", camera == 0 ? "left" : "right", pair);

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "app/config/calibration_file.hpp"
-#include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {

@@ -4,10 +4,7 @@
 #include <sched.h>
 
 #include <algorithm>
-#include <atomic>
 #include <fstream>
-#include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,12 +25,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-class Ros2Restarts : public testing::Test {
- protected:
-  TemporaryFolder folder_;
-  std::string socket_ = (folder_.path() / "pose.sock").string();
-  std::uint32_t domain_ = own_domain();
-};
+using Ros2Restarts = Ros2Rig;
 
 TEST_F(Ros2Restarts, nextSessionIsFoundGapIsStale) {
   const std::string log = (folder_.path() / "log").string();
@@ -41,7 +33,8 @@ TEST_F(Ros2Restarts, nextSessionIsFoundGapIsStale) {
   ChildProgram::Start start;
   start.errors = out.get();
   const auto bridge = start_bridge(socket_, domain_, {}, start);
-  std::this_thread::sleep_for(1500ms);  // nothing listens yet
+  // Nothing listens yet.
+  std::this_thread::sleep_for(1500ms);
   const RosParticipant participant(domain_);
   RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
   RosReader<RosDiagnostics> diagnostics(participant, "/diagnostics");
@@ -240,7 +233,8 @@ class BytesType final : public fast::TopicDataType {
 
 /// As rmw_fastrtps calls: the reply names the request's writer and number beside the message.
 TEST_F(Ros2Restarts, answersRmwFastrtpsCall) {
-  const auto bridge = start_bridge(socket_, domain_);  // vergence does not run
+  // vergence is not running.
+  const auto bridge = start_bridge(socket_, domain_);
   auto* factory = fast::DomainParticipantFactory::get_instance();
   fast::DomainParticipantQos here;
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();

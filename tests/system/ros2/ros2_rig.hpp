@@ -1,5 +1,6 @@
 #pragma once
 #include <dds/dds.h>
+#include <gtest/gtest.h>
 #include <messages.h>
 
 #include <chrono>
@@ -7,7 +8,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,7 +16,6 @@
 
 #include "app/publish/line_publisher.hpp"
 #include "core/math/random.hpp"
-#include "core/math/so3.hpp"
 #include "tests/support/child_program.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -37,58 +36,47 @@ using HumbleNodes = humble_msg_dds__ParticipantEntitiesInfo_;
 using TriggerRequest = std_srvs_srv_dds__Trigger_Request_;
 using TriggerResponse = std_srvs_srv_dds__Trigger_Response_;
 
-template <class Message>
-const dds_topic_descriptor_t& descriptor();
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosOdometry>() {
-  return nav_msgs_msg_dds__Odometry__desc;
-}
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosTf>() {
-  return tf2_msgs_msg_dds__TFMessage__desc;
-}
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosCameraInfo>() {
-  return sensor_msgs_msg_dds__CameraInfo__desc;
-}
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosFix>() {
-  return sensor_msgs_msg_dds__NavSatFix__desc;
-}
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosPose>() {
-  return geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc;
-}
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosDiagnostics>() {
-  return diagnostic_msgs_msg_dds__DiagnosticArray__desc;
-}
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosImage>() {
-  return sensor_msgs_msg_dds__Image__desc;
-}
-template <>
-inline const dds_topic_descriptor_t& descriptor<RosNodes>() {
-  return rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
-}
 /// Humble's layout under the same name.
+inline const dds_topic_descriptor_t kHumbleNodes = [] {
+  dds_topic_descriptor_t d = humble_msg_dds__ParticipantEntitiesInfo__desc;
+  d.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
+  return d;
+}();
+
+/// Descriptor of a message type.
+template <class Message>
+inline const dds_topic_descriptor_t* const kDescriptor = nullptr;
 template <>
-inline const dds_topic_descriptor_t& descriptor<HumbleNodes>() {
-  static const dds_topic_descriptor_t renamed = [] {
-    dds_topic_descriptor_t d = humble_msg_dds__ParticipantEntitiesInfo__desc;
-    d.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
-    return d;
-  }();
-  return renamed;
-}
+inline const dds_topic_descriptor_t* const kDescriptor<RosOdometry> =
+    &nav_msgs_msg_dds__Odometry__desc;
 template <>
-inline const dds_topic_descriptor_t& descriptor<TriggerRequest>() {
-  return std_srvs_srv_dds__Trigger_Request__desc;
-}
+inline const dds_topic_descriptor_t* const kDescriptor<RosTf> = &tf2_msgs_msg_dds__TFMessage__desc;
 template <>
-inline const dds_topic_descriptor_t& descriptor<TriggerResponse>() {
-  return std_srvs_srv_dds__Trigger_Response__desc;
-}
+inline const dds_topic_descriptor_t* const kDescriptor<RosCameraInfo> =
+    &sensor_msgs_msg_dds__CameraInfo__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<RosFix> =
+    &sensor_msgs_msg_dds__NavSatFix__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<RosPose> =
+    &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<RosDiagnostics> =
+    &diagnostic_msgs_msg_dds__DiagnosticArray__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<RosImage> =
+    &sensor_msgs_msg_dds__Image__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<RosNodes> =
+    &rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<TriggerRequest> =
+    &std_srvs_srv_dds__Trigger_Request__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<TriggerResponse> =
+    &std_srvs_srv_dds__Trigger_Response__desc;
+template <>
+inline const dds_topic_descriptor_t* const kDescriptor<HumbleNodes> = &kHumbleNodes;
 
 /// A domain of this process's own, so that tests may run in parallel.
 inline std::uint32_t own_domain() { return 1 + static_cast<std::uint32_t>(::getpid()) % 200; }
@@ -123,7 +111,7 @@ class RosParticipant {
   }
   template <class Message>
   [[nodiscard]] dds_entity_t topic(const std::string& name) const {
-    return dds_create_topic(participant_, &descriptor<Message>(), name.c_str(), nullptr, nullptr);
+    return dds_create_topic(participant_, kDescriptor<Message>, name.c_str(), nullptr, nullptr);
   }
 
  private:
@@ -273,8 +261,10 @@ class StreamSession {
   static constexpr int kWidth = 640, kHeight = 480;
   static constexpr std::size_t kShifts = 997;
 
-  static constexpr std::int64_t kFirst = 1'577'836'800'000'000'001;  // ns
-  static constexpr std::int64_t kInterval = 50'000'000;              // ns
+  /// First stamp in ns.
+  static constexpr std::int64_t kFirst = 1'577'836'800'000'000'001;
+  /// Frame interval in ns.
+  static constexpr std::int64_t kInterval = 50'000'000;
   app::SessionRequests requests;
 
  private:
@@ -300,7 +290,15 @@ inline std::unique_ptr<ChildProgram> start_bridge(const std::string& socket, std
   return std::make_unique<ChildProgram>(words, start);
 }
 
-/// Feeds poses until `done`; false: it never was.
+/// A socket and a domain for one test.
+class Ros2Rig : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  std::string socket_ = (folder_.path() / "pose.sock").string();
+  std::uint32_t domain_ = own_domain();
+};
+
+/// Feeds poses until `done` returns true; returns false on a time-out.
 inline bool feed_until(StreamSession* session, const std::function<bool()>& done,
                        std::chrono::milliseconds limit = 15s) {
   for (const auto end = std::chrono::steady_clock::now() + limit;

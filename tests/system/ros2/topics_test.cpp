@@ -15,12 +15,7 @@ namespace {
 
 using app::FileDescriptor;
 
-class Ros2Topics : public testing::Test {
- protected:
-  TemporaryFolder folder_;
-  std::string socket_ = (folder_.path() / "pose.sock").string();
-  std::uint32_t domain_ = own_domain();
-};
+using Ros2Topics = Ros2Rig;
 
 void expect_identity(const geometry_msgs_msg_dds__Quaternion_& q) {
   EXPECT_EQ(q.w, 1);
@@ -155,7 +150,8 @@ TEST_F(Ros2Topics, imagesEqualTheSessionsAndShareStamps) {
   RosReader<RosCameraInfo> left_info(participant, "/vergence/left/camera_info"),
       right_info(participant, "/vergence/right/camera_info");
   RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
-  std::map<std::int64_t, int> received;  // by frame: images, camera_info and odometry
+  // Number of images, camera_info and odometry messages by frame.
+  std::map<std::int64_t, int> received;
   int images = 0;
   const auto take = [&](RosReader<RosImage>* reader, std::size_t camera) {
     for (const RosImage* m; (m = reader->take()) != nullptr; ++images) {
@@ -233,7 +229,8 @@ TEST_F(Ros2Topics, nodeIsAnnouncedInHumblesLayout) {
 
 struct RefusalCase {
   std::vector<std::string> words;
-  std::string named;  // by the message
+  /// Part of the message.
+  std::string named;
 };
 void PrintTo(const RefusalCase& c, std::ostream* out) { *out << c.named; }
 

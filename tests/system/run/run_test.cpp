@@ -6,9 +6,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -72,8 +71,8 @@ TEST(Run, everySuppliedSimulatedConfigurationRuns) {
   for (const auto& entry :
        std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
     if (entry.path().extension() != ".yaml") continue;
-    if (text_of(entry.path()).find("driver: mock") == std::string::npos)
-      continue;  // real cameras: tests/system has them on their stacks
+    // Other tests of tests/system run real cameras on their stacks.
+    if (text_of(entry.path()).find("driver: mock") == std::string::npos) continue;
     ++files;
     const TemporaryFolder folder;
     const Outcome o = run_vergence("run '" + entry.path().string() +
@@ -103,7 +102,8 @@ TEST(Run, realTimeFramesArePosedOrCounted) {
                 devices["camera0_underruns"].get<int>(),
             81);
   const std::string poses = text_of(session / "poses.csv");
-  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n') - 1,  // but for the head
+  // The header is not counted.
+  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n') - 1,
             read - summary["drops"]["lines"].get<int>());
   EXPECT_EQ(summary["runtime_allocations"], 0);
   std::ifstream lines(session / "events.jsonl");
@@ -139,7 +139,8 @@ TEST(Run, idealInsReferenceIsTruthWithinAMillimetre) {
   double worst_m = 0, worst_rad = 0;
   const Transform& T0 = truth[100].T_world_body;
   const Transform& R0 = reference[100].T_world_body;
-  for (std::size_t i = 100; i < reference.size(); ++i) {  // the clocks are known after five seconds
+  // The clocks are synchronised after five seconds.
+  for (std::size_t i = 100; i < reference.size(); ++i) {
     ASSERT_LT(std::abs((reference[i].stamp - truth[i].stamp).to_seconds()), 1e-4);
     const Transform step = T0.inverse() * truth[i].T_world_body,
                     ours = R0.inverse() * reference[i].T_world_body;
@@ -204,63 +205,53 @@ TEST(Run, fullDiskLeavesNoTruncatedFileAndExitsFour) {
   EXPECT_LE(poses.size(), 2048U);
 }
 
-struct InsCase {
-  const char* fault;
-  const char* event;
-  int code;
-};
-class RunWithABadIns : public ::testing::TestWithParam<InsCase> {};
-
-TEST_P(RunWithABadIns, faultIsReportedAndPosesContinue) {
-  const TemporaryFolder folder;
-  const auto session = folder / "s";
-  const Outcome o =
-      drive(session, std::string("--duration 9 --fault '") + GetParam().fault + "'" + kSmall);
-  EXPECT_EQ(o.code, GetParam().code) << o.err;
-  EXPECT_GE(events(session, GetParam().event).size(), 1U) << text_of(session / "events.jsonl");
-  EXPECT_TRUE(test::mentions(o.err, "INS"));
-  const auto summary = summary_of(session);
-  EXPECT_EQ(summary["frames"]["posed"], 181);
-  EXPECT_EQ(summary["runtime_allocations"], 0);
+TEST(Run, insFaultIsReportedAndPosesContinue) {
+  struct Case {
+    const char* fault;
+    const char* event;
+    int code;
+  };
+  for (const Case& c : {Case{"ins_gone@0 duration_s=4", "ins_timeout", 0},
+                        Case{"ins_gone@5 duration_s=0", "ins_timeout", 0},
+                        Case{"ins_gone@0 duration_s=0", "ins_timeout", 1},
+                        Case{"no_fix@0 duration_s=0", "ins_no_fix", 1}}) {
+    SCOPED_TRACE(c.fault);
+    const TemporaryFolder folder;
+    const auto session = folder / "s";
+    const Outcome o =
+        drive(session, std::string("--duration 9 --fault '") + c.fault + "'" + kSmall);
+    EXPECT_EQ(o.code, c.code) << o.err;
+    EXPECT_GE(events(session, c.event).size(), 1U) << text_of(session / "events.jsonl");
+    EXPECT_TRUE(test::mentions(o.err, "INS"));
+    const auto summary = summary_of(session);
+    EXPECT_EQ(summary["frames"]["posed"], 181);
+    EXPECT_EQ(summary["runtime_allocations"], 0);
+  }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Ways, RunWithABadIns,
-    ::testing::Values(InsCase{"ins_gone@0 duration_s=4", "ins_timeout", 0},  // starts late
-                      InsCase{"ins_gone@5 duration_s=0", "ins_timeout", 0},  // stops
-                      InsCase{"ins_gone@0 duration_s=0", "ins_timeout", 1},  // never speaks
-                      InsCase{"no_fix@0 duration_s=0", "ins_no_fix", 1}));
-
-struct BadCase {
-  const char* arguments;
-  const char* mentions;
-};
-class RunRefuses : public ::testing::TestWithParam<BadCase> {};
-
-TEST_P(RunRefuses, impossibleSettingWithItsNameAndExitTwo) {
-  const TemporaryFolder folder;
-  const Outcome o = drive(folder / "s", GetParam().arguments);
-  EXPECT_EQ(o.code, 2) << o.err;
-  EXPECT_TRUE(test::mentions(o.err, GetParam().mentions));
-  EXPECT_FALSE(std::filesystem::exists(folder / "s")) << "nothing is begun";
+TEST(Run, impossibleSettingIsNamedAndExitsTwo) {
+  for (const auto& [arguments, named] :
+       {std::pair{"--set trigger.rate=0", "trigger.rate is 0"},
+        std::pair{"--set ins.rate=0", "ins.rate is 0"},
+        std::pair{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
+        std::pair{"--set cameras.0.exposure_us=60000",
+                  "longer than the 50000 µs between two pulses"},
+        std::pair{"--set cameras.0.driver=gige", "--fast needs simulated cameras"},
+        std::pair{"--set cameras.1.driver=", "one camera is configured"},
+        std::pair{"--set sync.mode=bord", "did you mean \"board\"?"},
+        std::pair{"--set mock.drive=lop", "did you mean \"loop\"?"},
+        std::pair{"--set rig.nominal.focal_px=3", "rig.nominal"},
+        std::pair{"--fault knok@3", "unknown fault \"knok\""},
+        std::pair{"--fault 'cover@1 camera=3'", "there is no camera 3"},
+        std::pair{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
+        std::pair{"--duration=-1", "--duration needs seconds"}}) {
+    const TemporaryFolder folder;
+    const Outcome o = drive(folder / "s", arguments);
+    EXPECT_EQ(o.code, 2) << o.err;
+    EXPECT_TRUE(test::mentions(o.err, named));
+    EXPECT_FALSE(std::filesystem::exists(folder / "s")) << arguments;
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    Ways, RunRefuses,
-    ::testing::Values(
-        BadCase{"--set trigger.rate=0", "trigger.rate is 0"},
-        BadCase{"--set ins.rate=0", "ins.rate is 0"},
-        BadCase{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
-        BadCase{"--set cameras.0.exposure_us=60000", "longer than the 50000 µs between two pulses"},
-        BadCase{"--set cameras.0.driver=gige", "--fast needs simulated cameras"},
-        BadCase{"--set cameras.1.driver=", "one camera is configured"},
-        BadCase{"--set sync.mode=bord", "did you mean \"board\"?"},
-        BadCase{"--set mock.drive=lop", "did you mean \"loop\"?"},
-        BadCase{"--set rig.nominal.focal_px=3", "rig.nominal"},
-        BadCase{"--fault knok@3", "unknown fault \"knok\""},
-        BadCase{"--fault 'cover@1 camera=3'", "there is no camera 3"},
-        BadCase{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
-        BadCase{"--duration=-1", "--duration needs seconds"}));
 
 }  // namespace
 }  // namespace vergence

@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <string>
 
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/live_drive.hpp"

@@ -99,7 +99,8 @@ TEST_F(ToolsRig, everyConnectedDeviceIsListedOnce) {
 
 TEST_F(ToolsRig, writtenUdevRulesTakeEffect) {
   Emulator usb("sim_usb_iidc", {"--cameras", "1"});
-  std::size_t cameras = 0;  // those of the test before are on their way out, this one on its way in
+  // The cameras of the previous test may still be listed, and this one may not be listed yet.
+  std::size_t cameras = 0;
   for (int i = 0; i < 15 && cameras != 1; ++i) cameras = cameras_of(devices(), "iidc-usb");
   ASSERT_EQ(cameras, 1U);
   fs::create_directories("/run/udev/rules.d");

@@ -20,7 +20,8 @@ using test::VividPlayer;
 
 constexpr int kWidth = test::width_of(test::LoopSize::vga);
 constexpr int kHeight = test::height_of(test::LoopSize::vga);
-constexpr std::int64_t kInterval_ns = 100'000'000;  // of an image: about six frames of the camera
+/// Interval of an image, which is about six frames of the camera.
+constexpr std::int64_t kInterval_ns = 100'000'000;
 
 /// The number at the start of every row, with the output's; a level that follows from it elsewhere.
 void draw_number(std::size_t output, std::uint64_t number, std::span<std::uint8_t> image) {
@@ -69,8 +70,10 @@ class V4l2Loop : public ::testing::Test {
 /// A frame that a thinned camera kept.
 struct Kept {
   std::int64_t number = 0;
-  std::int64_t from_ns = 0, until_ns = 0;  // its image was copied between them
-  std::int64_t interval = 0;               // of the clock, that its exposure began in
+  /// The image was copied between these times.
+  std::int64_t from_ns = 0, until_ns = 0;
+  /// Interval of the clock in which the exposure began.
+  std::int64_t interval = 0;
 };
 
 /// The numbers that an output showed while a frame was copied: the first and the last.

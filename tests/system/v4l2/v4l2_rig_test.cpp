@@ -1,18 +1,13 @@
 // The V4L2 driver on the kernel's own test cameras, as a USB camera would be: webcam inputs, nobody
 // at the far side.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstring>
 #include <filesystem>
-#include <map>
 #include <set>
-#include <thread>
 
 #include "drivers/v4l2/v4l2.hpp"
 #include "tests/rigs/vivid.hpp"
@@ -23,7 +18,8 @@ namespace {
 
 using test::set_control;
 
-constexpr Duration kSoon = Duration::seconds(2);  // a frame, or the news that the camera is gone
+/// Maximum wait for a frame or for the report of a disconnection.
+constexpr Duration kSoon = Duration::seconds(2);
 
 CameraConfiguration webcam() {
   CameraConfiguration c{640, 360, 25, Duration::milliseconds(8)};
@@ -96,7 +92,8 @@ TEST_F(V4l2Rig, missingPermissionIsReportedWithTheGroup) {
 }
 
 TEST_F(V4l2Rig, everyPixelFormatGivesTheSameGrey) {
-  set_control(node(0), "test_pattern", 20);  // a ramp of grey: the weights of colours do not matter
+  // The weights of colours do not matter on a ramp of grey.
+  set_control(node(0), "test_pattern", 20);
   set_control(node(0), "osd_text_mode", 2);
   std::vector<std::uint8_t> reference;
   int formats = 0;
@@ -214,7 +211,8 @@ TEST_F(V4l2Rig, silentCameraDisconnectsAndStreamsAgain) {
   set_control(node(0), "percentage_of_dropped_buffers", 100);
   Frame frame;
   DeviceStatus status = DeviceStatus::timeout;
-  for (int i = 0; i < 300 && status != DeviceStatus::disconnected; ++i) {  // 30 s at most
+  // The loop waits 30 s at most.
+  for (int i = 0; i < 300 && status != DeviceStatus::disconnected; ++i) {
     status = camera->wait(Duration::milliseconds(100), &frame);
     if (status == DeviceStatus::ok) camera->release(frame.slot);
   }
@@ -281,7 +279,8 @@ TEST_F(V4l2Rig, repeatedStopAndStartLeaksNoDescriptor) {
         ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
         Frame frame;
         ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
-        if (i % 2 == 0) camera->release(frame.slot);  // else it is given back only after the stop
+        // Every second image is released only after the stop.
+        if (i % 2 == 0) camera->release(frame.slot);
         camera->stop();
         if (i % 2 != 0) camera->release(frame.slot);
       }

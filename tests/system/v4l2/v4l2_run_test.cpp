@@ -4,10 +4,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -83,7 +81,8 @@ class V4l2Run : public ::testing::Test {
     EXPECT_GE(frames["posed"].get<std::uint64_t>() * 20, read * 19);
     EXPECT_EQ(frames["lost"].get<std::uint64_t>() + frames["posed"].get<std::uint64_t>(), read);
     EXPECT_EQ(summary["runtime_allocations"], 0);
-    test::expect_no_heap_but_of({}, summary);  // the INS on a line is among them
+    // The thread of the INS on a serial line is included.
+    test::expect_no_heap_but_of({}, summary);
     const app::Trajectory trajectory = app::read_tum(session_ + "/trajectory.tum");
     const Transform& last = trajectory.back().T_world_body;
     const Transform& truth = film.T_first_left(film.pairs() - 1);

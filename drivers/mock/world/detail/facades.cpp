@@ -8,7 +8,8 @@ namespace {
 
 /// Stretcher bond with mortar joints and single bricks burnt darker.
 void bricks(Canvas& c, float mortar, float contrast, std::uint64_t seed) {
-  constexpr double kBrick = 0.25, kCourse = 0.0857;  // m: 48 x 140 of them tile 12 m x 12 m
+  // Sizes in m: 48 x 140 bricks tile 12 m x 12 m.
+  constexpr double kBrick = 0.25, kCourse = 0.0857;
   Random random(seed, 5);
   const int across = static_cast<int>(c.width_m() / kBrick + 0.5),
             up = static_cast<int>(c.height_m() / kCourse + 0.5);
@@ -48,8 +49,9 @@ struct Window {
 void window(Canvas& c, const Window& w, float frame, Random& random) {
   c.rectangle(w.u - 0.1, w.v - 0.1, w.u + w.width + 0.1, w.v + w.height + 0.1, frame);
   c.rectangle(w.u - 0.18, w.v - 0.18, w.u + w.width + 0.18, w.v - 0.1, frame * 0.85F);
+  // The lintel is in its own shadow.
   c.rectangle(w.u - 0.12, w.v + w.height + 0.1, w.u + w.width + 0.12, w.v + w.height + 0.25, 0.25F,
-              0.7F);  // lintel in its own shadow
+              0.7F);
   const double pu = w.width / w.panes_across, pv = w.height / w.panes_up;
   const int curtain = static_cast<int>(random.below(4));
   for (int j = 0; j < w.panes_up; ++j)
@@ -60,9 +62,11 @@ void window(Canvas& c, const Window& w, float frame, Random& random) {
       const bool edge = i == 0 || i == w.panes_across - 1;
       if (curtain == 1 && edge) c.rectangle(u, v, u + pu * 0.45, v + pv - 0.06, 0.55F, 0.8F);
       if (curtain == 2 && j == w.panes_up - 1)
-        c.rectangle(u, v + pv * 0.4, u + pu - 0.06, v + pv - 0.06, 0.62F, 0.85F);  // blind
+        // The rectangle is a blind.
+        c.rectangle(u, v + pv * 0.4, u + pu - 0.06, v + pv - 0.06, 0.62F, 0.85F);
       if (curtain == 3)
-        c.stroke(u, v, u + pu * 0.7, v + pv * 0.8, 0.12, 0.45F, 0.5F);  // reflection
+        // The stroke is a reflection.
+        c.stroke(u, v, u + pu * 0.7, v + pv * 0.8, 0.12, 0.45F, 0.5F);
     }
 }
 
@@ -74,7 +78,8 @@ void door(Canvas& c, double u, double width, float paint, float frame) {
       c.rectangle(u + 0.12 + i * width * 0.48, 0.3 + j * 0.62, u + width * 0.45 + i * width * 0.46,
                   0.78 + j * 0.62, j == 2 ? 0.12F : paint * 0.75F);
   c.disc(u + width - 0.1, 1.15, 0.045, 0.9F);
-  c.rectangle(u - 0.3, 0, u + width + 0.3, 0.12, 0.7F);  // step
+  // The rectangle is a step.
+  c.rectangle(u - 0.3, 0, u + width + 0.3, 0.12, 0.7F);
 }
 
 void downpipe(Canvas& c, double u, float value) {
@@ -91,7 +96,8 @@ void weather(Canvas& c, std::uint64_t seed) {
 }
 
 void shopfront(Canvas& c, Random& random) {
-  c.rectangle(0, 2.75, 12, 3.35, 0.82F);  // fascia with lettering
+  // The rectangle is a fascia with lettering.
+  c.rectangle(0, 2.75, 12, 3.35, 0.82F);
   for (double u = 0.7; u < 10.8; u += random.uniform(0.32, 0.62)) {
     const double h = random.uniform(0.22, 0.36);
     c.rectangle(u, 2.9, u + 0.07, 2.9 + h, 0.08F);
@@ -111,20 +117,29 @@ void shopfront(Canvas& c, Random& random) {
 
 struct FacadeStyle {
   float wall, frame, door;
-  int cladding;  // 0 render, 1 bricks, 2 boards
+  /// 0 for render, 1 for bricks, 2 for boards.
+  int cladding;
   double window_width, window_height;
-  int windows;  // a storey
+  /// Number of windows per storey.
+  int windows;
   int panes_across, panes_up;
 };
 
 constexpr FacadeStyle kStyles[kFacades] = {
-    {0.42F, 0.85F, 0.30F, 1, 1.3, 1.4, 3, 2, 2},  // red brick, white sashes
-    {0.74F, 0.92F, 0.22F, 2, 1.6, 1.3, 3, 3, 1},  // painted weatherboard
-    {0.66F, 0.35F, 0.45F, 0, 2.2, 1.5, 2, 3, 1},  // rendered, dark aluminium
-    {0.52F, 0.80F, 0.15F, 0, 1.1, 1.6, 4, 1, 2},  // shop below, flat above
-    {0.28F, 0.70F, 0.60F, 1, 1.0, 1.2, 4, 1, 2},  // dark brick
-    {0.58F, 0.75F, 0.18F, 2, 1.2, 1.5, 4, 2, 3},  // old timber house with a verandah
-    {0.80F, 0.55F, 0.35F, 0, 1.8, 1.2, 3, 2, 1},  // white render
+    // Red brick with white sashes.
+    {0.42F, 0.85F, 0.30F, 1, 1.3, 1.4, 3, 2, 2},
+    // Painted weatherboard.
+    {0.74F, 0.92F, 0.22F, 2, 1.6, 1.3, 3, 3, 1},
+    // Rendered, with dark aluminium.
+    {0.66F, 0.35F, 0.45F, 0, 2.2, 1.5, 2, 3, 1},
+    // Shop below and flat above.
+    {0.52F, 0.80F, 0.15F, 0, 1.1, 1.6, 4, 1, 2},
+    // Dark brick.
+    {0.28F, 0.70F, 0.60F, 1, 1.0, 1.2, 4, 1, 2},
+    // Old timber house with a verandah.
+    {0.58F, 0.75F, 0.18F, 2, 1.2, 1.5, 4, 2, 3},
+    // White render.
+    {0.80F, 0.55F, 0.35F, 0, 1.8, 1.2, 3, 2, 1},
 };
 
 }  // namespace
@@ -159,7 +174,8 @@ Canvas paint_facade(int kind, std::uint64_t seed, int detail) {
               s.panes_across, s.panes_up},
              s.frame, random);
     }
-    if (kind == 5) {  // verandah rail and posts
+    // The house has a verandah with rail and posts.
+    if (kind == 5) {
       c.rectangle(0, floor + 0.85, 12, floor + 0.95, s.frame);
       for (double u = 0.1; u < 12; u += 0.3)
         c.rectangle(u, floor + 0.1, u + 0.06, floor + 0.9, s.frame, 0.9F);
@@ -199,7 +215,8 @@ Canvas paint_flats(std::uint64_t seed, int detail) {
       c.rectangle(u, j * 3.0 + 0.9, u + random.uniform(1.4, 2.3), j * 3.0 + 2.5,
                   static_cast<float>(random.uniform(0.08, 0.3)));
       if (random.below(3) == 0)
-        c.rectangle(u, j * 3.0 + 0.3, u + 2.2, j * 3.0 + 1.2, 0.85F);  // balcony
+        // The rectangle is a balcony.
+        c.rectangle(u, j * 3.0 + 0.3, u + 2.2, j * 3.0 + 1.2, 0.85F);
     }
   }
   weather(c, seed + 3);

@@ -15,12 +15,15 @@ constexpr Tint kWarm{1.0F, 1.08F, 0.98F, 0.88F}, kGreen{1.0F, 0.86F, 1.08F, 0.70
 Canvas paint_asphalt(std::uint64_t seed, int detail) {
   Canvas c(9 + detail, 9 + detail, 16, 16, 0.30F);
   c.octaves(5.3, 4, 0.035F, 0.8F, seed);
-  c.octaves(0.4, 4, 0.045F, 1.1F, seed + 50);  // aggregate
+  // The octaves are the aggregate.
+  c.octaves(0.4, 4, 0.045F, 1.1F, seed + 50);
   Random random(seed, 1);
-  for (int i = 0; i < 2600; ++i)  // stones and worn spots
+  // Draws stones and worn spots.
+  for (int i = 0; i < 2600; ++i)
     c.disc(random.uniform(0, 16), random.uniform(0, 16), random.uniform(0.02, 0.06),
            static_cast<float>(random.uniform(0.10, 0.62)), 0.65F);
-  for (int i = 0; i < 7; ++i) {  // mended trenches and patches with tarred rims
+  // Draws repaired trenches and patches with tarred rims.
+  for (int i = 0; i < 7; ++i) {
     const double u = random.uniform(0, 16), v = random.uniform(0, 16), a = random.uniform(0.6, 3.0),
                  b = random.uniform(0.5, 1.6);
     const auto tone = static_cast<float>(random.uniform(0.17, 0.40));
@@ -30,7 +33,8 @@ Canvas paint_asphalt(std::uint64_t seed, int detail) {
     c.stroke(u, v + b, u + a, v + b, 0.05, 0.1F, 0.8F);
     c.stroke(u, v, u, v + b, 0.05, 0.1F, 0.8F);
   }
-  for (int i = 0; i < 14; ++i) {  // cracks that wander
+  // Draws cracks that wander.
+  for (int i = 0; i < 14; ++i) {
     double u = random.uniform(0, 16), v = random.uniform(0, 16),
            heading = random.uniform(0, 2 * std::numbers::pi);
     const int length = 8 + static_cast<int>(random.below(20));
@@ -44,9 +48,10 @@ Canvas paint_asphalt(std::uint64_t seed, int detail) {
   }
   for (int i = 0; i < 60; ++i)
     c.disc(random.uniform(0, 16), random.uniform(0, 16), random.uniform(0.04, 0.25),
-           static_cast<float>(random.uniform(0.12, 0.45)),
-           0.6F);                  // oil, gum, stones
-  c.disc(5.0, 11.5, 0.38, 0.14F);  // a manhole
+           // The discs are oil, gum and stones.
+           static_cast<float>(random.uniform(0.12, 0.45)), 0.6F);
+  // The disc is a manhole.
+  c.disc(5.0, 11.5, 0.38, 0.14F);
   c.disc(5.0, 11.5, 0.30, 0.34F);
   for (int i = 0; i < 4; ++i) c.stroke(4.8, 11.35 + 0.1 * i, 5.2, 11.35 + 0.1 * i, 0.03, 0.1F);
   c.clamp(0.04F, 0.9F);
@@ -92,7 +97,8 @@ Canvas paint_plain(int log2, double size, float value, float amplitude, std::uin
 Canvas paint_roof(std::uint64_t seed, int detail) {
   Canvas c(8 + detail, 8 + detail, 8, 8, 0.40F);
   Random random(seed, 4);
-  for (int j = 0; j < 24; ++j) {  // courses of tiles
+  // Draws courses of tiles.
+  for (int j = 0; j < 24; ++j) {
     for (int i = 0; i < 26; ++i) {
       const double w = 8.0 / 26, u = (i + 0.5 * (j % 2)) * w, v = j / 3.0;
       c.rectangle(u, v, u + w, v + 1.0 / 3,
@@ -132,8 +138,10 @@ void paint_foliage(std::uint64_t seed, int detail, Canvas* brightness, Canvas* o
 Canvas paint_car_side(std::uint64_t seed, int detail) {
   Canvas c(7 + detail, 6 + detail, 4.2, 1.5, 0.62F);
   c.octaves(2.0, 3, 0.03F, 0.8F, seed);
-  c.rectangle(0, 0, 4.2, 0.22, 0.12F);        // sill and shadow
-  c.rectangle(0.75, 0.9, 3.45, 1.38, 0.14F);  // glass
+  // The rectangle is the sill and its shadow.
+  c.rectangle(0, 0, 4.2, 0.22, 0.12F);
+  // The rectangle is the glass.
+  c.rectangle(0.75, 0.9, 3.45, 1.38, 0.14F);
   for (const double u : {1.55, 2.45}) c.rectangle(u, 0.86, u + 0.1, 1.45, 0.55F);
   c.stroke(0.85, 0.95, 1.4, 1.3, 0.08, 0.4F, 0.6F);
   for (const double u : {1.05, 2.0, 3.1}) c.rectangle(u, 0.25, u + 0.025, 0.9, 0.25F);
@@ -158,7 +166,8 @@ Canvas paint_car_end(std::uint64_t seed, int detail) {
   c.rectangle(0.2, 0.92, 1.6, 1.4, 0.13F);
   c.rectangle(0.08, 0.6, 0.42, 0.8, 0.9F);
   c.rectangle(1.38, 0.6, 1.72, 0.8, 0.9F);
-  c.rectangle(0.65, 0.48, 1.15, 0.62, 0.95F);  // number plate
+  // The rectangle is the number plate.
+  c.rectangle(0.65, 0.48, 1.15, 0.62, 0.95F);
   for (int i = 0; i < 6; ++i) c.rectangle(0.69 + 0.075 * i, 0.5, 0.73 + 0.075 * i, 0.6, 0.1F);
   return c;
 }

@@ -8,9 +8,12 @@ namespace {
 
 using Bounds = RayTiles::Bounds;
 
-constexpr double kNearest = 0.05;   // m: polygons are cut here only to find the tiles they touch
-constexpr double kSmallest = 0.35;  // px: objects with a smaller bounding radius are not drawn
-constexpr double kFlat = 1e-4;      // m: a plane nearer to the eye than this is seen edge-on
+/// Distance in m at which polygons are cut, only to find the tiles that they touch.
+constexpr double kNearest = 0.05;
+/// Objects with a smaller bounding radius in px are not drawn.
+constexpr double kSmallest = 0.35;
+/// A plane nearer to the eye than this in m is seen edge-on.
+constexpr double kFlat = 1e-4;
 
 Bounds empty() noexcept { return {1e30F, -1e30F, 1e30F, -1e30F}; }
 
@@ -62,7 +65,8 @@ Bounds ray_bounds(const std::array<Vec3, 4>& corners, int count) noexcept {
 Vec3 pixel_ray(const Camera& camera, Vec2 pixel) noexcept {
   const Vec2 centre(camera.intrinsics().cx, camera.intrinsics().cy);
   Vec3 ray(0, 0, 1);
-  for (int i = 0; i < 64; ++i) {  // 0.97^64 = 0.14: well inside any lens
+  // 0.97^64 = 0.14 is well inside any lens.
+  for (int i = 0; i < 64; ++i) {
     if (camera.unproject(pixel, &ray)) return ray;
     pixel = centre + 0.97 * (pixel - centre);
   }
@@ -103,7 +107,8 @@ RayTiles::RayTiles(const Camera& camera) {
 
 /// For whatever a later view shows, its pages touched: a drive takes no more memory on its way.
 void Projection::allocate(const Scene& scene, const RayTiles& tiles) {
-  constexpr std::size_t kUsual = 64;  // polygons of a tile
+  // Usual number of polygons of a tile.
+  constexpr std::size_t kUsual = 64;
   polygons_.resize(scene.polygons.size() + scene.bus.size());
   candidates_.resize(tiles.bounds.size());
   for (auto& list : candidates_) list.resize(kUsual);
@@ -133,7 +138,8 @@ void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& 
     for (const Polygon& polygon : scene.bus)
       (void)add(scene, polygon, tiles, camera, *T_camera_bus, bayer);
   for (auto& list : candidates_) {
-    float closed = 0;  // inverse depth in front of which everything that counts lies
+    // Inverse depth that is not exceeded by anything behind it that counts.
+    float closed = 0;
     for (const Candidate& c : list)
       if (c.covers) closed = std::max(closed, c.q_min);
     std::erase_if(list, [closed](const Candidate& c) { return c.q_max < closed; });
@@ -149,8 +155,8 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
   std::array<Vec3, 4> corners;
   for (std::size_t i = 0; i < count; ++i) corners[i] = T_camera_enu * polygon.corners[i];
   const Vec3 normal = T_camera_enu.R * polygon.normal;
-  const double height = normal.dot(
-      corners[0]);  // of the plane along its normal from the eye; negative: the front is seen
+  // Distance of the plane along its normal from the eye; negative if the front is seen.
+  const double height = normal.dot(corners[0]);
   if (std::abs(height) < kFlat || (height > 0 && !polygon.two_sided)) return false;
 
   Bounds box = ray_bounds(corners, polygon.count);
@@ -163,7 +169,8 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
   const Vec3 q = normal / height;
   for (std::size_t i = 0; i < 4; ++i) {
     if (i >= count) {
-      out.edge[i] = {0, 0, 1};  // always inside
+      // Every point is inside such an edge.
+      out.edge[i] = {0, 0, 1};
       continue;
     }
     // The plane through the eye and the edge; inside is where X · m > 0. Holds also for corners
@@ -177,7 +184,8 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
   const Vec3 origin = T_camera_enu * polygon.texture_origin;
   const auto texture_row = [&](const Vec3& axis) {
     const Vec3 s = T_camera_enu.R * axis;
-    return floats(s - s.dot(origin) * q);  // s · (Z d − origin) = Z (s − (s·origin) q) · d
+    // s · (Z d − origin) = Z (s − (s·origin) q) · d.
+    return floats(s - s.dot(origin) * q);
   };
   out.q = floats(q);
   out.u = texture_row(polygon.axis_u);

@@ -15,7 +15,8 @@ float paint(Random* random, double lo, double hi) {
 
 /// Four slopes over a rectangle, ridge along its length.
 void hip_roof(SceneBuilder* builder, const SceneBuilder::Box& walls, double rise, float light) {
-  constexpr double kOverhang = 0.45;  // m
+  // Overhang in m.
+  constexpr double kOverhang = 0.45;
   const double l = walls.half_length + kOverhang, w = walls.half_width + kOverhang,
                ridge = std::max(0.3, l - w);
   const Vec2 a = walls.along, n(a.y(), -a.x());
@@ -49,7 +50,8 @@ void add_house(SceneBuilder* builder, const Lot& lot, Random* random) {
   walls.half_length = half_length;
   walls.half_width = half_width;
   const Vec2 centre = lot.at(random->uniform(-0.4, 0.4), setback + half_width);
-  const double floor = builder->ground(centre.x()) + kKerb, below = 0.7;  // m: into the slope
+  // The walls reach `below` m into the slope.
+  const double floor = builder->ground(centre.x()) + kKerb, below = 0.7;
   walls.base = raised(centre, floor - below);
   walls.height = height + below;
   const float tone = paint(random, 0.78, 1.0);
@@ -61,7 +63,8 @@ void add_house(SceneBuilder* builder, const Lot& lot, Random* random) {
   const bool parapet = kind == 3 || storeys == 3;
   builder->box(walls, front, side, parapet ? &flat_top : nullptr);
   if (!parapet) hip_roof(builder, walls, random->uniform(1.4, 2.3), paint(random, 0.7, 1.25));
-  if (random->below(3) == 0) {  // a porch: posts and a roof over the door
+  // The house has a porch: posts and a roof over the door.
+  if (random->below(3) == 0) {
     const double depth = 1.6, reach = random->uniform(1.5, 3.0),
                  offset = random->uniform(-2.0, 2.0);
     for (const double s : {-reach, reach})
@@ -156,7 +159,8 @@ void add_car(SceneBuilder* builder, const Lot& lot, double along_m, Random* rand
 }
 
 void build_bus(const WorldOptions& options, Scene* scene) {
-  constexpr double kFloor = 0.3;  // m above the ground
+  // Height in m above the ground.
+  constexpr double kFloor = 0.3;
   const std::size_t first = scene->polygons.size();
   SceneBuilder builder(options, scene);
   // Rows of windows along it, boards with letters at both ends: there is much to be seen on it.
@@ -207,7 +211,8 @@ void add_power_pole(SceneBuilder* builder, const Lot& lot) {
 
 void add_sign(SceneBuilder* builder, const Vec2& foot, const Vec2& facing, int board) {
   const double ground = builder->ground(foot.x()) + kKerb;
-  const Vec2 right(-facing.y(), facing.x());  // of the board, seen from the front
+  // Right of the sign as seen from the front.
+  const Vec2 right(-facing.y(), facing.x());
   const SceneBuilder::Face steel{material::concrete, 0.9F, 0, 0};
   builder->begin();
   builder->box({raised(foot - 0.05 * facing, ground - 0.1), right, 0.035, 0.035, 2.9}, steel, steel,
@@ -241,8 +246,8 @@ void add_tree_line(SceneBuilder* builder, const Vec2& a, const Vec2& b, double h
   builder->begin();
   builder->textured_quad(std::array<Vec3, 4>{raised(a, za), raised(b, zb), raised(b, zb + height_m),
                                              raised(a, za + height_m)},
-                         material::tree_line, paint(random, 0.75, 1.2), 64.0,
-                         1.06 * height_m);  // less than the texture, which wraps around
+                         // The height is less than the texture's, which wraps around.
+                         material::tree_line, paint(random, 0.75, 1.2), 64.0, 1.06 * height_m);
   builder->end();
 }
 

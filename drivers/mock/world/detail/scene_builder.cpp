@@ -10,9 +10,10 @@
 namespace vergence::mock {
 namespace {
 
-constexpr double kHillLength =
-    300.0;  // m, of a whole wave; the north-south streets lie on its level places
-constexpr double kTexturePeriod = 16.0;  // m: every ground texture repeats in it
+/// Length of a whole wave in m; the north-south streets lie on its level places.
+constexpr double kHillLength = 300.0;
+/// Every ground texture repeats with this period in m.
+constexpr double kTexturePeriod = 16.0;
 
 double amplitude(double hill_deg) noexcept {
   return std::tan(hill_deg * std::numbers::pi / 180.0) * kHillLength / (2 * std::numbers::pi);
@@ -115,8 +116,8 @@ void SceneBuilder::ground_polygon(std::span<const Vec2> outline, double lift_m, 
     p.axis_u = Vec3::UnitX() * m.texels_per_metre_u;
     p.axis_v = Vec3::UnitY() * m.texels_per_metre_v;
     begin();
-    for (std::size_t k = 1;
-         k + 1 < piece.size();) {  // a fan of quads, the last one perhaps a triangle
+    // The polygon becomes a fan of quads, the last of which may be a triangle.
+    for (std::size_t k = 1; k + 1 < piece.size();) {
       p.count = 3;
       p.corners[0] = {piece[0].x(), piece[0].y(), height(piece[0].x())};
       p.corners[1] = {piece[k].x(), piece[k].y(), height(piece[k].x())};
@@ -187,11 +188,11 @@ void SceneBuilder::textured_quad(std::span<const Vec3> corners, int material, fl
 
 void SceneBuilder::box(const Box& b, const Face& front_back, const Face& sides, const Face* top) {
   const Vec3 a(b.along.x() * b.half_length, b.along.y() * b.half_length, 0);
-  const Vec3 n(b.along.y() * b.half_width, -b.along.x() * b.half_width,
-               0);  // to the right of `along`
+  // The normal is to the right of `along`.
+  const Vec3 n(b.along.y() * b.half_width, -b.along.x() * b.half_width, 0);
   const Vec3 up(0, 0, b.height);
-  const std::array<Vec3, 4> base{b.base - a + n, b.base + a + n, b.base + a - n,
-                                 b.base - a - n};  // counter-clockwise from above
+  // The corners are counter-clockwise from above.
+  const std::array<Vec3, 4> base{b.base - a + n, b.base + a + n, b.base + a - n, b.base - a - n};
   for (std::size_t i = 0; i < 4; ++i) {
     const Vec3 &p = base[i], &q = base[(i + 1) % 4];
     flat(std::array<Vec3, 4>{p, q, q + up, p + up}, i % 2 == 0 ? front_back : sides);

@@ -169,9 +169,11 @@ TextureRef TextureAtlas::add(const Canvas& canvas) {
                        canvas.log2_height()};
   words_.resize(words_.size() + words);
   std::int32_t* base = words_.data() + ref.base;
-  std::vector<float> row = canvas.texels();  // level (0, j)
+  // Level (0, j).
+  std::vector<float> row = canvas.texels();
   for (int j = 0; j <= ref.log2_height; ++j) {
-    std::vector<float> level = row;  // level (i, j)
+    // Level (i, j).
+    std::vector<float> level = row;
     for (int i = 0; i <= ref.log2_width; ++i) {
       const std::ptrdiff_t x0 = 2 * w - ((2 * w) >> i), y0 = 2 * h - ((2 * h) >> j);
       pack(level, w >> i, h >> j, base + y0 * 2 * w + x0, 2 * w);

@@ -20,9 +20,10 @@ using VF = hn::Vec<F>;
 using VI = hn::Vec<I>;
 using MF = hn::Mask<F>;
 
-constexpr float kSoftness = 0.6F;  // levels of detail coarser than one texel a pixel: what bilinear
-                                   // look-ups need to stay free of aliasing
-constexpr float kNegligible = 1.0F / 512.0F;  // half a grey level of a full-scale surface
+/// Levels of detail that are coarser than one texel per pixel: what bilinear interpolation needs.
+constexpr float kSoftness = 0.6F;
+/// This is half a grey level of a full-scale surface.
+constexpr float kNegligible = 1.0F / 512.0F;
 
 HWY_INLINE VF dot(const std::array<float, 3>& a, VF x, VF y) {
   const F f;
@@ -40,8 +41,10 @@ HWY_INLINE VF half_log2(VF squared) {
 
 /// One axis of a rip-map look-up at one level: index and weight of the lower texel.
 struct Axis {
-  VI index;   // words from the texture's first column (or row)
-  VF weight;  // of the upper neighbour
+  /// Words from the texture's first column or row.
+  VI index;
+  /// Weight of the upper neighbour.
+  VF weight;
 };
 
 HWY_INLINE Axis axis_at(VF texels, VI level, int log2_size) {
@@ -198,7 +201,8 @@ HWY_INLINE Layers find_layers(const TileInput& in, VF x, VF y) {
   const VF zero = hn::Zero(f);
   const VI none = hn::Zero(i);
   Layers l{zero, zero, zero, zero, zero, zero, zero, zero, none, none, none, none};
-  float steepest = 0;  // of the surfaces so far, inverse depth per pixel
+  // Steepest of the surfaces so far, in inverse depth per pixel.
+  float steepest = 0;
   for (const Candidate& candidate : in.candidates) {
     // Closed in front of all that is left, with room for what meets it within a pixel: candidates
     // are sorted by their nearest possible point.
@@ -288,8 +292,8 @@ void ShadeTile(const TileInput& in, float weight, float* out, std::ptrdiff_t out
         if (hn::AllFalse(f, open)) return;
         covered = hn::Add(covered, w);
         hn::Store(p, i, ids);
-        for (std::size_t turn = 0; turn < n;
-             ++turn) {  // one polygon each turn, so at most a turn a lane
+        // Each turn handles one polygon, so there is at most one turn per lane.
+        for (std::size_t turn = 0; turn < n; ++turn) {
           const std::intptr_t lane = hn::FindFirstTrue(f, open);
           if (lane < 0) break;
           const std::int32_t id = ids[lane];

@@ -8,22 +8,26 @@
 namespace vergence::mock {
 namespace {
 
-constexpr std::array<double, 3> kStreetX{0, kStreetSpacingX,
-                                         2 * kStreetSpacingX};  // x of the streets that run along y
-constexpr std::array<double, 3> kStreetY{0, kStreetSpacingY,
-                                         2 * kStreetSpacingY};  // y of the streets that run along x
-constexpr double kLot = 12.0;                                   // m
-constexpr double kFrontDepth =
-    24.0;  // m of a block's corner that belong to the houses of the other street
-constexpr double kRing = 1200.0;  // m: the hills on the horizon
-constexpr double kPaintThickness =
-    0.001;  // m: enough to lie above the road, too little to show in a disparity
-constexpr double kCloudHeight = 900.0;  // m
+/// x of the streets that run along y.
+constexpr std::array<double, 3> kStreetX{0, kStreetSpacingX, 2 * kStreetSpacingX};
+/// y of the streets that run along x.
+constexpr std::array<double, 3> kStreetY{0, kStreetSpacingY, 2 * kStreetSpacingY};
+/// Length in m.
+constexpr double kLot = 12.0;
+/// Length in m of a block's corner that belongs to the houses of the other street.
+constexpr double kFrontDepth = 24.0;
+/// Radius in m of the hills on the horizon.
+constexpr double kRing = 1200.0;
+/// Height in m: enough to lie above the road, too little to show in a disparity.
+constexpr double kPaintThickness = 0.001;
+/// Height in m.
+constexpr double kCloudHeight = 900.0;
 
 /// Ground between four centrelines; on the outer sides of the town there is no street.
 struct Block {
   double x0, x1, y0, y1;
-  bool west, east, south, north;  // a street along that side
+  /// True if a street runs along that side.
+  bool west, east, south, north;
 };
 
 std::vector<Block> blocks() {
@@ -54,8 +58,9 @@ void add_block_ground(SceneBuilder* builder, const Block& b) {
   const auto kerb_line = outline(b, 0), stone = outline(b, 0.28), back = outline(b, kPavementWidth);
   for (std::size_t i = 0; i < 8; ++i) {
     const std::size_t j = (i + 1) % 8;
+    // There is no street on this side.
     if ((kerb_line[i] - stone[i]).norm() < 1e-9 && (kerb_line[j] - stone[j]).norm() < 1e-9)
-      continue;  // no street on this side
+      continue;
     if ((kerb_line[j] - kerb_line[i]).norm() < 1e-9) continue;
     // A side towards open country keeps its line: only sides that moved are kerbs.
     const Vec2 d = (kerb_line[j] - kerb_line[i]).normalized(), normal(-d.y(), d.x());
@@ -77,7 +82,8 @@ void add_roads(SceneBuilder* builder) {
         0, material::asphalt);
   for (const double x : kStreetX) {
     double from = kWorldY0 + 30;
-    for (std::size_t k = 0; k <= kStreetY.size(); ++k) {  // between the crossings
+    // Covers the stretches between the crossings.
+    for (std::size_t k = 0; k <= kStreetY.size(); ++k) {
       const double to = k < kStreetY.size() ? kStreetY[k] - kRoadHalf : kWorldY1 - 30;
       builder->ground_polygon(
           std::array<Vec2, 4>{Vec2(x - kRoadHalf, from), Vec2(x + kRoadHalf, from),
@@ -85,7 +91,8 @@ void add_roads(SceneBuilder* builder) {
           0, material::asphalt);
       from = to + 2 * kRoadHalf;
     }
-    for (const double y : kStreetY)  // what the cut kerbs leave open
+    // Covers what the cut kerbs leave open.
+    for (const double y : kStreetY)
       for (const double sx : {-1.0, 1.0})
         for (const double sy : {-1.0, 1.0}) {
           std::array<Vec2, 3> corner{Vec2(x + sx * kRoadHalf, y + sy * kRoadHalf),
@@ -116,7 +123,8 @@ void mark_street(SceneBuilder* builder, const Vec2& start, const Vec2& d, double
   for (double s = 2; s < length - 3; s += 7.5)
     if (!near_crossing(s, 5))
       mark(builder, start + s * d, d, 1.5, 0.06, static_cast<float>(random->uniform(0.8, 1.1)));
-  for (double s = 1; s < length - 3; s += 6.0)  // corners of the parking bays
+  // Draws the corners of the parking bays.
+  for (double s = 1; s < length - 3; s += 6.0)
     if (!near_crossing(s, 9))
       for (const double side : {-1.0, 1.0}) {
         mark(builder, start + s * d + side * (kRoadHalf - 2.1) * n, d, 0.5, 0.05, 0.95F);
@@ -128,7 +136,8 @@ void mark_street(SceneBuilder* builder, const Vec2& start, const Vec2& d, double
       const Vec2 at = start + (c + side * (kRoadHalf + kCornerCut + 1.2)) * d +
                       side * 0.5 * kRoadHalf * -n * -1.0;
       mark(builder, at, n, 0.5 * kRoadHalf - 0.3, 0.2, 1.1F);
-      for (int k = 0; k < 6; ++k)  // a zebra in front of it
+      // Draws a zebra crossing in front.
+      for (int k = 0; k < 6; ++k)
         mark(builder,
              start + (c + side * (kRoadHalf + kCornerCut + 3.4)) * d + (-4.5 + 1.8 * k) * n, d, 1.2,
              0.32, 1.05F);
@@ -210,7 +219,8 @@ void add_block_interior(SceneBuilder* builder, const Block& b, Random* random) {
 void add_surroundings(SceneBuilder* builder, Random* random) {
   for (const double out : {24.0, 6.0}) {
     const double x0 = kWorldX0 + out, x1 = kWorldX1 - out, y0 = kWorldY0 + out, y1 = kWorldY1 - out;
-    const double step = out > 10 ? 44 : 30;  // the inner row has gaps
+    // The inner row has gaps.
+    const double step = out > 10 ? 44 : 30;
     const auto jitter = [&] { return random->uniform(-4, 4); };
     for (double x = x0; x < x1; x += step)
       for (const double y : {y0, y1})
@@ -232,8 +242,8 @@ void add_surroundings(SceneBuilder* builder, Random* random) {
       return Vec3(middle.x() + r * std::cos(a), middle.y() + r * std::sin(a), z);
     };
     const std::array<Vec3, 4> corners{at(i + 1, -10), at(i, -10), at(i, 130), at(i + 1, 130)};
-    builder->textured_quad(corners, material::hills, 1.0F, side * kSides / 4,
-                           150);  // the texture's top is left out: textures wrap around
+    // The texture's top is left out, because textures wrap around.
+    builder->textured_quad(corners, material::hills, 1.0F, side * kSides / 4, 150);
   }
   builder->end();
   builder->begin();

@@ -18,7 +18,8 @@ using test::known_rig;
 using test::place_error;
 
 const BoardPattern kBoard = parse_checkerboard("9x6", 0.04);
-constexpr double kNoise = 0.1;  // px
+/// Noise of a corner in px.
+constexpr double kNoise = 0.1;
 
 /// Every number of the rig within so many of its own sigmas.
 void expect_recovered(const BoardCalibration& c, const RigCalibration& truth, double sigmas) {
@@ -45,7 +46,8 @@ struct RigCase {
   const char* name;
   int cameras;
   CameraModelKind model;
-  bool gaps;  // the last camera misses some views and some corners
+  /// The last camera misses some views and some corners.
+  bool gaps;
 };
 class BoardCalibrationOf : public ::testing::TestWithParam<RigCase> {};
 
@@ -123,9 +125,10 @@ TEST(BoardCalibration, lensSigmaIncludesCorrelatedErrors) {
 TEST(BoardCalibration, rejectsOnlyInconsistentViews) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   BoardScene scene = board_scene(truth, kBoard, 14, kNoise, 9);
-  std::swap(scene.views[4].corners[1], scene.views[5].corners[1]);  // of other pairs
-  for (BoardCorner& corner : scene.views[7].corners[1])
-    corner.pixel.y() += 2.5;  // px: the board moved between the exposures
+  // These two views get the corners of each other's right image.
+  std::swap(scene.views[4].corners[1], scene.views[5].corners[1]);
+  // The board moved between the exposures of view 7.
+  for (BoardCorner& corner : scene.views[7].corners[1]) corner.pixel.y() += 2.5;
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
   expect_recovered(c, truth, 4);
   for (std::size_t v = 0; v < 14; ++v) EXPECT_EQ(c.views[v].used, v != 4 && v != 5 && v != 7) << v;

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <fmt/format.h>
-
 #include "app/checkerboard/board_detector.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"

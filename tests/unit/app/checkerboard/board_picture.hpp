@@ -40,15 +40,17 @@ class BoardPainter {
   [[nodiscard]] double shade(const app::BoardPattern& board, const Vec3& eye,
                              const Vec3& ray) const {
     constexpr double kGrey = 110, kMiddle = 125, kContrast = 95;
-    const double depth = -eye.z() / ray.z();  // rays have z = 1 in the camera
+    // Rays have z = 1 in the camera.
+    const double depth = -eye.z() / ray.z();
     if (!(depth > 0)) return kGrey;
     const double x = (eye.x() + depth * ray.x()) / board.square,
                  y = (eye.y() + depth * ray.y()) / board.square;
     if (x < -2 || y < -2 || x > board.columns + 1 || y > board.rows + 1) return kGrey;
-    const double pixel = depth / (lens_.fx * board.square);  // in squares
+    // Size of a pixel in squares.
+    const double pixel = depth / (lens_.fx * board.square);
     if (x < -1 || y < -1 || x > board.columns || y > board.rows) return kMiddle + kContrast;
-    return kMiddle + kContrast * wave(x, pixel) *
-                         wave(y, pixel);  // the square right and below of the first corner is white
+    // The square right of and below the first corner is white.
+    return kMiddle + kContrast * wave(x, pixel) * wave(y, pixel);
   }
   /// 1 in squares of even number, -1 in the others, a ramp of half width `pixel` between.
   static double wave(double x, double pixel) {

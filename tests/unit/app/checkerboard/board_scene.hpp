@@ -40,9 +40,8 @@ inline RigCalibration known_rig(int cameras, CameraModelKind kind) {
 inline Transform held_board(const app::BoardPattern& board, const Intrinsics& lens, int view,
                             Random& random) {
   const double width = board.square * (board.columns - 1), height = board.square * (board.rows - 1);
-  const double far =
-      lens.fx * width /
-      (lens.width * (0.35 + 0.1 * (view % 4)));  // it fills 35 to 65 % of the image's width
+  // The board fills 35 to 65 % of the image's width.
+  const double far = lens.fx * width / (lens.width * (0.35 + 0.1 * (view % 4)));
   const double tilt = 0.35 + 0.25 * random.uniform(),
                direction = 2 * M_PI * (view * 0.37 + 0.1 * random.uniform());
   const Mat3 R = exp_so3(tilt * Vec3(std::cos(direction), std::sin(direction), 0)) *

@@ -285,8 +285,8 @@ void expect_camera_info(const CalibrationFile& c, const Info& l, const Info& r) 
     cv::Mat rectified(4, 1, CV_64F, 1.0);
     rectified.rowRange(0, 3) = l.R * X;
     const cv::Mat pixel = r.P * rectified;
-    const cv::Mat X_right =
-        r.R.t() * r.P.colRange(0, 3).inv() * pixel;  // homogeneous pixel keeps its depth
+    // A homogeneous pixel keeps its depth.
+    const cv::Mat X_right = r.R.t() * r.P.colRange(0, 3).inv() * pixel;
     const Reference in_left{l.K, l.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F),
                             l.fisheye};
     const Reference in_right{r.K, r.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F),
@@ -311,8 +311,8 @@ void expect_camera_info(const CalibrationFile& c, const Info& l, const Info& r) 
 TEST(RosCameraInfo, writtenFileProjectsAsReference) {
   for (const auto kind : kModels) {
     CalibrationFile c = ours(kind);
-    if (kind == CameraModelKind::pinhole_radtan)
-      c.rig.intrinsics[0].distortion[4] = -0.004;  // k3 has its place here
+    // This format stores k3.
+    if (kind == CameraModelKind::pinhole_radtan) c.rig.intrinsics[0].distortion[4] = -0.004;
     Remarks remarks;
     const auto [left, right] = format_ros(c, &remarks);
     expect_camera_info(c, info_of(left), info_of(right));

@@ -77,7 +77,8 @@ TEST(Coverage, namesMissingPartsTiltsAndSizes) {
 TEST(Coverage, cornersWithoutPoseGiveNoTilt) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   const BoardView whole = seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)));
-  for (const std::size_t corners : {3U, 7U}) {  // of the first row: they lie on a line
+  // The corners of the first row lie on a line.
+  for (const std::size_t corners : {3U, 7U}) {
     BoardView few;
     few.corners[0].assign(whole.corners[0].begin(),
                           whole.corners[0].begin() + static_cast<std::ptrdiff_t>(corners));
@@ -117,7 +118,8 @@ TEST(ViewCollector, movingBoardIsNotTaken) {
   BoardView seen = seen_board(rig, kBoard, shown_around(kBoard, rig)[4]);
   (void)collector.offer(seen);
   for (int i = 0; i < 5; ++i) {
-    for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 1.2;  // px a set: above 0.15 % of 640
+    // The motion per set in px is above 0.15 % of 640 px.
+    for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 1.2;
     EXPECT_EQ(collector.offer(seen), OfferResult::moving);
   }
   for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 0.5;

@@ -30,9 +30,12 @@ BoardCorners found_in(const std::vector<std::uint8_t>& pixels, const BoardPatter
 
 /// A flat board of black and white as it is printed.
 struct PrintedBoard {
-  cv::Mat sheet;  // with a margin; around it all is grey
-  double scale;   // px a metre
-  double x, y;    // px of the board's origin
+  /// The sheet has a margin; everything around it is grey.
+  cv::Mat sheet;
+  /// Pixels of the sheet per metre.
+  double scale;
+  /// The board's origin on the sheet in px.
+  double x, y;
   bool y_up = false;
 
   /// As a camera sees it: each pixel is the mean over a grid of points within it.
@@ -87,7 +90,8 @@ void expect_corners(const BoardCorners& found, const RigCalibration& rig, const 
 
 /// `black_first`: the upper left square is black.
 PrintedBoard printed_charuco(const BoardPattern& board, bool black_first) {
-  constexpr int kSquare = 120, kMargin = 36;  // px
+  // Both lengths are in px.
+  constexpr int kSquare = 120, kMargin = 36;
   const auto dictionary = cv::aruco::getPredefinedDictionary(static_cast<int>(board.dictionary));
   const int columns = board.columns + 1, rows = board.rows + 1;
   cv::Mat sheet(rows * kSquare + 2 * kMargin, columns * kSquare + 2 * kMargin, CV_8U,
@@ -112,7 +116,8 @@ PrintedBoard printed_charuco(const BoardPattern& board, bool black_first) {
 
 /// `border`: black cells around a tag's code; `from_below`: tag 0 at the lower left.
 PrintedBoard printed_aprilgrid(const BoardPattern& board, int border, bool from_below) {
-  constexpr int kSide = 80;  // px of a tag
+  // Side of a tag in px.
+  constexpr int kSide = 80;
   const auto family = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
   const int gap = static_cast<int>(std::lround(kSide * board.spacing)), pitch = kSide + gap,
             margin = 2 * gap;
@@ -134,7 +139,8 @@ PrintedBoard printed_aprilgrid(const BoardPattern& board, int border, bool from_
 
 /// Upright in front of the camera, its middle at `centre`, turned about the camera's axes.
 Transform shown(const BoardPattern& board, const Vec3& turn, const Vec3& centre) {
-  const bool grid = board.kind == BoardKind::aprilgrid;  // y of the board is up
+  // The y axis of an AprilGrid points up.
+  const bool grid = board.kind == BoardKind::aprilgrid;
   const Mat3 R = grid ? Mat3(exp_so3(turn) * Vec3(1, -1, -1).asDiagonal()) : exp_so3(turn);
   return {R,
           centre - R * (0.5 * (board.corner(0) + board.corner(board.corners() - (grid ? 2 : 1))))};
@@ -146,8 +152,10 @@ TEST(MarkedBoard, findsCornersOfEveryLayout) {
   struct Print {
     BoardPattern board;
     PrintedBoard printed;
-    double distance;    // m
-    std::size_t least;  // corners that are found
+    /// Distance in m.
+    double distance;
+    /// Minimum number of corners found.
+    std::size_t least;
   };
   for (const Print& p : {Print{kCharuco, printed_charuco(kCharuco, true), 0.75, 38},
                          Print{even, printed_charuco(even, true), 0.75, 37},

@@ -1,53 +1,27 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
-#include <CLI/App.hpp>
 #include <nlohmann/json.hpp>
 
-#include "app/commands/commands.hpp"
-#include "app/commands/evaluation_report.hpp"
 #include "app/session/ins_file.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/se3.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::app {
 namespace {
 
-struct Outcome {
-  ExitCode code = ExitCode::done;
-  std::string out, err;
-};
+using test::Outcome;
 
-/// The command as a user gives it; a refusal comes back as exit code 2 and its message.
-Outcome evaluate_command(std::vector<std::string> words) {
-  CLI::App root("test", "vergence");
-  Outcome outcome;
-  add_evaluate(root, &outcome.code);
-  words.insert(words.begin(), "evaluate");
-  std::reverse(words.begin(), words.end());  // CLI11 takes a vector from its end
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  std::string refused;
-  try {
-    root.parse(words);
-  } catch (const InputError& e) {
-    outcome.code = ExitCode::bad_input;
-    refused = e.what();
-  } catch (const CLI::ParseError& e) {
-    outcome.code = ExitCode::bad_input;
-    refused = e.what();
-  }
-  outcome.out = testing::internal::GetCapturedStdout();
-  outcome.err = testing::internal::GetCapturedStderr() + refused;
-  return outcome;
+Outcome evaluate_command(const std::vector<std::string>& words) {
+  return test::run_vergence(fmt::format("evaluate '{}'", fmt::join(words, "' '")));
 }
 
 /// Every figure of `expected` is in `got` at the same place and agrees to six digits (expected has
@@ -88,14 +62,14 @@ TEST(EvaluateCommand, matchesReferenceToSixDigits) {
            "--step", segments["step"].dump(), "--associate",
            name == "b_nearest" ? "nearest" : "interpolate", "--max-gap",
            pair == "b" ? "0.1" : "0.2", "--axes", pair < "c" ? "flu" : "camera"});
-      ASSERT_EQ(o.code, ExitCode::done) << o.err;
+      ASSERT_EQ(o.code, 0) << o.err;
       auto expected = answer;
       expected["segments"] = nlohmann::json::array({segments});
       const auto got = nlohmann::json::parse(o.out);
       expect_same(expected, got, name);
       EXPECT_EQ(got["dropped"], answer["dropped"]);
-      EXPECT_EQ(got["roll_about_path_unobservable"],
-                pair == "c");  // the straight one, and only that
+      // Only the path of pair c is straight.
+      EXPECT_EQ(got["roll_about_path_unobservable"], pair == "c");
     }
   }
 }
@@ -129,7 +103,7 @@ TEST(EvaluateCommand, estimatesInsExtrinsics) {
                     b = folder.write("theirs.tum", theirs).string();
   const Outcome outcome =
       evaluate_command({a, b, "--axes", "flu", "--estimate-ins-extrinsics", "--json"});
-  ASSERT_EQ(outcome.code, ExitCode::done) << outcome.err;
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto mount = nlohmann::json::parse(outcome.out).at("mount");
   // T_ref_est is the inverse: turned back, and the arm seen from the reference.
   EXPECT_NEAR(mount["rotation_deg"]["z"]["value"].get<double>(), -0.1 * 180 / M_PI, 0.02);
@@ -147,8 +121,8 @@ std::string session_with_ins(const test::TemporaryFolder& folder, const std::str
   const LocalTangentPlane plane({-27.5, 153, 60});
   Transform T_ins_left = mount_of({0.9, 0.4, 0}, {0, 0, 2 * M_PI / 180});
   std::string ours, readings = std::string(kInsHeader) + "\n", line;
-  const Transform T_world_enu =
-      (place_at(0) * T_ins_left).inverse();  // the odometry begins where it is
+  // The world of the odometry starts at the first left camera pose.
+  const Transform T_world_enu = (place_at(0) * T_ins_left).inverse();
   for (int i = 0; i < 4800; ++i) {
     const double t = 0.025 * i;
     const Transform T = place_at(t);
@@ -179,7 +153,7 @@ TEST(EvaluateCommand, comparesInsOfSessionAtLeftCamera) {
                     elsewhere = folder.write("t.tum", test::read_file(session + "/trajectory.tum"));
   const auto figures = [&](const std::string& estimate, const std::string& axes = "camera") {
     const Outcome o = evaluate_command({estimate, ins, "--axes", axes, "--json"});
-    EXPECT_EQ(o.code, ExitCode::done) << o.err;
+    EXPECT_EQ(o.code, 0) << o.err;
     return nlohmann::json::parse(o.out);
   };
   folder.write("s/summary.json", R"({"enu": {"mount": {"lever_arm_m": [0.9, 0.4, 0],
@@ -210,7 +184,7 @@ TEST(EvaluateCommand, refusesInvalidArguments) {
   const auto refused = [&](std::vector<std::string> words, const std::string& part) {
     words.insert(words.begin(), {a, a});
     const Outcome o = evaluate_command(words);
-    EXPECT_EQ(o.code, ExitCode::bad_input) << part;
+    EXPECT_EQ(o.code, 2) << part;
     EXPECT_TRUE(o.out.empty());
     EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
   };
@@ -224,8 +198,8 @@ TEST(EvaluateCommand, refusesInvalidArguments) {
   refused({"--max-gap", "-1"}, "--max-gap needs");
   refused({"--max-gap", "nan"}, "--max-gap");
   refused({"--max-difference", "1e300"}, "--max-difference needs");
-  EXPECT_EQ(evaluate_command({(folder / "none.tum").string(), a}).code, ExitCode::bad_input);
-  EXPECT_EQ(evaluate_command({a}).code, ExitCode::bad_input);
+  EXPECT_EQ(evaluate_command({(folder / "none.tum").string(), a}).code, 2);
+  EXPECT_EQ(evaluate_command({a}).code, 2);
 }
 
 // Without times row belongs to row, and that takes as many.
@@ -238,10 +212,9 @@ TEST(Evaluate, refusesKittiPosesOfOtherLength) {
     return (folder / name).string();
   };
   const std::string ten = write("ten.txt", 10);
-  EXPECT_NE(evaluate_command({ten, ten}).code, ExitCode::bad_input);
+  EXPECT_NE(evaluate_command({ten, ten}).code, 2);
   for (const int other : {9, 11})
-    EXPECT_EQ(evaluate_command({write("other.txt", other), ten}).code, ExitCode::bad_input)
-        << other;
+    EXPECT_EQ(evaluate_command({write("other.txt", other), ten}).code, 2) << other;
 }
 
 }  // namespace

@@ -2,8 +2,6 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include "tests/support/temporary_folder.hpp"
@@ -12,7 +10,8 @@ namespace vergence::test {
 
 /// Result of one run of the built program.
 struct Outcome {
-  int code = -1;  // exit code; 128 + number when a signal ended it
+  /// Exit code, or 128 + the number of the signal that ended the program.
+  int code = -1;
   std::string out, err;
 };
 
@@ -21,21 +20,12 @@ struct Outcome {
 [[nodiscard]] inline Outcome run_vergence(const std::string& arguments,
                                           const std::string& before = "") {
   const TemporaryFolder folder;
-  const auto text = [](const std::filesystem::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    std::ostringstream all;
-    all << in.rdbuf();
-    return all.str();
-  };
   const auto out = folder / "out", err = folder / "err";
   const std::string command = before + " '" + VERGENCE_PROGRAM + "' " + arguments + " >'" +
                               out.string() + "' 2>'" + err.string() + "' </dev/null";
   const int status = std::system(command.c_str());
-  Outcome outcome;
-  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  outcome.out = text(out);
-  outcome.err = text(err);
-  return outcome;
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(out),
+          read_file(err)};
 }
 
 }  // namespace vergence::test

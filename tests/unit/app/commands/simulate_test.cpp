@@ -40,8 +40,8 @@ TEST(Simulate, jsonHasOneObjectPerNoiseLevel) {
   for (const char* key : {"mean_reprojection_px", "mean_pose_error_m", "mean_rotation_error_rad",
                           "mean_translation_error_m"})
     EXPECT_NEAR(levels[2][key].get<double>() / levels[1][key].get<double>(), 2.0, 0.05) << key;
-  EXPECT_NEAR(levels[1]["mean_reprojection_px"].get<double>(), 0.1 * 1.2533,
-              0.01);  // the mean length of a 2-D Gaussian, less the freedom used
+  // This is the mean length of a 2-D Gaussian, less the degrees of freedom used.
+  EXPECT_NEAR(levels[1]["mean_reprojection_px"].get<double>(), 0.1 * 1.2533, 0.01);
 }
 
 TEST(Simulate, refusesImpossibleOptionsInOneLine) {

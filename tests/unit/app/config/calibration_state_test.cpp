@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 

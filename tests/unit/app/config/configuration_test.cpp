@@ -83,7 +83,8 @@ TEST(Configuration, impossibleValuesAreRefusedWithPlace) {
            {"threads: 1\nodometry: {features: 300\n", "drive.yaml:"},
            {"a: 1\n---\nb: 2\n", "several YAML documents"},
            {"threads: *unknown", "drive.yaml"},
-           {std::string(100'000, '['), "drive.yaml"},  // nested beyond any stack
+           // This text is nested beyond any stack.
+           {std::string(100'000, '['), "drive.yaml"},
        })
     EXPECT_TRUE(test::mentions(refusal(yaml), mentions)) << yaml.substr(0, 80);
 }

@@ -9,8 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/errors.hpp"
-#include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
@@ -76,11 +74,13 @@ TEST(Schema, everyRangeIsEnforcedAtBothEnds) {
 TEST(Schema, everyKeyChangesItsOwnValueOnly) {
   for (const Group& group : schema())
     for (const Key& key : group.keys) {
-      if (key.words.size() == 1) continue;  // there is no other value
+      // Such a key has no other value.
+      if (key.words.size() == 1) continue;
       SCOPED_TRACE(key.name);
       Configuration changed;
       const bool options = key.name.ends_with(".options");
-      if (options)  // which there are is the driver's matter
+      // The driver defines the options that exist.
+      if (options)
         changed.cameras[static_cast<std::size_t>(key.name[8] - '0')].options =
             v4l2::Options{.subdevice = "other"};
       const std::string text = key.words.empty() ? "other" : key.words.front();

@@ -8,7 +8,6 @@
 
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/bag_in_memory.hpp"
@@ -22,8 +21,10 @@ using test::BagKind;
 using test::mentions;
 using test::Wire;
 
-constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kMs = 1'000'000;  // ns
-constexpr std::array<std::uint16_t, 2> kSides{1, 2};                         // channels
+/// Times in ns.
+constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kMs = 1'000'000;
+/// Channels of the two images.
+constexpr std::array<std::uint16_t, 2> kSides{1, 2};
 const Geodetic kOrigin{-27.5, 153.0, 40};
 
 std::array<double, 4> coefficients(const Mat3& R) {

@@ -8,7 +8,6 @@
 
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/types/bayer.hpp"
 #include "tests/support/bag_in_memory.hpp"
 #include "tests/support/refusal.hpp"
@@ -20,10 +19,13 @@ namespace {
 using test::BagKind;
 using test::ImageMessage;
 
-constexpr std::int64_t kStart = 1'700'000'000'000'000'000;  // ns
-constexpr std::array<std::uint16_t, 2> kSides{1, 2};        // channels
+/// Stamp in ns.
+constexpr std::int64_t kStart = 1'700'000'000'000'000'000;
+/// Channels of the two images.
+constexpr std::array<std::uint16_t, 2> kSides{1, 2};
 constexpr int kWidth = 16, kHeight = 8;
-using Grey = std::vector<std::uint8_t>;  // kWidth · kHeight
+/// An image of kWidth · kHeight pixels.
+using Grey = std::vector<std::uint8_t>;
 
 std::uint8_t value(int x, int y, int channel) {
   return static_cast<std::uint8_t>(7 * x + 31 * y + 85 * channel);
@@ -84,14 +86,16 @@ class BagPixels : public ::testing::TestWithParam<BagKind> {
                    compressed_message(GetParam().wire(), kStart, format, file));
   }
 
-  std::unique_ptr<test::BagWriter> writer_;  // holds the bag's bytes
+  /// The writer owns the bytes of the bag.
+  std::unique_ptr<test::BagWriter> writer_;
   std::string refusal_;
 };
 
 TEST_P(BagPixels, keepsGrey) {
   struct Case {
     const char* encoding;
-    int bytes, grey;  // of a pixel, and its place there
+    /// Bytes per pixel, and the position of the grey value in them.
+    int bytes, grey;
   };
   for (const Case& c :
        {Case{"mono8", 1, 0}, Case{"8UC1", 1, 0}, Case{"nv12", 1, 0}, Case{"nv21", 1, 0},
@@ -135,7 +139,8 @@ TEST_P(BagPixels, refusesOtherEncodingsAndShortData) {
   ImageMessage image = image_of("mono8", 1);
   image.data.pop_back();
   EXPECT_TRUE(grey_of(image).empty());
-  image = image_of("rgb8", 1);  // rows too short for three bytes a pixel
+  // The rows are too short for three bytes per pixel.
+  image = image_of("rgb8", 1);
   EXPECT_TRUE(grey_of(image).empty());
   EXPECT_TRUE(grey_of(image_of("mono16", 1)).empty());
 }

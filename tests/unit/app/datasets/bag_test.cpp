@@ -7,7 +7,6 @@
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/ros_messages.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -19,8 +18,10 @@ using test::BagKind;
 using test::mentions;
 using test::Wire;
 
-constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kStep = 50'000'000;  // ns
-constexpr std::uint32_t kWidth = 70, kHeight = 48, kStride = 80;                // px, px, bytes
+/// Times in ns.
+constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kStep = 50'000'000;
+/// Width and height in px, stride in bytes.
+constexpr std::uint32_t kWidth = 70, kHeight = 48, kStride = 80;
 
 char pixel(std::uint32_t x, std::uint32_t y) { return static_cast<char>((3 * x + 5 * y) & 0xFFU); }
 
@@ -184,9 +185,11 @@ TEST_P(Bag, refusesOtherFilesByHeader) {
 TEST(CameraInfo, appliesBinningAndRegionByRep104) {
   struct Case {
     const char* what;
-    double f, cx, cy;  // of CameraInfo
+    /// Focal length and centre in CameraInfo.
+    double f, cx, cy;
     ImageSize size;
-    RosCrop crop;  // binning x and y, offset x and y, height, width
+    /// Binning x and y, offset x and y, height, width.
+    RosCrop crop;
     bool assumed;
   };
   constexpr ImageSize kImage{96, 72};
@@ -244,7 +247,8 @@ void write_db3(const std::filesystem::path& file, int pairs) {
   };
   message(3, kStart, camera_info(Wire::cdr, 0));
   message(4, kStart, camera_info(Wire::cdr, -7.2));
-  for (int i = pairs; i-- > 0;)  // rows need not be in the order of time
+  // Rows need not be in the order of time.
+  for (int i = pairs; i-- > 0;)
     for (int k = 1; k <= 2; ++k)
       message(k, kStart + i * kStep, image(Wire::cdr, kStart + i * kStep));
   sqlite3_close(database);

@@ -90,8 +90,8 @@ FileBytes png_noise(const PngKind& kind, int width, int height) {
   return raw;
 }
 
-constexpr int kWidth = 37,
-              kHeight = 21;  // no multiple of eight: interlacing and single bits have ends of rows
+/// The size is no multiple of eight, so that interlacing and single bits have row ends.
+constexpr int kWidth = 37, kHeight = 21;
 
 cv::Mat by_opencv(const FileBytes& file) {
   return cv::imdecode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
@@ -141,9 +141,11 @@ std::vector<PngKind> every_png_kind() {
 
 TEST(PngDecoder, everyKindEqualsOpenCv) {
   for (const PngKind& kind : every_png_kind())
-    for (const FileBytes& gamma : {FileBytes{}, FileBytes{0, 0, 0xb1, 0x8f}})  // none, 0.45455
+    // The second chunk is a gamma of 0.45455.
+    for (const FileBytes& gamma : {FileBytes{}, FileBytes{0, 0, 0xb1, 0x8f}})
       for (const bool transparent : {false, true}) {
-        if (transparent && kind.colours > 3) continue;  // has its alpha already
+        // These kinds have an alpha channel already.
+        if (transparent && kind.colours > 3) continue;
         expect_opencvs_pixels(
             noisy_png(kind, gamma, transparent), kWidth, kHeight,
             fmt::format("colours {} depth {} interlaced {} gamma {} transparent {}", kind.colours,
@@ -213,7 +215,8 @@ TEST(JpegDecoder, detectsMissingDataBeforeEnd) {
 
 TEST(JpegDecoder, limitsNumberOfScans) {
   const FileBytes file = jpeg_of(test_image(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
-  std::size_t last = 0;  // of the scans: it only refines, and may come again
+  // The last scan only refines, and may be repeated.
+  std::size_t last = 0;
   for (std::size_t i = 2; i + 1 < file.size(); ++i)
     if (file[i] == 0xff && file[i + 1] == 0xda) last = i;
   ASSERT_GT(last, 0U);

@@ -82,9 +82,8 @@ TEST_F(ImageFile, readsGreyBmpInBothRowOrders) {
     for (int x = 0; x < static_cast<int>(kStride); ++x)
       ASSERT_EQ(out[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)],
                 x < kTinyWidth ? test::tiny_pixel(x, y, 5) : 77);
-  const std::uint32_t turned =
-      0U -
-      static_cast<std::uint32_t>(kTinyHeight);  // a negative height: the first row is the top one
+  // With a negative height, the first row is the top one.
+  const std::uint32_t turned = 0U - static_cast<std::uint32_t>(kTinyHeight);
   for (std::size_t i = 0; i < 4; ++i) bytes[22 + i] = static_cast<std::uint8_t>(turned >> (8 * i));
   ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
   EXPECT_EQ(out[0], test::tiny_pixel(0, kTinyHeight - 1, 5));
@@ -100,7 +99,8 @@ TEST_F(ImageFile, refusesTruncatedBmpAndOtherDepths) {
               ImageFileStatus::truncated)
         << n;
   auto other = bytes;
-  other[28] = 16;  // bits a pixel
+  // This byte is the number of bits per pixel.
+  other[28] = 16;
   EXPECT_NE(decode(other), ImageFileStatus::ok);
 }
 
@@ -116,7 +116,8 @@ TEST_F(ImageFile, convertsColourBmpToLuminance) {
   EXPECT_EQ(grey_of(tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC3, colour))), 78);
   EXPECT_EQ(grey_of(tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC4, colour))), 78);
   auto painted = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
-  painted[14 + 40 + 4 * 90] = 255;  // blue of palette entry 90
+  // This byte is the blue value of palette entry 90.
+  painted[14 + 40 + 4 * 90] = 255;
   EXPECT_EQ(grey_of(painted), 109) << "0.886 · 90 + 0.114 · 255";
 }
 

@@ -13,9 +13,7 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stamp_text.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/math/so3.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
@@ -26,8 +24,10 @@ namespace fs = std::filesystem;
 using test::mentions;
 using test::refusal_of;
 
-constexpr std::int64_t kStart = 1'317'045'935'500'923'136;  // 2011-09-26 14:05:35.500923136 UTC
-constexpr std::int64_t kStep = 100'000'000;                 // ns
+/// 2011-09-26 14:05:35.500923136 UTC in ns.
+constexpr std::int64_t kStart = 1'317'045'935'500'923'136;
+/// Frame interval in ns.
+constexpr std::int64_t kStep = 100'000'000;
 constexpr int kFrames = 6, kPackets = 10;
 const std::string kDrive = "2011_09_26/2011_09_26_drive_0001_extract";
 const std::string kCameras = "2011_09_26/calib_cam_to_cam.txt",
@@ -326,7 +326,8 @@ TEST(KittiRawIns, reportsBadPackets) {
 
   write_drive(f);
   struct Status {
-    const char* words;  // navigation status, satellites, modes
+    /// Navigation status, number of satellites, and modes.
+    const char* words;
     FixStatus fix;
   };
   const std::array statuses{

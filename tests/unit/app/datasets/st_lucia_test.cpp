@@ -14,7 +14,6 @@
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/recorded_ins.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
 #include "core/types/bayer.hpp"
 #include "tests/support/refusal.hpp"
@@ -47,7 +46,8 @@ void write_mosaic(const std::filesystem::path& file, std::vector<std::uint8_t> p
 
 // ---- images
 
-constexpr int kWidth = 62, kHeight = 48;  // no multiple of four: BMP pads its rows
+/// The width is no multiple of four, because BMP pads its rows.
+constexpr int kWidth = 62, kHeight = 48;
 
 std::vector<std::uint8_t> mosaic(std::uint64_t seed) {
   Random random(seed);
@@ -105,7 +105,7 @@ TEST_F(StLuciaImages, readsUnpaddedMicroseconds) {
 
 TEST_F(StLuciaImages, convertsMosaicToGrey) {
   const StereoSequence s = open();
-  Arena arena(FramePool::memory_needed(kWidth, kHeight, FrameDecoder::kSlots) + kCacheLine);
+  Arena arena;
   FramePool pool(kWidth, kHeight, FrameDecoder::kSlots, arena);
   FrameDecoder decoder(s, 0, 2, pool);
   for (std::uint64_t i = 0; i < 2; ++i) {
@@ -182,9 +182,9 @@ std::vector<std::string> ins_lines(const Conventions& c, double speed = 1) {
     double latitude = 0, longitude = 0, height = 0;
     plane.Reverse(p.x(), p.y(), p.z(), latitude, longitude, height);
     const Vec3 v = speed * Way::velocity(t);
-    p += dt / 6 * speed *
-         (Way::velocity(t) + 4 * Way::velocity(t + dt / 2) +
-          Way::velocity(t + dt));  // Simpson's rule
+    // The path is integrated by Simpson's rule.
+    p +=
+        dt / 6 * speed * (Way::velocity(t) + 4 * Way::velocity(t + dt / 2) + Way::velocity(t + dt));
     const Vec3 written = c.velocity == Velocity::east_north_up     ? v
                          : c.velocity == Velocity::north_east_down ? Vec3(v.y(), v.x(), -v.z())
                                                                    : Vec3(v.y(), -v.x(), v.z());

@@ -12,8 +12,8 @@
 /// Data sets of a few tiny images, in each of the layouts that are read.
 namespace vergence::test {
 
-inline constexpr int kTinyWidth = 70,
-                     kTinyHeight = 48;  // px; a width that is no multiple of a cache line
+/// Size in px; the width is no multiple of a cache line.
+inline constexpr int kTinyWidth = 70, kTinyHeight = 48;
 
 /// Pixel (x, y) of image `seed`: a pattern that compresses badly, so that a file has many bytes to
 /// lose.
@@ -65,9 +65,10 @@ inline std::string tiny_sensor_yaml(const std::string& first_line, double x,
   return out;
 }
 
-inline constexpr std::int64_t kTinyStart =
-    1403636584763555584;                             // ns: a double loses its last digits
-inline constexpr std::int64_t kTinyStep = 49999872;  // ns
+/// First stamp in ns, whose last digits a double cannot hold.
+inline constexpr std::int64_t kTinyStart = 1403636584763555584;
+/// Frame interval in ns.
+inline constexpr std::int64_t kTinyStep = 49999872;
 
 inline void write_tiny_euroc(const TemporaryFolder& folder, int pairs,
                              const std::string& end = "\n", const std::string& first_line = "") {

@@ -20,7 +20,8 @@ using test::mentions;
 using test::refusal_of;
 
 constexpr const char* kGoodLine = "1.5 1 2 3 0 0 0 1\n";
-constexpr std::int64_t kFirst = 1403636584763555584;  // ns
+/// Stamp in ns.
+constexpr std::int64_t kFirst = 1403636584763555584;
 
 constexpr const char* kSensor =
     "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n  "
@@ -33,7 +34,7 @@ TEST(Split, assignsEveryByteToAField) {
     const std::string line =
         std::string("1 2") + static_cast<char>(byte) + "3 " + static_cast<char>(byte);
     std::array<std::string_view, 8> fields;
-    EXPECT_LE(split(line, ' ', fields), 4U) << byte;  // and it comes back
+    EXPECT_LE(split(line, ' ', fields), 4U) << byte;
   }
 }
 
@@ -49,8 +50,10 @@ struct Row {
   const char* name;
   std::string text;
   std::size_t poses;
-  std::int64_t first;  // ns
-  const char* remark;  // part of what is said; empty: nothing is
+  /// First stamp in ns.
+  std::int64_t first;
+  /// Part of the remarks; empty if none is expected.
+  const char* remark;
 };
 
 TEST(Trajectory, readsVariantsOfPrograms) {
@@ -219,8 +222,10 @@ TEST(Euroc, convertsBodyToLeftCamera) {
 TEST(TimesFile, readsVariantsOfPrograms) {
   struct Case {
     const char* text;
-    std::int64_t second;  // ns
-    const char* name;     // of the second line's left image
+    /// Stamp of the second line in ns.
+    std::int64_t second;
+    /// Name of the second line's left image.
+    const char* name;
   };
   const test::TemporaryFolder folder;
   for (const Case& c : {
@@ -237,7 +242,8 @@ TEST(TimesFile, readsVariantsOfPrograms) {
            Case{"2014-06-24 18:29:44.5 a.png\n2014-06-24 18:29:45 b.png\n", 1403634585000000000,
                 "b.png"},
            Case{"0\n50000000\n100000000\n", 50'000'000, ""},
-           Case{"864000000000000\n864000050000000\n", 864000050000000, ""},  // ns since the start
+           // These are ns since the start.
+           Case{"864000000000000\n864000050000000\n", 864000050000000, ""},
        }) {
     const TimesFile t = read_times_file(folder.write("times.txt", c.text));
     EXPECT_EQ(t.lines.at(1).stamp.ns(), c.second) << c.text;

@@ -8,26 +8,19 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/idle_camera.hpp"
+
 namespace vergence::app {
 namespace {
 
 constexpr int kWidth = 96, kHeight = 64;
 
 /// Answers as told, after a while.
-class SlowCamera final : public CameraDevice {
+class SlowCamera final : public test::IdleCamera {
  public:
-  const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration&, CameraConfiguration*) noexcept override {
-    return DeviceStatus::ok;
-  }
-  DeviceTiming timing() const noexcept override { return {}; }
-  DeviceStatus start(Notifier*) noexcept override { return DeviceStatus::ok; }
-  DeviceStatus wait(Duration, Frame*) noexcept override { return DeviceStatus::timeout; }
   ImageView view(FrameSlot) const noexcept override {
     return {pixels_.data(), kWidth, kHeight, kWidth};
   }
-  void release(FrameSlot) noexcept override {}
-  void stop() noexcept override {}
   DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -35,7 +28,6 @@ class SlowCamera final : public CameraDevice {
     if (answer.load() == DeviceStatus::ok) *actual = requested;
     return answer.load();
   }
-  CameraStatistics statistics() const noexcept override { return {}; }
   void expose_for(ExposureControl* control) {
     Frame frame;
     frame.exposure = has.exposure;
@@ -49,8 +41,8 @@ class SlowCamera final : public CameraDevice {
   std::atomic<DeviceStatus> answer{DeviceStatus::ok};
 
  private:
-  DeviceInfo info_;
-  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight, 10);  // dark
+  /// The image is dark.
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight, 10);
 };
 
 TEST(ExposureControl, slowCameraDoesNotDelayFrames) {
@@ -80,7 +72,8 @@ TEST(ExposureControl, unableCameraEndsItForgetfulOneIsAskedAgain) {
 
   exposure::ExposureOptions options;
   options.target = 20;
-  options.dead_band = 1;  // 10 grey levels are within a stop of 20
+  // Ten grey levels are within a stop of 20.
+  options.dead_band = 1;
   // Another exposure than it was given, or another gain alone.
   for (const ExposureSetting& has : {ExposureSetting{Duration::microseconds(100), 0},
                                      ExposureSetting{Duration::microseconds(1000), 6}}) {
@@ -95,7 +88,8 @@ TEST(ExposureControl, unableCameraEndsItForgetfulOneIsAskedAgain) {
 
 TEST(ExposureControl, changeWhileDisconnectedIsRepeatedOnReturn) {
   const ExposureSetting start{Duration::microseconds(1000), 0};
-  SlowCamera camera;  // dark: a longer exposure is asked for
+  // The image is dark, so a longer exposure is requested.
+  SlowCamera camera;
   camera.has = start;
   camera.answer = DeviceStatus::disconnected;
   exposure::ExposureOptions options;
@@ -103,7 +97,8 @@ TEST(ExposureControl, changeWhileDisconnectedIsRepeatedOnReturn) {
   const auto look = [&] { camera.expose_for(&control); };
   while (camera.asked == 0) look();
   camera.answer = DeviceStatus::ok;
-  camera.show(options.target);  // nothing more is to be changed
+  // No further change is needed.
+  camera.show(options.target);
   for (int i = 0; i < 8 * options.settle_frames && camera.asked == 1; ++i) look();
   EXPECT_EQ(camera.asked, 2);
   EXPECT_EQ(control.counters().again, 1U);

@@ -58,10 +58,13 @@ struct FakeMachine {
   app::Machine machine;
   app::Inventory inventory;
   app::Configuration drive;
-  bool given = false;  // the configuration counts
+  /// True if the checks get the configuration.
+  bool given = false;
   std::size_t cameras = 0;
-  std::vector<std::string> closed;  // nodes that may not be opened
-  std::string group = "video";      // of all nodes
+  /// Nodes that may not be opened.
+  std::vector<std::string> closed;
+  /// Group of all nodes.
+  std::string group = "video";
   std::optional<app::DiskRoom> room = app::DiskRoom{std::uint64_t{1} << 40};
 };
 

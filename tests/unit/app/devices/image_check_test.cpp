@@ -81,14 +81,16 @@ TEST(ImageCheck, rejectsBlackWhiteAndFlatImages) {
 TEST(ImageCheck, detectsOneDefocusedCamera) {
   const TestImage sharp = squares(320, 240);
   TestImage blurred = sharp;
-  constexpr int kRadius = 12;  // px: three squares run into one
+  // With this radius in px, three squares run into one.
+  constexpr int kRadius = 12;
   for (int y = 0; y < 240; ++y)
     for (int x = kRadius; x + kRadius < 320; ++x) {
       int sum = 0;
       for (int u = -kRadius; u <= kRadius; ++u) sum += sharp.view().at(x + u, y / 8 * 8);
       blurred.at(x, y) = static_cast<std::uint8_t>(sum / (2 * kRadius + 1));
     }
-  for (int x = 0; x < 320; ++x)  // and over the rows
+  // Then blur across the rows.
+  for (int x = 0; x < 320; ++x)
     for (int y = 0; y < 240; ++y) blurred.at(x, y) = blurred.at(x, y / 48 * 48);
   const auto remarks = issues_of({sharp, blurred});
   ASSERT_EQ(remarks.size(), 1U);

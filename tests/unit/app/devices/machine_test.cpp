@@ -54,7 +54,8 @@ TEST(Machine, roomBehindClosedFolderIsNotWritable) {
   (void)folder.write("closed/a/b/file", "");
   ASSERT_EQ(::chmod(folder.path().c_str(), 0755), 0);
   ASSERT_EQ(::chmod((folder / "closed").c_str(), 0), 0);
-  const pid_t child = ::fork();  // root may go anywhere, so another user looks
+  // Root may enter any folder, so another user checks.
+  const pid_t child = ::fork();
   if (child == 0) {
     constexpr uid_t kNobody = 65534;
     if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) ::_exit(3);

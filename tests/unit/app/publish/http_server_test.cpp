@@ -113,22 +113,22 @@ class HttpPolicies : public Http {
   }
 };
 TEST_F(HttpPolicies, admitsOnlyRequestsWithToken) {
-  const std::vector<Ask> actions{
-      {"POST /mark\r\n" + kKey, 204},
-      {"POST /recalibrate\r\n" + kKey, 204},
-      {"POST /mark\r\n" + kKey + "Content-Length: 0\r\n", 204},
-      {"POST /mark\r\n", 403},
-      {"POST /mark\r\nX-Vergence-Token: 0123456789abcdeF\r\n", 403},
-      {"POST /mark\r\nX-Vergence-Token: \r\n", 403},
-      {"POST /mark?token=" + kToken + "\r\n", 403},  // a form of another site could send that
-      {"POST /mark\r\n" + kKey + "Origin: http://evil.example\r\n", 403},
-      {"POST /mark\r\n" + kKey + "Origin: null\r\n", 403},
-      {"POST /mark\r\n" + kKey + "Content-Length: 1\r\n", 413},
-      {"POST /mark\r\n" + kKey + "Transfer-Encoding: chunked\r\n", 413},
-      {"POST /other\r\n" + kKey, 404},
-      {"GET /mark\r\n" + kKey, 404},
-      {"PUT /\r\n", 405},
-      {"GET /other\r\n", 404}};
+  const std::vector<Ask> actions{{"POST /mark\r\n" + kKey, 204},
+                                 {"POST /recalibrate\r\n" + kKey, 204},
+                                 {"POST /mark\r\n" + kKey + "Content-Length: 0\r\n", 204},
+                                 {"POST /mark\r\n", 403},
+                                 {"POST /mark\r\nX-Vergence-Token: 0123456789abcdeF\r\n", 403},
+                                 {"POST /mark\r\nX-Vergence-Token: \r\n", 403},
+                                 // A form of another site could send this request.
+                                 {"POST /mark?token=" + kToken + "\r\n", 403},
+                                 {"POST /mark\r\n" + kKey + "Origin: http://evil.example\r\n", 403},
+                                 {"POST /mark\r\n" + kKey + "Origin: null\r\n", 403},
+                                 {"POST /mark\r\n" + kKey + "Content-Length: 1\r\n", 413},
+                                 {"POST /mark\r\n" + kKey + "Transfer-Encoding: chunked\r\n", 413},
+                                 {"POST /other\r\n" + kKey, 404},
+                                 {"GET /mark\r\n" + kKey, 404},
+                                 {"PUT /\r\n", 405},
+                                 {"GET /other\r\n", 404}};
   expect(actions, "localhost");
   EXPECT_EQ(acted_, (std::vector{HttpRoute::mark, HttpRoute::recalibrate, HttpRoute::mark}));
   for (const char* host : {"localhost", "127.0.0.1:8080", "[::1]:8080"})
@@ -160,7 +160,8 @@ TEST_F(Http, stateIsAnsweredOrNoContent) {
 
 /// A viewer that sends requests and reads nothing costs one response.
 TEST_F(Http, stalledViewerHoldsOneResponse) {
-  state_.assign(32'000'000, 'x');  // more than sockets hold
+  // This is more than sockets buffer.
+  state_.assign(32'000'000, 'x');
   const std::string request = "GET /state HTTP/1.1\r\nHost: localhost\r\n\r\n";
   std::string requests;
   for (int i = 0; i < 20; ++i) requests += request;

@@ -129,7 +129,8 @@ TEST_F(UnixLines, greetingReachesStalledReader) {
   while (socket->counters().refused == 0) socket->send(body + "\n");
   socket->greet("greeting\n");
   (void)all_of(reader);
-  socket->send("");  // the rest of a line, and the greeting
+  // This sends the rest of a line and the greeting.
+  socket->send("");
   socket->send("line\n");
   EXPECT_TRUE(all_of(reader).ends_with("greeting\nline\n"));
 }
@@ -174,7 +175,8 @@ TEST_F(UnixLines, imageReaderGetsWholePairsAtItsRateAndNoLines) {
   wait(socket.get(), [](std::string_view) {
     return LineResponse{"yes\n", Duration::milliseconds(50)};
   });
-  const std::string pair(1'000'000, 'p');  // more than a socket holds
+  // This is more than a socket buffers.
+  const std::string pair(1'000'000, 'p');
   ASSERT_TRUE(socket->wants_images());
   socket->send_images(pair);
   EXPECT_FALSE(socket->wants_images()) << "it has not read the pair";

@@ -52,7 +52,8 @@ TEST(LiveState, sendsChangesSinceAVersion) {
   start.frames = 100;
   state.begin(start);
   add_frame(&state, at(0));
-  add_frame(&state, at(0.1));  // no step
+  // This motion is too short for a step of the trail.
+  add_frame(&state, at(0.1));
   FrameReport report = at(1, PoseStatus::degraded);
   report.counts.read = 3, report.counts.ok = 2, report.counts.lost = 1;
   report.counts.path_m = 12.5;

@@ -71,7 +71,8 @@ TEST(PoseLine, hasEveryKeyOfTheSchema) {
                 q.coeffs()[static_cast<Eigen::Index>(i)], 1e-9);
   ASSERT_EQ(j["covariance"].size(), 21U);
   EXPECT_DOUBLE_EQ(j["covariance"][0], 0.25);
-  EXPECT_DOUBLE_EQ(j["covariance"][20], 1e-6);  // four digits are written
+  // Four digits are written.
+  EXPECT_DOUBLE_EQ(j["covariance"][20], 1e-6);
   ASSERT_EQ(j["motion_covariance"].size(), 21U);
   EXPECT_DOUBLE_EQ(j["motion_covariance"][6], 0.0004);
   EXPECT_DOUBLE_EQ(j["length_sigma"], 0.0125);
@@ -161,16 +162,14 @@ TEST(PoseStream, statusLineBeforeAndAfterFirstFrame) {
   EXPECT_EQ(j["ins"]["aligned"], true);
 }
 
-/// Keeps the pose lines and the greeting; holds the publisher's thread while it is shut.
+/// Keeps the pose lines and the greeting, and stalls the publisher's thread while `open` is false.
 class Kept final : public LineSocket {
  public:
-  explicit Kept(std::vector<std::string>* lines, std::atomic<bool>* open)
-      : lines_(lines), open_(open) {}
   void send(std::string_view line) noexcept override {
-    open_->wait(false);
-    if (line.find(R"("type":"pose")") != std::string_view::npos) lines_->emplace_back(line);
+    open.wait(false);
+    if (line.find(R"("type":"pose")") != std::string_view::npos) lines.emplace_back(line);
   }
-  void greet(std::string lines) noexcept override { greeting = std::move(lines); }
+  void greet(std::string text) noexcept override { greeting = std::move(text); }
   void wait(int wake, Duration timeout, const Answer& answer) noexcept override {
     pollfd event{wake, POLLIN, 0};
     (void)::poll(&event, 1, static_cast<int>(timeout.ns() / 1'000'000) + 1);
@@ -190,15 +189,27 @@ class Kept final : public LineSocket {
   }
   [[nodiscard]] LineSocketCounters counters() const noexcept override { return {}; }
 
-  // Used by the publisher's thread while it runs.
-  std::string greeting{}, request{}, response{};
-  std::string images{};
+  // The publisher's thread uses these members while it runs.
+  std::vector<std::string> lines{};
+  std::string greeting{}, request{}, response{}, images{};
   bool images_wanted = false;
-  std::atomic<bool> answered{false}, images_sent{false};
+  std::atomic<bool> open{true}, answered{false}, images_sent{false};
+};
 
- private:
-  std::vector<std::string>* lines_;
-  std::atomic<bool>* open_;
+/// A publisher on such a socket. The socket has a request from its first wait on.
+struct Publishing {
+  explicit Publishing(const SessionStart& start = {}, const std::string& request = "",
+                      bool open = true) {
+    socket->request = request;
+    socket->open = open;
+    publisher = std::make_unique<LinePublisher>(std::move(kept), &requests,
+                                                calibration::CalibrationOptions{});
+    publisher->on_start(start);
+  }
+  SessionRequests requests{};
+  std::unique_ptr<Kept> kept = std::make_unique<Kept>();
+  Kept* socket = kept.get();
+  std::unique_ptr<LinePublisher> publisher{};
 };
 
 FrameReport report(std::uint64_t frame) {
@@ -210,17 +221,14 @@ FrameReport report(std::uint64_t frame) {
 }
 
 TEST(LinePublisher, fullRingDropsAndCountsNewestPoses) {
-  SessionRequests requests;
-  std::vector<std::string> lines;
-  std::atomic<bool> open{false};
-  LinePublisher publisher(std::make_unique<Kept>(&lines, &open), &requests, {});
-  publisher.on_start({});
+  const Publishing p({}, "", false);
+  const auto& lines = p.socket->lines;
   constexpr std::uint64_t kPoses = 1000;
-  for (std::uint64_t i = 0; i < kPoses; ++i) publisher.on_pose(report(i));  // the socket is shut
-  open = true;
-  open.notify_all();
+  for (std::uint64_t i = 0; i < kPoses; ++i) p.publisher->on_pose(report(i));
+  p.socket->open = true;
+  p.socket->open.notify_all();
   std::map<std::string, std::uint64_t> counters;
-  for (const auto& [name, value] : publisher.counters()) counters[name] = value;
+  for (const auto& [name, value] : p.publisher->counters()) counters[name] = value;
   EXPECT_EQ(counters["lines"] + counters["lines_dropped"], kPoses);
   EXPECT_EQ(counters["lines"], lines.size());
   EXPECT_GE(lines.size(), 64U) << "all that the ring held";
@@ -235,59 +243,46 @@ TEST(LinePublisher, fullRingDropsAndCountsNewestPoses) {
 }
 
 TEST(LinePublisher, estimatorThreadDoesNotAllocate) {
-  SessionRequests requests;
-  std::vector<std::string> lines;
-  std::atomic<bool> open{true};
-  LinePublisher publisher(std::make_unique<Kept>(&lines, &open), &requests, {});
-  publisher.on_start({});
+  const Publishing p;
   EnuAlignment alignment;
   alignment.T_enu_world.t = {1, 2, 3};
   AllocationGuard::seal_thread();
   const auto before = AllocationGuard::runtime_allocations();
-  publisher.on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
-  publisher.on_pose(report(0));
+  p.publisher->on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
+  p.publisher->on_pose(report(0));
   const auto taken = AllocationGuard::runtime_allocations() - before;
   AllocationGuard::unseal_thread();
   EXPECT_EQ(taken, 0U);
-  (void)publisher.counters();
-  ASSERT_EQ(lines.size(), 1U);
-  EXPECT_EQ(nlohmann::json::parse(lines[0])["enu"]["enu_m"], (std::vector<double>{1, 2, 3}));
+  (void)p.publisher->counters();
+  ASSERT_EQ(p.socket->lines.size(), 1U);
+  EXPECT_EQ(nlohmann::json::parse(p.socket->lines[0])["enu"]["enu_m"],
+            (std::vector<double>{1, 2, 3}));
 }
 
 TEST(LinePublisher, greetsWithCalibrationAndAlignment) {
-  SessionRequests requests;
-  std::vector<std::string> lines;
-  std::atomic<bool> open{true};
-  auto kept = std::make_unique<Kept>(&lines, &open);
-  const Kept* socket = kept.get();
-  LinePublisher publisher(std::move(kept), &requests, {});
-  publisher.on_start({});
+  const Publishing p;
+  const Kept* socket = p.socket;
   CalibrationRecord record;
   for (const auto& [stamp, accepted] : {std::pair(1, true), {2, true}, {3, false}}) {
     record.stamp = Stamp(stamp);
     record.accepted = accepted;
-    publisher.on_calibration(record);
+    p.publisher->on_calibration(record);
   }
-  publisher.on_enu_alignment({}, {-27.4975, 153.0137, 60});
-  (void)publisher.counters();
+  p.publisher->on_enu_alignment({}, {-27.4975, 153.0137, 60});
+  (void)p.publisher->counters();
   const std::size_t end = socket->greeting.find('\n') + 1;
   EXPECT_EQ(nlohmann::json::parse(socket->greeting.substr(0, end))["stamp_ns"], 2);
   EXPECT_EQ(nlohmann::json::parse(socket->greeting.substr(end))["origin"]["height_m"], 60);
 }
 
 TEST(LinePublisher, imagesFollowARequestForThem) {
-  SessionRequests requests;
-  std::vector<std::string> lines;
-  std::atomic<bool> open{true};
-  auto kept = std::make_unique<Kept>(&lines, &open);
-  Kept* socket = kept.get();
-  socket->request = R"({"request": "images", "rate_hz": 5})";
-  LinePublisher publisher(std::move(kept), &requests, {});
   SessionStart start;
   start.camera_names = {"left", "right"};
   start.image_bytes = 6;
-  publisher.on_start(start);
-  const std::string pixels = "abcdefgh";  // rows of 4 bytes
+  const Publishing p(start, R"({"request": "images", "rate_hz": 5})");
+  const Kept* socket = p.socket;
+  // Rows have 4 bytes.
+  const std::string pixels = "abcdefgh";
   RigFrame frame;
   frame.cameras = 2;
   frame.images[0] = {reinterpret_cast<const std::uint8_t*>(pixels.data()), 3, 2, 4};
@@ -296,13 +291,13 @@ TEST(LinePublisher, imagesFollowARequestForThem) {
     frame.stamp = Stamp(static_cast<std::int64_t>(frame.number) * 50'000'000);
     AllocationGuard::seal_thread();
     const auto before = AllocationGuard::runtime_allocations();
-    publisher.on_frame(frame);
-    publisher.on_pose(report(frame.number));
+    p.publisher->on_frame(frame);
+    p.publisher->on_pose(report(frame.number));
     EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
     AllocationGuard::unseal_thread();
     std::this_thread::sleep_for(std::chrono::microseconds(500));
   }
-  (void)publisher.counters();
+  (void)p.publisher->counters();
   ASSERT_TRUE(socket->images_sent);
   std::string_view rest = socket->images;
   const auto next = [&rest] {
@@ -328,48 +323,32 @@ struct RequestCase {
   const char* request;
   bool can_recalibrate, accepted;
 };
-void PrintTo(const RequestCase& c, std::ostream* out) { *out << c.request; }
 
-class LineRequests : public testing::TestWithParam<RequestCase> {};
-
-TEST_P(LineRequests, areAcceptedOnlyIfTheSessionCan) {
-  const RequestCase& c = GetParam();
-  SessionRequests requests;
-  std::vector<std::string> lines;
-  std::atomic<bool> open{true};
-  auto kept = std::make_unique<Kept>(&lines, &open);
-  Kept* socket = kept.get();
-  SessionStart start;
-  start.can_recalibrate = c.can_recalibrate;
-  std::string response;
-  {
-    // The publisher's thread waits for what it is woken by, and then reads the request.
-    socket->request = c.request;
-    LinePublisher publisher(std::move(kept), &requests, {});
-    publisher.on_start(start);
-    publisher.on_pose(report(0));
-    while (socket->answered.load() == false) std::this_thread::yield();
-    response = socket->response;
+TEST(LinePublisher, acceptsOnlyRequestsTheSessionCanMeet) {
+  for (const RequestCase& c : {RequestCase{R"({"request": "recalibrate"})", true, true},
+                               RequestCase{R"({"request": "recalibrate"})", false, false},
+                               RequestCase{R"({"request": "images", "rate_hz": 200})", false, true},
+                               RequestCase{R"({"request": "images", "rate_hz": 201})", true, false},
+                               RequestCase{R"({"request": "images", "rate_hz": 0})", true, false},
+                               RequestCase{R"({"request": "images"})", true, false},
+                               RequestCase{R"({"request": "reboot"})", true, false},
+                               RequestCase{R"({"request": 7})", true, false},
+                               RequestCase{R"(["recalibrate"])", true, false},
+                               RequestCase{"{\xff", true, false}, RequestCase{" ", true, false}}) {
+    SCOPED_TRACE(c.request);
+    SessionStart start;
+    start.can_recalibrate = c.can_recalibrate;
+    const Publishing p(start, c.request);
+    // The publisher's thread reads the request when a pose wakes it.
+    p.publisher->on_pose(report(0));
+    while (!p.socket->answered.load()) std::this_thread::yield();
+    const auto j = nlohmann::json::parse(p.socket->response);
+    EXPECT_EQ(j["type"], "response");
+    EXPECT_EQ(j["accepted"], c.accepted);
+    EXPECT_EQ(p.requests.recalibrate.load(),
+              c.accepted && std::string_view(c.request).find("images") == std::string_view::npos);
   }
-  const auto j = nlohmann::json::parse(response);
-  EXPECT_EQ(j["type"], "response");
-  EXPECT_EQ(j["accepted"], c.accepted);
-  EXPECT_EQ(requests.recalibrate.load(),
-            c.accepted && std::string_view(c.request).find("images") == std::string_view::npos);
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    All, LineRequests,
-    testing::Values(RequestCase{R"({"request": "recalibrate"})", true, true},
-                    RequestCase{R"({"request": "recalibrate"})", false, false},
-                    RequestCase{R"({"request": "images", "rate_hz": 200})", false, true},
-                    RequestCase{R"({"request": "images", "rate_hz": 201})", true, false},
-                    RequestCase{R"({"request": "images", "rate_hz": 0})", true, false},
-                    RequestCase{R"({"request": "images"})", true, false},
-                    RequestCase{R"({"request": "reboot"})", true, false},
-                    RequestCase{R"({"request": 7})", true, false},
-                    RequestCase{R"(["recalibrate"])", true, false},
-                    RequestCase{"{\xff", true, false}, RequestCase{" ", true, false}));
 
 }  // namespace
 }  // namespace vergence::app

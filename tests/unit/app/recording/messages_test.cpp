@@ -23,7 +23,8 @@ struct Room {
   std::array<std::uint8_t, 4096> bytes{};
   CdrWriter out{fill()};
   std::span<std::uint8_t> fill() {
-    bytes.fill(0x55);  // what was in the memory before is not to show through
+    // The former content of the memory must not show through.
+    bytes.fill(0x55);
     return bytes;
   }
 };

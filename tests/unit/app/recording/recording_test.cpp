@@ -23,10 +23,14 @@ namespace {
 /// Threads  The settings: any.
 class FaultyDisk final : public Disk {
  public:
-  std::atomic<std::uint64_t> room{~std::uint64_t{0}};  // bytes of a file; then ENOSPC
-  std::atomic<int> error{0};                           // errno of every call from now on; 0: none
-  std::atomic<int> stall_ms{0};                        // the next write waits so long
-  std::atomic<int> writeback_error{0};                 // errno of the next writeback; 0: none
+  /// Maximum size of a file in bytes; beyond it, writing fails with ENOSPC.
+  std::atomic<std::uint64_t> room{~std::uint64_t{0}};
+  /// errno of every following call; 0 for none.
+  std::atomic<int> error{0};
+  /// Delay of the next write in ms.
+  std::atomic<int> stall_ms{0};
+  /// errno of the next writeback; 0 for none.
+  std::atomic<int> writeback_error{0};
 
   [[nodiscard]] int create(const char* path) noexcept override {
     return error != 0 ? -error : system_.create(path);
@@ -135,7 +139,8 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
   o.when_full = WhenFull::drop;
   o.files.disk = &disk;
   Recording recording(folder.path(), o);
-  disk.stall_ms = 1000;  // the first chunk
+  // The first chunk stalls.
+  disk.stall_ms = 1000;
   ASSERT_TRUE(post(&recording, 0));
   std::this_thread::sleep_for(150ms);
   int images = 0;
@@ -170,7 +175,8 @@ TEST(Recording, retriesFailedWritesInSameFile) {
   std::this_thread::sleep_for(200ms);
   disk.error = 0;
   const auto chunks = recording.counters().chunks;
-  await_chunks(recording, chunks + 1);  // within RecordingFiles::kRetry
+  // The recording retries within RecordingFiles::kRetry.
+  await_chunks(recording, chunks + 1);
   recording.close();
   const auto errors = recording.pop_errors();
   ASSERT_EQ(errors.size(), 2U);

@@ -10,7 +10,8 @@
 namespace vergence::app::report {
 namespace {
 
-constexpr std::int64_t kStep = 100'000'000;  // ns
+/// Frame interval in ns.
+constexpr std::int64_t kStep = 100'000'000;
 constexpr double kDegree = 0.017453292519943295;
 
 /// A way of 0.5 m a frame that bends, in a camera's axes; n = 600 is 300 m.
@@ -54,7 +55,8 @@ TEST(Analysis, aReferenceThatIsTheSameElsewhereGivesNoError) {
 
 TEST(Analysis, driftAfterHundredMetresKeepsSizeAndSign) {
   Session s = with_reference(bent_drive(600), Transform{});
-  for (std::size_t i = 400; i < 600; ++i) {  // after 200 m: up 2 m, turned left by 3°
+  // After 200 m, the pose is 2 m too high and turned left by 3°.
+  for (std::size_t i = 400; i < 600; ++i) {
     s.frames[i].T_world_left.t.y() -= 2;
     s.frames[i].T_world_left.R = exp_so3({0, -3 * kDegree, 0}) * s.frames[i].T_world_left.R;
   }
@@ -119,16 +121,19 @@ TEST(Analysis, errorsToTheInsAreThoseOfTheFile) {
 TEST(Analysis, driftAgainstInsUsesPositionsOnly) {
   Session s = bent_drive(600);
   Mat3 up;
-  up << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // camera axes that look east, in enu
+  // These are the axes in ENU of a camera that looks east.
+  up << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   for (Frame& f : s.frames) {
     const Vec3 p = exp_so3({0, 0, 0.4}) * up * f.T_world_left.t;
     f.placed = f.has_ins = f.compared = true;
     f.ins = {p.x(), p.y(), p.z()};
-    f.enu = {0.9 * p.x(), p.y(), p.z()};  // a bad alignment: its errors are large
+    // The alignment is bad, so its errors are large.
+    f.enu = {0.9 * p.x(), p.y(), p.z()};
     f.error = {-0.1 * p.x(), 0, 0};
   }
   EXPECT_LT(analyse(s).drift.value(), 1e-9);
-  for (Frame& f : s.frames) f.T_world_left.t *= 1.02;  // two per cent too long
+  // The path is two per cent too long.
+  for (Frame& f : s.frames) f.T_world_left.t *= 1.02;
   const Analysis a = analyse(s);
   EXPECT_NE(a.drift_message.find("300 m"), std::string::npos);
   // 300 m of ours are an arc of 300/102 rad on a circle of 102 m; the ways differ by 2 m of radius

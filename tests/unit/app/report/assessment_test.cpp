@@ -76,8 +76,10 @@ struct Row {
   const char* name;
   std::function<void(Case&)> change;
   Grade grade;
-  std::string reason = {};  // a part of one; empty: any
-  std::string advice = {};  // likewise
+  /// Part of a reason; empty accepts any.
+  std::string reason = {};
+  /// Part of an advice; empty accepts any.
+  std::string advice = {};
 };
 
 TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "app/report/report.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/session_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -57,7 +56,8 @@ TEST(Page, acceptsEveryTruncatedSession) {
   std::vector<std::string> pages;
   for (const char* gone : {"summary.json", "poses.csv", "reference.tum", "calibrations.csv",
                            "calibration.yaml", "events.jsonl"})
-    for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {  // of the file; negative: no file
+    // Share of the file that is kept; a negative share removes the file.
+    for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {
       const test::TemporaryFolder folder;
       std::filesystem::copy(whole.path(), folder.path(), std::filesystem::copy_options::recursive);
       const std::string text = test::read_file(folder / gone);

@@ -36,7 +36,8 @@ TEST(ReadSession, wholeSessionHasNothingMissing) {
   EXPECT_EQ(s.missing, std::vector<std::string>{});
   ASSERT_EQ(s.frames.size(), 400U);
   EXPECT_EQ(s.frames.front().stamp.ns(), writer.first_stamp_ns);
-  EXPECT_EQ(s.frames[250].status, PoseStatus::lost);  // 62 to 64 %
+  // Frames from 62 to 64 % of the run are lost.
+  EXPECT_EQ(s.frames[250].status, PoseStatus::lost);
   EXPECT_FALSE(s.frames[250].posed);
   EXPECT_TRUE(s.frames[399].compared && s.frames[399].placed && s.frames[399].has_ins &&
               s.frames[399].posed);

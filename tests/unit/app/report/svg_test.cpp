@@ -18,10 +18,14 @@ TEST(Escape, keepsValidUtf8AndReplacesInvalid) {
   EXPECT_EQ(escape("a\xff"
                    "b"),
             "a" + mark + "b");
-  EXPECT_EQ(escape("\xc3"), mark);                                   // cut off
-  EXPECT_EQ(escape("\xc0\xaf"), mark + mark);                        // overlong /
-  EXPECT_EQ(escape("\xed\xa0\x80"), mark + mark + mark);             // surrogate
-  EXPECT_EQ(escape("\xf4\x90\x80\x80"), mark + mark + mark + mark);  // beyond Unicode
+  // The character is cut off.
+  EXPECT_EQ(escape("\xc3"), mark);
+  // This is an overlong slash.
+  EXPECT_EQ(escape("\xc0\xaf"), mark + mark);
+  // This is a surrogate.
+  EXPECT_EQ(escape("\xed\xa0\x80"), mark + mark + mark);
+  // This is beyond Unicode.
+  EXPECT_EQ(escape("\xf4\x90\x80\x80"), mark + mark + mark + mark);
 }
 
 TEST(Ticks, areRoundFewAndWithinAxis) {

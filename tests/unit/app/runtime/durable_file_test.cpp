@@ -34,7 +34,8 @@ TEST(DurableFile, replacesWithoutTemporaryFiles) {
 TEST(DurableFile, failureNamesFileAndKeepsOldOne) {
   const test::TemporaryFolder folder;
   replace_durably(folder / "a.yaml", "old");
-  std::filesystem::create_directory(folder / "a.yaml.new");  // cannot be opened as a file
+  // A folder cannot be opened as a file.
+  std::filesystem::create_directory(folder / "a.yaml.new");
   EXPECT_NE(refusal(folder / "a.yaml").find("a.yaml: cannot be written"), std::string::npos);
   EXPECT_EQ(test::read_file(folder / "a.yaml"), "old");
   EXPECT_NE(refusal(folder / "none" / "b.yaml").find("b.yaml: cannot be written"),

@@ -40,7 +40,8 @@ TEST_F(ProgressTest, lineHasEveryKnownField) {
   auto p = progress(Progress::Mode::terminal);
   p.update(at(1, 33000));
   now = now + Duration::seconds(10);
-  ProgressState s = at(1001, 33000);  // 100 frames a second: 31999 are left, 319.99 s
+  // At 100 Hz, the remaining 31999 frames take 319.99 s.
+  ProgressState s = at(1001, 33000);
   s.from_ins_m = 0.42;
   p.update(s);
   EXPECT_TRUE(

@@ -32,7 +32,8 @@ TEST(BackgroundThread, startDoesNotWaitForTheTask) {
 
 TEST(BackgroundThread, resultIsVisibleWhenNotBusy) {
   BackgroundThread runner;
-  std::array<int, 64> written{};  // plain: seen too early it would be a race
+  // The array is not atomic, so reading it too early would be a race.
+  std::array<int, 64> written{};
   int expected = 0;
   auto task = [&] {
     for (int& w : written) ++w;
@@ -81,7 +82,8 @@ TEST(ThreadRunner, runsOneHalfOnEachThread) {
 
 TEST(ThreadRunner, waitsForTheSlowerHalf) {
   ThreadRunner runner;
-  int left = 0, right = 0;  // plain: a run that returned early would be a race
+  // The counters are not atomic, so a run that returned early would be a race.
+  int left = 0, right = 0;
   const auto pause = [](int i) {
     // Longer than both sides spin now and then, so that sleeping and waking are walked, too.
     if (i % 500 == 0) std::this_thread::sleep_for(std::chrono::microseconds(300));

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
@@ -83,7 +82,8 @@ EventRecord verified() {
 TEST(CalibrationWriter, savesFoundOrVerifiedForNextDrive) {
   struct Row {
     bool confirms, finds;
-    int frames;  // of the calibration in the state file; 0: there is none
+    /// Frames of the calibration in the state file; 0 if there is none.
+    int frames;
   };
   for (const auto& [confirms, finds, frames] :
        {Row{false, false, 0}, {true, false, 7}, {false, true, 60}, {true, true, 60}}) {
@@ -127,7 +127,8 @@ TEST(CalibrationWriter, reportsWhetherNextDriveHasIt) {
         {false, true, true, true},
         {true, true, true, true},
         {true, true, false, false},
-        {true, false, false, true}}) {  // the session's is all there is to keep
+        // The session's file is the only one to write.
+        {true, false, false, true}}) {
     const test::TemporaryFolder folder;
     const auto block = [&](const char* file) {
       std::filesystem::create_directories(folder / (std::string(file) + ".new"));
@@ -146,22 +147,6 @@ TEST(CalibrationWriter, reportsWhetherNextDriveHasIt) {
         std::string(outcome.event.message.data()).find("calibration.yaml") != std::string::npos,
         session_fails);
   }
-}
-
-TEST(CalibrationWriter, postingDoesNotAllocate) {
-  if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  const test::TemporaryFolder folder;
-  CalibrationWriter writer({.session = folder.path(), .when_full = WhenFull::wait});
-  const CalibrationRecord record = found(false);
-  const auto before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    for (int i = 0; i < 100; ++i) writer.on_calibration(record);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
-  EXPECT_TRUE(close(&writer).empty());
-  EXPECT_EQ(writer.totals().rejected, 100U);
 }
 
 }  // namespace

@@ -13,8 +13,10 @@ namespace vergence::app {
 namespace {
 
 constexpr int kRestarts = 70;
-constexpr double kBetween = 200;  // m
-constexpr double kSpeed = 10;     // m/s, eastwards
+/// Path between two restarts in m.
+constexpr double kBetween = 200;
+/// Eastward speed in m/s.
+constexpr double kSpeed = 10;
 
 Stamp at(double t) { return Stamp(1403636584000000000) + Duration::seconds(t); }
 
@@ -43,7 +45,7 @@ struct ComparedSession {
   SessionOutput output{observers};
   const std::unique_ptr<EventLog> log = std::make_unique<EventLog>();
   const ComparisonOptions options{};
-  Arena arena{Comparison::bytes_needed(options)};
+  Arena arena;
   InsComparison comparison{options, InsSource::device, arena, *log};
 };
 
@@ -59,7 +61,8 @@ TEST(InsComparison, keepsAlignmentsOfManyTunnels) {
   ComparedSession session;
   InsComparison& comparison = session.comparison;
   const LocalTangentPlane plane(Geodetic{48, 11, 500});
-  constexpr int kPoses = static_cast<int>(kBetween / kSpeed * 10);  // of a scene, at 10 Hz
+  // Poses of one map at 10 Hz.
+  constexpr int kPoses = static_cast<int>(kBetween / kSpeed * 10);
   for (int i = 0; i < kPoses * (kRestarts + 1); ++i) {
     const double t = i / 10.0;
     FrameReport report;
@@ -87,7 +90,8 @@ TEST(InsComparison, countsScaleDisagreementOnlyWithIns) {
   ComparedSession session;
   InsComparison& comparison = session.comparison;
   const LocalTangentPlane plane(Geodetic{48, 11, 500});
-  constexpr double kGone = 40;  // s
+  // Time in s at which the INS stops.
+  constexpr double kGone = 40;
   for (int i = 0; i < 600; ++i) {
     const double t = i / 10.0;
     if (t < kGone) comparison.add(reading(plane, t, {kSpeed * t, 0, 0}));

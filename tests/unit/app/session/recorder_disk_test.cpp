@@ -54,7 +54,8 @@ TEST(Recorder, brieflyFullDiskLosesNothing) {
 
 TEST(Recorder, longFullDiskLosesWholeCountedLines) {
   const test::TemporaryFolder folder;
-  constexpr std::uint64_t kFrames = 14'000;  // 170 bytes each in poses.csv: twice what memory holds
+  // At 170 bytes each in poses.csv, this is twice what memory holds.
+  constexpr std::uint64_t kFrames = 14'000;
   Recorder::Options options;
   options.disk_full = full_from_to(10, kFrames - 10);
   Recorder recorder(folder.path(), options);

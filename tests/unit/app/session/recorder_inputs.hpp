@@ -1,7 +1,6 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -12,7 +11,8 @@
 /// Inputs of a recorder in tests, and readers of its output.
 namespace vergence::app {
 
-inline constexpr std::int64_t kStamp = 1403636584763555584;  // ns: a double loses its last digits
+/// Stamp in ns, whose last digits a double cannot hold.
+inline constexpr std::int64_t kStamp = 1403636584763555584;
 
 inline FrameReport pose(std::uint64_t frame, PoseStatus status, double x) {
   PoseSample sample;

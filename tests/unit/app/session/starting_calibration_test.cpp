@@ -5,8 +5,6 @@
 #include <string>
 
 #include "app/config/calibration_state.hpp"
-#include "app/runtime/errors.hpp"
-#include "core/math/so3.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {

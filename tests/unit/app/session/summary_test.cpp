@@ -51,7 +51,8 @@ TEST(Summary, framesAreCountedAndMissingReferenceIsNull) {
   EXPECT_EQ(json["timing_ms"]["mean"], 8.0);
   EXPECT_EQ(json["timing_ms"]["stage_distributions"].size(), json["timing_ms"]["stages"].size());
   const auto& track = json["timing_ms"]["stage_distributions"]["track"];
-  EXPECT_NEAR(track["p50"], 1.0, 0.0035);  // half a bin, and microseconds
+  // The tolerance is half a bin, and microseconds.
+  EXPECT_NEAR(track["p50"], 1.0, 0.0035);
   EXPECT_EQ(track["max"], 16.0);
   EXPECT_EQ(json["memory"]["total_bytes"], 7);
   EXPECT_TRUE(json["calibration"]["rating"].is_null());
@@ -122,7 +123,8 @@ TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
       << "without the noise's part nobody knows";
   in.calibration.sigma_noise[1] = in.calibration.sigma_total[1];
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "noise");
-  in.calibration.sigma_noise[1][1] = 1e-4;  // a quarter of the variance
+  // This is a quarter of the variance.
+  in.calibration.sigma_noise[1][1] = 1e-4;
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "intrinsics");
 }
 

@@ -7,8 +7,7 @@ namespace vergence {
 
 /// An adjuster with an arena of its own.
 struct OwnAdjuster {
-  explicit OwnAdjuster(const BundleCapacities& c)
-      : arena(BundleAdjuster::memory_needed(c)), adjuster(c, arena) {}
+  explicit OwnAdjuster(const BundleCapacities& c) : adjuster(c, arena) {}
   Arena arena;
   BundleAdjuster adjuster;
 };

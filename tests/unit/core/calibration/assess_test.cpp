@@ -16,7 +16,7 @@ constexpr double kDegree = std::numbers::pi / 180, kPixelSigma = 0.15;
 /// A measured rig that is the true one, and frames that it does not rest on.
 struct Measured {
   test::FeatureDriveOptions drive;
-  Arena arena{TrackLog::memory_needed(20, 300)};
+  Arena arena;
   TrackLog log{20, 300, arena};
   CalibrationOptions options;
   CalibrationOrigin source = CalibrationOrigin::elsewhere;

@@ -25,9 +25,7 @@ Transform rig(double yaw_deg) {
 class Street {
  public:
   explicit Street(const Transform& believed, std::uint64_t seed = 1)
-      : arena_(DisparityJumpDetector::memory_needed(2 * kTracks)),
-        detector_(2 * kTracks, arena_),
-        random_(seed) {
+      : detector_(2 * kTracks, arena_), random_(seed) {
     detector_.set_reference(believed, kPinhole, kPinhole);
     for (std::size_t i = 0; i < kTracks; ++i) points_.push_back(fresh());
   }
@@ -159,7 +157,7 @@ TEST(DisparityJump, vibrationRaisesTheThresholdForTwentyFrames) {
 }
 
 TEST(DisparityJump, tooFewTracksMeasureNothing) {
-  Arena arena(DisparityJumpDetector::memory_needed(10));
+  Arena arena;
   DisparityJumpDetector detector(10, arena);
   detector.set_reference(rig(0), kPinhole, kPinhole);
   const std::vector<StereoObservation> same(

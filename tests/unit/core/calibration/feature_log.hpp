@@ -121,9 +121,7 @@ struct SolverInArena {
   Arena arena;
   calibration::RigSolver solver;
   explicit SolverInArena(const calibration::CalibrationOptions& o, int cameras = 2)
-      : options(o),
-        arena(calibration::RigSolver::memory_needed(o, monitor, cameras, kFeatures)),
-        solver(options, monitor, cameras, kFeatures, arena) {}
+      : options(o), solver(options, monitor, cameras, kFeatures, arena) {}
   static constexpr std::size_t kFeatures = 300;
 };
 

@@ -15,7 +15,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 /// A question that every gate answers with `open`: frames 30 to 49 were not in the solve, and fit.
 struct Case {
   test::FeatureDriveOptions drive;
-  Arena arena{TrackLog::memory_needed(60, 300)};
+  Arena arena;
   TrackLog log{60, 300, arena};
   CalibrationOptions options;
   RigCalibration nominal, in_use;

@@ -218,7 +218,7 @@ TEST(Monitor, invalidReferenceOrOptionsAreRefused) {
   const Pinhole k{1247, 1247, 511.5, 383.5};
   EXPECT_FALSE(trial.monitor().set_reference(Transform{}, k, k, Mat6::Zero()));
   EXPECT_EQ(trial.step().kind, Kind::quiet);
-  Arena arena(calibration::Monitor::memory_needed({}));
+  Arena arena;
   MonitorOptions bad;
   bad.threshold = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(calibration::Monitor(bad, arena), std::invalid_argument);

@@ -24,7 +24,7 @@ class MonitorTrial {
       : MonitorTrial(drive, drive.T_right_left, Mat6::Zero(), options) {}
   MonitorTrial(const FeatureDriveOptions& drive, const Transform& T_right_left,
                const Mat6& covariance, const calibration::MonitorOptions& options = {})
-      : arena_(std::make_unique<Arena>(calibration::Monitor::memory_needed(options))),
+      : arena_(std::make_unique<Arena>()),
         drive_(drive),
         monitor_(options, *arena_),
         epipolar_(T_right_left) {

@@ -44,7 +44,7 @@ struct Seen {
 /// Twenty frames before the fault, twenty with it, and twenty after it.
 Seen drive(const Case& c) {
   constexpr int kFrames = 60, kFault = 20, kEnd = 40;
-  Arena arena(PairingEvidence::memory_needed(kPoints));
+  Arena arena;
   PairingEvidence evidence(kPoints, arena);
   Random random(7);
   const Transform T_right_left{exp_so3({0.002, -0.01, 0.003}), {-0.5, 0.01, 0}};
@@ -93,7 +93,7 @@ TEST(PairingEvidence, lagIsDistinguishedFromKnockAndStanding) {
 }
 
 TEST(PairingEvidence, noiseOfAStandingRigIsNoLag) {
-  Arena arena(PairingEvidence::memory_needed(kPoints));
+  Arena arena;
   PairingEvidence evidence(kPoints, arena);
   Random random(3);
   std::vector<StereoObservation> points(kPoints);
@@ -113,7 +113,7 @@ TEST(PairingEvidence, noiseOfAStandingRigIsNoLag) {
 }
 
 TEST(PairingEvidence, distanceFromEpipolarLinesIsMeasured) {
-  Arena arena(PairingEvidence::memory_needed(kPoints));
+  Arena arena;
   PairingEvidence evidence(kPoints, arena);
   const Transform T_right_left{Mat3::Identity(), {-0.5, 0, 0}};
   std::vector<StereoObservation> points;

@@ -30,7 +30,7 @@ struct Driven {
   FeatureDrive drive;
   CalibrationOptions options;
   calibration::MonitorOptions monitor;
-  Arena log_arena{TrackLog::memory_needed(kLogged, kFeatures)}, arena;
+  Arena log_arena, arena;
   TrackLog log{kLogged, kFeatures, log_arena};
   SegmentSolver stretches;
   std::vector<RigSolution> solved;
@@ -45,7 +45,6 @@ struct Driven {
          const RigCalibration& start, double extrinsic_random_walk_mrad_per_sqrt_h = 0.3)
       : drive(o),
         options(small(extrinsic_random_walk_mrad_per_sqrt_h)),
-        arena(SegmentSolver::memory_needed(options, monitor, 2, kFeatures)),
         stretches(kind, given, start, kStretch, options, monitor, kFeatures, arena) {}
   void go(int frames) {
     for (int i = 0; i < frames; i += 10) {

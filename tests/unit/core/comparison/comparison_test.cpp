@@ -34,8 +34,7 @@ struct Bench {
   Comparison comparison;
   std::vector<ComparedPose> out;
 
-  explicit Bench(ComparisonOptions o = with_mount())
-      : options(o), arena(Comparison::bytes_needed(o)), comparison(o, arena) {}
+  explicit Bench(ComparisonOptions o = with_mount()) : options(o), comparison(o, arena) {}
 
   static ComparisonOptions with_mount() {
     ComparisonOptions o;

@@ -39,7 +39,7 @@ struct Drive {
       given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
   }
   void begin() {
-    arena.emplace(Estimator::memory_needed(options, given));
+    arena.emplace();
     estimator.emplace(options, given, nominal, *arena, runner, solver);
   }
   void give(const RigFrame& frame) {
@@ -249,7 +249,7 @@ TEST(Calibrating, fromScratchIgnoresTheSuppliedTransform) {
 TEST(Calibrating, fromScratchNeedsABaselineLength) {
   Drive d(CalibrationTrust::none);
   d.given.baseline = 0;
-  EXPECT_THROW((void)Estimator::memory_needed(d.options, d.given), std::invalid_argument);
+  EXPECT_THROW(d.begin(), std::invalid_argument);
 }
 
 }  // namespace

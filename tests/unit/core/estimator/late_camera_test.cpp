@@ -45,7 +45,7 @@ struct StopAndGo {
   /// Each frame's sample to `see`.
   template <class See>
   void drive(bool late, const See& see) {
-    Arena arena(Estimator::memory_needed(options, given));
+    Arena arena;
     Estimator estimator(options, given, given, arena, runner, solver);
     Image before(320, 240);
     double speed = 0, place = 0;

@@ -23,7 +23,7 @@ TEST_P(RepeatedImage, repeatedImageIsNotTakenForStandstill) {
   Corridor corridor;
   EstimatorOptions options;
   options.online = false;
-  Arena arena(Estimator::memory_needed(options, corridor.rig()));
+  Arena arena;
   SequentialRunner runner;
   ImmediateRunner solver;
   Estimator estimator(options, corridor.rig(), corridor.rig(), arena, runner, solver);

@@ -18,7 +18,7 @@ struct Review {
   static constexpr double kSigma = 1e-4;       // of the rotation found, rad
 
   test::FeatureDriveOptions drive;
-  Arena arena{calibration::TrackLog::memory_needed(20, 300)};
+  Arena arena;
   calibration::TrackLog log{20, 300, arena};
   EstimatorOptions options;
   calibration::FocalCheck focal{false};

@@ -42,7 +42,7 @@ struct SuppliedRig {
   }
   /// `knock_at`: from this frame on the rig is turned by `knock`.
   void drive(int last, int knock_at = -1, const Vec3& knock = Vec3::Zero()) {
-    arena.emplace(Estimator::memory_needed(options, given));
+    arena.emplace();
     estimator.emplace(options, given, nominal, *arena, runner, solver);
     for (int i = 0; i < last; ++i) {
       auto T_camera_left = corridor.rig().T_camera_left;

@@ -19,7 +19,7 @@ constexpr int kWidth = 120, kHeight = 120;
 template <class Value>
 Descriptor of(const Value& value, int levels = 3) {
   const test::Image image = draw(kWidth, kHeight, value);
-  Arena arena(Pyramid::memory_needed(kWidth, kHeight, levels));
+  Arena arena;
   Pyramid pyramid(kWidth, kHeight, levels, arena);
   pyramid.build(image.view());
   Patch patch{};

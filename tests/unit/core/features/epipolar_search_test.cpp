@@ -175,7 +175,6 @@ TEST(EpipolarSearch, noByteOutsideTheImageIsRead) {
             EpipolarCurve c = wall.curve(Vec2(x, y));
             c.T_camera_left.R = exp_so3(Vec3(tilt, tilt, 0));
             EpipolarSearchOptions o = to_two_metres();
-            o.level = 0;
             o.band = 2;
             (void)search_along(patch, b.pyramid, c, o);
           }

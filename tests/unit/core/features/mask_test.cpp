@@ -40,24 +40,21 @@ Image half_hidden(int from_x) {
 TEST(Mask, zeroPixelsAndTheirMarginAreHidden) {
   const Image image = spotted();
   for (const int margin : {0, 1, 7}) {
-    Arena arena(Mask::memory_needed(kWidth, kHeight));
+    Arena arena;
     const Mask mask(image.view(), margin, arena);
-    std::int64_t hidden = 0;
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x) {
         bool near = false;
         for (int v = std::max(0, y - margin); v <= std::min(kHeight - 1, y + margin); ++v)
           for (int u = std::max(0, x - margin); u <= std::min(kWidth - 1, x + margin); ++u)
             near = near || image.view().at(u, v) == 0;
-        hidden += near ? 1 : 0;
         ASSERT_EQ(mask.hides(x, y), near) << x << ", " << y << ", margin " << margin;
       }
-    EXPECT_EQ(mask.count(), hidden);
   }
 }
 
 TEST(Mask, emptyMaskAndOutsideHideNothing) {
-  Arena arena(Mask::memory_needed(kWidth, kHeight));
+  Arena arena;
   EXPECT_FALSE(Mask().hides(3, 3));
   EXPECT_TRUE(Mask(ImageView{}, 7, arena).empty());
   const Image black(kWidth, kHeight);
@@ -72,7 +69,7 @@ TEST(Mask, emptyMaskAndOutsideHideNothing) {
 TEST(Mask, maskRemovesOnlyItsOwnCorners) {
   const Image image = draw(kWidth, kHeight, Texture(5));
   const Image shown = half_hidden(kWidth / 2);
-  Arena arena(Mask::memory_needed(kWidth, kHeight));
+  Arena arena;
   const Mask mask(shown.view(), 0, arena);
   SequentialRunner runner;
   CornerOptions options;
@@ -106,8 +103,7 @@ TEST(Mask, maskRemovesOnlyItsOwnCorners) {
 TEST(Mask, maskedBlobsTakeNoCapacity) {
   const Image image = draw(kWidth, kHeight, Texture(5));
   const Image shown = half_hidden(kWidth / 2);
-  Arena arena(Mask::memory_needed(kWidth, kHeight) + Surf::memory_needed(kWidth, kHeight) +
-              2 * kCacheLine);
+  Arena arena;
   const Mask mask(shown.view(), 0, arena);
   Surf surf(kWidth, kHeight, arena);
   ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);

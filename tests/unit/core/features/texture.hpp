@@ -125,8 +125,7 @@ struct Built {
   Arena arena;
   Pyramid pyramid;
   explicit Built(const ImageView& image, int levels = 3)
-      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
-        pyramid(image.width, image.height, levels, arena) {
+      : pyramid(image.width, image.height, levels, arena) {
     pyramid.build(image);
   }
 };

@@ -18,7 +18,7 @@ constexpr std::size_t kCapacity = 512;
 
 class RigMlesacTest : public testing::Test {
  protected:
-  Arena arena_{RigMlesac::memory_needed(kCapacity) + RigObservationTable::memory_needed(kCapacity)};
+  Arena arena_;
   RigMlesac mlesac_{kCapacity, arena_};
   RigObservationTable table_{kCapacity, arena_};
 };
@@ -122,7 +122,7 @@ TEST_F(RigMlesacTest, invalidInputHasNoPose) {
   options.confidence = 1.0;
   EXPECT_FALSE(mlesac_.solve(table_.view(), options, nullptr, random).found);
 
-  Arena small_arena(RigMlesac::memory_needed(20));
+  Arena small_arena;
   RigMlesac small(20, small_arena);
   EXPECT_FALSE(small.solve(table_.view(), {}, nullptr, random).found);
 

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <limits>
 
+#include "core/math/linear_solve.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/geometry/rig_scene.hpp"
 
@@ -32,9 +33,7 @@ class PoseRefinerTest : public testing::Test {
     }
   }
 
-  Arena arena_{PoseRefiner::memory_needed(kCapacity) +
-               RigObservationTable::memory_needed(kCapacity) +
-               detail::PoseProblem::memory_needed(kCapacity)};
+  Arena arena_;
   PoseRefiner refiner_{kCapacity, arena_};
   RigObservationTable table_{kCapacity, arena_};
   detail::PoseProblem problem_{kCapacity, arena_, "test"};
@@ -88,6 +87,12 @@ TEST_F(PoseRefinerTest, informationIsTheCurvatureAtZeroResiduals) {
   EXPECT_LT((numeric - H).norm(), 1e-6 * H.norm()) << numeric << "\n\n" << H;
 }
 
+/// Standard deviation of the position in its worst direction, in metres.
+double translation_sigma(const RefinedPose& pose) {
+  const Mat6 covariance = pose.information.inverse();
+  return std::sqrt(semidefinite_eigenvalues<3>(covariance.bottomRightCorner<3, 3>())[0]);
+}
+
 TEST_F(PoseRefinerTest, nearOutliersDoNotMoveThePose) {
   // Three points at 7 m, wrong by 8 px the same way in both cameras, beside 150 right ones at 10 to
   // 60 m. The second round is the solve without them: the same to a hundredth of its sigma.
@@ -114,7 +119,7 @@ TEST_F(PoseRefinerTest, nearOutliersDoNotMoveThePose) {
     one_round.gross_chi2 = std::numeric_limits<double>::infinity();
     const RefinedPose pulled = refiner_.refine(table_.view(), Transform{}, {}, one_round);
     EXPECT_GT((pulled.T_left_world.centre() - without.T_left_world.centre()).norm(),
-              2.5 * without.translation_sigma)
+              2.5 * translation_sigma(without))
         << seed;
   }
 }
@@ -133,9 +138,6 @@ TEST_F(PoseRefinerTest, informationPredictsTheSpreadOfThePose) {
     const Vec6 d = step_between(found.T_left_world, scene.T_left_world);
     nees += d.dot(found.information * d) / kDraws;
     rms += found.rms_px / kDraws;
-    const Mat6 covariance = found.information.inverse();
-    EXPECT_LE(std::sqrt(covariance(0, 0)), found.rotation_sigma * (1 + 1e-9));
-    EXPECT_LE(std::sqrt(covariance(5, 5)), found.translation_sigma * (1 + 1e-9));
   }
   EXPECT_NEAR(nees, 6.0, 1.2);
   EXPECT_NEAR(rms, 0.4, 0.02);  // the 1 % beyond the χ² threshold are not in it
@@ -153,9 +155,9 @@ TEST_F(PoseRefinerTest, farPointsLeaveThePositionUncertain) {
   }
   const RefinedPose loose = refiner_.refine(table_.view(), Transform{}, {}, {});
   ASSERT_TRUE(loose.usable);
-  EXPECT_LT(held.translation_sigma, 0.05);
-  EXPECT_GT(loose.translation_sigma, 1.0);
-  EXPECT_LT(loose.rotation_sigma, 0.01);
+  EXPECT_LT(translation_sigma(held), 0.05);
+  EXPECT_GT(translation_sigma(loose), 1.0);
+  EXPECT_LT(std::sqrt(loose.information.inverse().diagonal().head<3>().sum()), 0.01);
 }
 
 TEST_F(PoseRefinerTest, onlySelectedObservationsAreUsed) {
@@ -185,7 +187,7 @@ TEST_F(PoseRefinerTest, invalidInputHasNoPose) {
   options = {};
   options.gross_chi2 = 0;
   EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, options).usable);
-  Arena small_arena(PoseRefiner::memory_needed(20));
+  Arena small_arena;
   PoseRefiner small(20, small_arena);
   EXPECT_FALSE(small.refine(table_.view(), Transform{}, {}, {}).usable);
 

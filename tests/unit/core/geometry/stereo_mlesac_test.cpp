@@ -54,7 +54,7 @@ Vec5 step_between(const Transform& a, const Transform& b) {
 
 class StereoMlesacTest : public testing::Test {
  protected:
-  Arena arena_{StereoMlesac::memory_needed(kCapacity)};
+  Arena arena_;
   StereoMlesac mlesac_{kCapacity, arena_};
 };
 
@@ -142,7 +142,7 @@ TEST_F(StereoMlesacTest, invalidInputFailsAndNonFiniteIsIgnored) {
   StereoMatches short_one = m.view();
   short_one.sigma = short_one.sigma.first(3);
   EXPECT_FALSE(mlesac_.estimate_stereo_transform(short_one, kBaseline, {}, random).found);
-  Arena small_arena(StereoMlesac::memory_needed(20));
+  Arena small_arena;
   StereoMlesac small(20, small_arena);
   EXPECT_FALSE(small.estimate_stereo_transform(m.view(), kBaseline, {}, random).found);
   m.left_x[3] = std::numeric_limits<double>::quiet_NaN();

@@ -41,7 +41,7 @@ TEST(Triangulate, exactViewsGiveTheExactPoint) {
     const Vec3 p = test::visible_point(random, 3, 30);
     Vec3 p_world;
     const std::vector<RayView> views = views_of(p, 2 + random.below(4), 0.0, random, &p_world);
-    const TriangulatedPoint found = triangulate(views, {});
+    const TriangulatedPoint found = triangulate(views);
     if (found.status == TriangulateStatus::no_parallax)
       continue;  // two centres nearly in line with the point
     ASSERT_EQ(found.status, TriangulateStatus::ok);
@@ -58,7 +58,7 @@ TEST(Triangulate, covarianceAndChiSquareMatchTheErrors) {
     const Vec3 p = test::visible_point(random, 3, 8);
     Vec3 p_world;
     std::vector<RayView> views = views_of(p, 4, kSigma, random, &p_world);
-    const TriangulatedPoint found = triangulate(views, {});
+    const TriangulatedPoint found = triangulate(views);
     if (found.status != TriangulateStatus::ok ||
         found.inverse_depth < 20 * found.inverse_depth_sigma) {
       --k;  // where depth is linear enough for an ellipsoid
@@ -76,7 +76,7 @@ TEST(Triangulate, pointAtInfinityKeepsItsDirection) {
   const std::array<RayView, 2> views = {
       RayView{Transform{}, Vec2(0.1, -0.05), kSigma},
       RayView{{Mat3::Identity(), {-0.5, 0, 0}}, Vec2(0.1, -0.05), kSigma}};
-  const TriangulatedPoint found = triangulate(views, {});
+  const TriangulatedPoint found = triangulate(views);
   EXPECT_EQ(found.status, TriangulateStatus::no_parallax);
   EXPECT_NEAR(found.inverse_depth, 0.0, 1e-12);
   EXPECT_NEAR(found.inverse_depth_sigma, std::sqrt(2.0) * kSigma / 0.5,
@@ -89,20 +89,20 @@ TEST(Triangulate, degenerateViewsGiveTheirStatus) {
   const Transform right{Mat3::Identity(), {-0.5, 0, 0}};
   std::array<RayView, 2> views = {RayView{Transform{}, Vec2(0.0, 0.0), kSigma},
                                   RayView{right, Vec2(0.1, 0.0), kSigma}};
-  EXPECT_EQ(triangulate(views, {}).status,
+  EXPECT_EQ(triangulate(views).status,
             TriangulateStatus::behind);  // the disparity of a swapped pair
   views[1] = {Transform{}, Vec2(0.0, 0.0), kSigma};
-  EXPECT_EQ(triangulate(views, {}).status, TriangulateStatus::no_baseline);
+  EXPECT_EQ(triangulate(views).status, TriangulateStatus::no_baseline);
   views[1] = {
       {Mat3::Identity(), {0, 0, -1}}, Vec2(0.0, 0.0), kSigma};  // driving straight at the point
-  EXPECT_EQ(triangulate(views, {}).status, TriangulateStatus::no_baseline);
+  EXPECT_EQ(triangulate(views).status, TriangulateStatus::no_baseline);
   views[1] = {right, Vec2(-0.05, 0.0), 0.0};
-  EXPECT_EQ(triangulate(views, {}).status, TriangulateStatus::invalid_input);
+  EXPECT_EQ(triangulate(views).status, TriangulateStatus::invalid_input);
   views[1] = {right, Vec2(std::numeric_limits<double>::quiet_NaN(), 0.0), kSigma};
-  EXPECT_EQ(triangulate(views, {}).status, TriangulateStatus::invalid_input);
-  EXPECT_EQ(triangulate(std::span<const RayView>(views).first(1), {}).status,
+  EXPECT_EQ(triangulate(views).status, TriangulateStatus::invalid_input);
+  EXPECT_EQ(triangulate(std::span<const RayView>(views).first(1)).status,
             TriangulateStatus::invalid_input);
-  EXPECT_EQ(triangulate({}, {}).status, TriangulateStatus::invalid_input);
+  EXPECT_EQ(triangulate({}).status, TriangulateStatus::invalid_input);
 }
 
 TEST(Triangulate, extremeViewsAreFiniteWithoutAllocations) {
@@ -114,7 +114,7 @@ TEST(Triangulate, extremeViewsAreFiniteWithoutAllocations) {
       v = {test::random_transform(random, 3, std::pow(10, random.uniform(-8, 4))),
            Vec2(random.uniform(-3, 3), random.uniform(-3, 3)), kSigma};
     const SealedScope sealed;
-    const TriangulatedPoint found = triangulate(views, {});
+    const TriangulatedPoint found = triangulate(views);
     ASSERT_TRUE(found.p_world.allFinite() && found.covariance.allFinite() &&
                 std::isfinite(found.inverse_depth_sigma));
   }

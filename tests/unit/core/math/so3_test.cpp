@@ -76,17 +76,6 @@ TEST(So3, logAtPiGivesEitherSignOfTheAxis) {
   EXPECT_NEAR(rotation_angle(Vec3(1, -1, -1).asDiagonal()), kPi, kRounding);
 }
 
-TEST(So3, leftJacobianMatchesTheSeriesAtEveryAngle) {
-  for (const Vec3& axis : axes())
-    for (const double angle : kAngles) {
-      const auto [a, b, c] = by_series(angle);
-      const Mat3 K = skew(angle * axis);
-      EXPECT_LT((left_jacobian_so3(angle * axis) - (Mat3::Identity() + b * K + c * K * K)).norm(),
-                kRounding)
-          << angle;
-    }
-}
-
 TEST(So3, normalisedRestoresThousandRotations) {
   Mat3 R = Mat3::Identity();
   const Mat3 step = exp_so3({0.01, -0.02, 0.03});

@@ -11,7 +11,7 @@ namespace vergence {
 namespace {
 
 TEST(FramePool, slotsAreAlignedPaddedAndApart) {
-  Arena arena(FramePool::memory_needed(70, 5, 3));
+  Arena arena;
   FramePool pool(70, 5, 3, arena);
   EXPECT_EQ(FramePool::stride(70), 128U);
   EXPECT_EQ(FramePool::stride(64), 64U);
@@ -33,7 +33,7 @@ TEST(FramePool, slotsAreAlignedPaddedAndApart) {
 }
 
 TEST(FramePool, exhaustedPoolRefusesUntilARelease) {
-  Arena arena(FramePool::memory_needed(8, 8, 2));
+  Arena arena;
   FramePool pool(8, 8, 2, arena);
   const auto a = pool.acquire(), b = pool.acquire();
   ASSERT_TRUE(a && b);
@@ -45,7 +45,7 @@ TEST(FramePool, exhaustedPoolRefusesUntilARelease) {
 }
 
 TEST(FramePool, secondReleaseOfASlotIsRefused) {
-  Arena arena(FramePool::memory_needed(8, 8, 2));
+  Arena arena;
   FramePool pool(8, 8, 2, arena);
   const auto a = pool.acquire();
   ASSERT_TRUE(a);

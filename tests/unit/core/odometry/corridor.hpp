@@ -120,7 +120,7 @@ class Corridor {
 /// An odometry of a calibrated rig.
 struct LinkedOdometry {
   explicit LinkedOdometry(const RigCalibration& rig)
-      : arena(Odometry::memory_needed(options, rig)), odometry(options, rig, true, arena, runner) {}
+      : odometry(options, rig, true, arena, runner) {}
   OdometryOptions options;
   SequentialRunner runner;
   Arena arena;

@@ -36,7 +36,7 @@ class FreeMatches : public ::testing::TestWithParam<int> {
 TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
   const OdometryOptions o = options();
   const RigCalibration rig = blank_rig();
-  Arena arena(FrontEnd::memory_needed(o, rig));
+  Arena arena;
   SequentialRunner runner;
   FrontEnd front(o, rig, arena, runner);
   const features::test::Texture fine(3, 7, 24), coarse(4, 20, 80);
@@ -69,7 +69,7 @@ TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
 TEST_P(FreeMatches, missingOrFlatImageHasNoMatch) {
   const OdometryOptions o = options();
   const RigCalibration rig = blank_rig();
-  Arena arena(FrontEnd::memory_needed(o, rig));
+  Arena arena;
   SequentialRunner runner;
   FrontEnd front(o, rig, arena, runner);
   EXPECT_TRUE(front.match_free(1).empty());

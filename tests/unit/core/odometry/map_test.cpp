@@ -9,7 +9,7 @@ namespace vergence::odometry {
 namespace {
 
 struct Filled {
-  Arena arena{Map::memory_needed()};
+  Arena arena;
   Map map;
   explicit Filled(std::size_t window) : map(window, arena) {}
 
@@ -19,8 +19,8 @@ struct Filled {
     return p;
   }
   std::size_t keyframe(double x = 0) {
-    return map.make_keyframe({Mat3::Identity(), Vec3(x, 0, 0)},
-                             Stamp(static_cast<std::int64_t>(x)));
+    return map.make_keyframe(
+        {{Mat3::Identity(), Vec3(x, 0, 0)}, {}, Stamp(static_cast<std::int64_t>(x))});
   }
 };
 

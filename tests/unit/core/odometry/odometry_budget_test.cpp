@@ -14,7 +14,7 @@ constexpr int kFrames = 20;
 std::vector<FrameOutcome> drive(Duration budget, const std::vector<FrameOutcome>& given = {}) {
   test::Corridor corridor;
   const OdometryOptions options;
-  Arena arena(Odometry::memory_needed(options, corridor.rig()));
+  Arena arena;
   SequentialRunner runner;
   Odometry odometry(options, corridor.rig(), true, arena, runner);
   std::vector<FrameOutcome> all;

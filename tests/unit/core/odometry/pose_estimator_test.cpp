@@ -27,8 +27,7 @@ struct Scene {
   Transform T_left_world{exp_so3({0.3, -0.2, 0.1}), {1, -2, 3}};
   std::array<Transform, kMaxCameras> T_camera_left{};  // true; the rig's may be another
 
-  explicit Scene(int cameras = 2)
-      : arena(Map::memory_needed() + PoseEstimator::memory_needed()), map(10, arena) {
+  explicit Scene(int cameras = 2) : map(10, arena) {
     rig.cameras = cameras;
     for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
       Intrinsics& c = rig.intrinsics[k];
@@ -249,12 +248,12 @@ TEST(PoseEstimator, singleCameraPoseNeedsAShareOfItsPoints) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   Transform T;
-  ASSERT_TRUE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.near(0.01, 0.1), true, &T));
+  ASSERT_TRUE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.near(0.01, 0.1), &T));
   expect_exact(T, s.T_camera_left[1] * s.T_left_world);
   // Matches by chance: every observation somewhere.
   for (MapPoint& p : s.points())
     p.now.set(1, {s.random.uniform(0, 639), s.random.uniform(0, 479)}, 0.15F);
-  EXPECT_FALSE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.T_left_world, true, &T));
+  EXPECT_FALSE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.T_left_world, &T));
 }
 
 }  // namespace

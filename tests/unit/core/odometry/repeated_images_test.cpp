@@ -17,20 +17,20 @@ constexpr int kWidth = 320, kHeight = 240;
 /// The front end of a pair whose pyramids have one level: images are compared as they are.
 struct Pair {
   OdometryOptions options;
-  RigCalibration rig;
+  RigCalibration rig = small_rig();
   SequentialRunner runner;
   Arena arena;
   FrontEnd front_end;
 
-  Pair() : arena(needed(&options, &rig)), front_end(options, rig, arena, runner) {}
-  static std::size_t needed(OdometryOptions* options, RigCalibration* rig) {
-    options->pyramid_levels = 1;
-    rig->cameras = 2;
+  Pair() : options{.pyramid_levels = 1}, front_end(options, rig, arena, runner) {}
+  static RigCalibration small_rig() {
+    RigCalibration rig;
+    rig.cameras = 2;
     for (std::size_t k = 0; k < 2; ++k) {
-      Intrinsics& c = rig->intrinsics[k];
+      Intrinsics& c = rig.intrinsics[k];
       c.width = kWidth, c.height = kHeight, c.fx = c.fy = 300, c.cx = 160, c.cy = 120;
     }
-    return FrontEnd::memory_needed(*options, *rig);
+    return rig;
   }
   [[nodiscard]] ImageCheck give(const Image& left, const Image& right) {
     RigFrame frame;

@@ -40,7 +40,7 @@ OdometryOptions many_steps() {
 struct Bend {
   RigCalibration calibration = rig();
   OdometryOptions options = many_steps();
-  Arena arena{Map::memory_needed() + WindowAdjuster::memory_needed(options, calibration)};
+  Arena arena;
   Map map{6, arena};
   WindowAdjuster adjuster{options, calibration, arena};
   std::vector<Transform> poses;
@@ -58,7 +58,7 @@ struct Bend {
     for (int i = 0; i < 6; ++i) {
       poses.push_back(Transform{exp_so3(Vec3(0.002 * i, 0.02 * i, -0.003 * i)),
                                 Vec3(0.03 * i, 0.01 * i, -0.4 * i)});
-      const std::size_t slot = map.make_keyframe(poses.back(), Stamp(i));
+      const std::size_t slot = map.make_keyframe({poses.back(), {}, Stamp(i)});
       for (MapPoint& p : map.points())
         if (p.stage != PointStage::free) see(&p, slot, poses.back());
     }
@@ -111,10 +111,8 @@ TEST(WindowAdjuster, exactObservationsRestoreThePoses) {
   b.disturb();
   ASSERT_GT(b.worst_pose_error(), 0.02);
   const int before = b.observations();
-  const WindowOutcome out = b.adjuster.adjust(b.map);
+  const WindowOutcome out = b.adjuster.adjust(b.map, true);
   EXPECT_LT(b.worst_pose_error(), 1e-6);
-  EXPECT_LT(out.rms_px, 1e-4);  // what rounding to floats leaves
-  EXPECT_GT(out.points, 100);
   EXPECT_EQ(out.dropped, 0);
   EXPECT_EQ(b.observations(), before);
   EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, first.t)
@@ -134,7 +132,7 @@ TEST(WindowAdjuster, onlyGrossOutliersAreDropped) {
   }
   ASSERT_GE(wrong.size(), 8U);
   const int before = b.observations();
-  const WindowOutcome out = b.adjuster.adjust(b.map);
+  const WindowOutcome out = b.adjuster.adjust(b.map, true);
   EXPECT_EQ(out.dropped, static_cast<int>(wrong.size()));
   EXPECT_EQ(b.observations(), before - static_cast<int>(wrong.size()));
   for (std::size_t n = 0, i = 3; n < wrong.size(); i += 11) {
@@ -144,7 +142,7 @@ TEST(WindowAdjuster, onlyGrossOutliersAreDropped) {
       ++n;
     }
   }
-  (void)b.adjuster.adjust(b.map);
+  (void)b.adjuster.adjust(b.map, true);
   EXPECT_LT(b.worst_pose_error(), 1e-6) << "once they are gone they leave nothing behind";
 }
 
@@ -154,7 +152,7 @@ TEST(WindowAdjuster, candidatesMoveNothing) {
   lie->stage = PointStage::candidate;
   lie->p_world = Vec3(0, 0, 10);
   for (const std::uint8_t slot : b.map.order()) lie->seen[slot].set(0, {10.0 * slot, 400}, 0.01F);
-  (void)b.adjuster.adjust(b.map);
+  (void)b.adjuster.adjust(b.map, true);
   EXPECT_LT(b.worst_pose_error(), 1e-6);
   EXPECT_EQ(lie->p_world, Vec3(0, 0, 10));
 }
@@ -162,9 +160,9 @@ TEST(WindowAdjuster, candidatesMoveNothing) {
 TEST(WindowAdjuster, singleKeyframeOrNoPointsChangesNothing) {
   Bend b;
   b.map.clear();
-  EXPECT_EQ(b.adjuster.adjust(b.map).observations, 0);
-  (void)b.map.make_keyframe(b.poses[1], Stamp(1));
-  (void)b.adjuster.adjust(b.map);
+  EXPECT_EQ(b.adjuster.adjust(b.map, true).observations, 0);
+  (void)b.map.make_keyframe({b.poses[1], {}, Stamp(1)});
+  (void)b.adjuster.adjust(b.map, true);
   EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, b.poses[1].t);
 }
 
@@ -175,7 +173,7 @@ TEST(WindowAdjuster, unlinkedImageWithoutPointsKeepsItsTransform) {
   for (const std::uint8_t slot : b.map.order())
     b.map.keyframe(slot).T_camera_left = b.calibration.T_camera_left;
   b.disturb();
-  ASSERT_TRUE(b.adjuster.adjust_unlinked(b.map).usable);
+  ASSERT_TRUE(b.adjuster.adjust(b.map, false).usable);
   for (const std::uint8_t slot : b.map.order()) {
     const Transform& T = b.map.keyframe(slot).T_camera_left[1];
     EXPECT_EQ(T.t, b.calibration.T_camera_left[1].t);
@@ -200,7 +198,7 @@ TEST(WindowAdjuster, extrinsicRotationErrorIsEstimated) {
   b.adjuster.adopt_rig();
   ASSERT_NEAR(turn_left(b), kTurned, 1e-9);
   b.disturb();
-  ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
+  ASSERT_TRUE(b.adjuster.adjust(b.map, true).usable);
   // The prior weighs a hundredth of the (0.2 mrad / 50 mrad)² that a window of exact observations
   // at 0.15 px would leave it.
   EXPECT_LT(turn_left(b), 0.01 * kTurned);
@@ -216,11 +214,11 @@ TEST(WindowAdjuster, certainCalibrationIsKeptFixed) {
     b.calibration.covariance.set(extrinsic_row(1) + i, extrinsic_row(1) + i, kCertain * kCertain);
   b.adjuster.adopt_rig();
   b.disturb();
-  ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
+  ASSERT_TRUE(b.adjuster.adjust(b.map, true).usable);
   EXPECT_NEAR(turn_left(b), kTurned, 0.01 * kTurned);
   b.options.extrinsic_rotation_sigma_rad = 0;
   b.adjuster.adopt_rig();
-  ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
+  ASSERT_TRUE(b.adjuster.adjust(b.map, true).usable);
   EXPECT_NEAR(turn_left(b), kTurned, 1e-12);
 }
 
@@ -230,7 +228,7 @@ TEST(WindowAdjuster, adjustmentAllocatesNothing) {
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
-    (void)b.adjuster.adjust(b.map);
+    (void)b.adjuster.adjust(b.map, true);
   }
   EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }

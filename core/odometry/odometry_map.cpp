@@ -10,15 +10,7 @@
 /// Maps: initialisation, change of calibration, loss.
 namespace vergence::odometry {
 
-using detail::kNearEnough;
-using detail::kRigidShare;
-using detail::StageClock;
-using detail::weakness;
-
 namespace {
-
-// Minimum number of stereo matches to initialise the rig's transform.
-constexpr int kStartMatches = 30;
 
 // Maximum sigma of the direction of t for a start, in rad.
 constexpr double kWorstDirection = 0.1;
@@ -30,13 +22,11 @@ constexpr double kWorstRotation = 0.01;
 bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   StageClock clock(out);
   const std::span<const FreeMatch> matches = front_end_.match_free(1);
-  const std::size_t n = matches.size();
+  const auto n = static_cast<int>(matches.size());
   const StereoEstimate e = initialiser_.estimate(matches, rig_);
   clock.mark(Stage::match);
-  out->reason =
-      n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
-  if (!e.found || e.inliers < kStartMatches || e.inliers < kRigidShare * static_cast<double>(n))
-    return false;
+  out->reason = n < options_.min_inliers ? Reason::needs_texture : Reason::uncalibrated;
+  if (!e.found || e.inliers < options_.min_inliers || e.inliers < kRigidShare * n) return false;
   // If all points are far away, the direction of t is not determined and depths would be arbitrary.
   if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
     out->reason = Reason::needs_near_structure;
@@ -46,17 +36,18 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   return true;
 }
 
-bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
+bool Odometry::start_map(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  StereoCount stereo = front_end_.match_new(nullptr);
+  front_end_.detect_new(nullptr);
+  StereoCount stereo = front_end_.match_new();
   // If half of the corners are matched and near, swapped cameras cannot match more by chance.
-  const bool asked = 2 * stereo.near < stereo.corners;
-  const bool exchanged = asked && front_end_.exchanged();
-  if (asked) stereo = front_end_.match_new(nullptr);
+  const bool asked = stereo.near < kMajority * stereo.corners;
+  const bool swapped = asked && front_end_.swapped();
+  if (asked) stereo = front_end_.match_new();
   clock.mark(Stage::match);
   if (stereo.corners < options_.min_inliers)
     out->reason = Reason::few_features;
-  else if (exchanged)
+  else if (swapped)
     out->reason = Reason::cameras_swapped;
   else if (!stereo.evidence.fits() || stereo.matched < options_.min_inliers)
     out->reason = Reason::no_stereo_matches;
@@ -67,14 +58,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
     front_end_.add_points(T_left_world, PointStage::active, &map_);
     new_points_.reset();
     gaps_.clear_renewal();
-    const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
-    map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
-    keyframe_points_ = 0;
-    for (MapPoint& p : map_.points()) {
-      if (!p.followed()) continue;
-      p.seen[slot] = p.now;
-      ++keyframe_points_;
-    }
+    keyframe_points_ = map_.observe(map_.make_keyframe({T_left_world, rig_.T_camera_left, stamp}));
     out->posed = true;
     out->keyframe = true;
     out->reason = Reason::none;
@@ -86,15 +70,15 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   return false;
 }
 
-void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
-                           const Transform& predicted, double dt, FrameOutcome* out) noexcept {
+void Odometry::begin_map(const RigFrame& frame, const ImageCheck& images,
+                         const Transform& predicted, double dt, FrameOutcome* out) noexcept {
   // Without points to follow, this frame starts a map at the predicted end of the last one.
   const Reason of_images = weakness(images, rig_.cameras);
   const bool unknown = link_ == Link::unlinked && !rig_known_;
   bool started = unknown && resume(predicted, frame.stamp, out);
   const bool initialise = unknown && !started;
   if (!started)
-    started = (!initialise || initialise_rig(out)) && start_scene(predicted, frame.stamp, out);
+    started = (!initialise || initialise_rig(out)) && start_map(predicted, frame.stamp, out);
   if (!started && link_ == Link::linked && out->reason == Reason::no_stereo_matches)
     started = resume(predicted, frame.stamp, out);
   if (!started) {
@@ -127,11 +111,6 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
   frames_lost_ = 0;
 }
 
-void Odometry::lose_scene() noexcept {
-  map_.clear();
-  if (link_ == Link::unlinked) reset_extrinsics();
-}
-
 void Odometry::reset_extrinsics() noexcept {
   rig_known_ = false;
   for (Transform& T : rig_.T_camera_left) T = {};
@@ -150,35 +129,29 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   if (next_rig_ && out->relink_due) {
     const RigCalibration next = *std::exchange(next_rig_, std::nullopt);
     out->relinked = true;
-    if (!reexpress_scene(next, &out->points_kept)) {
+    if (!reexpress_map(next, &out->points_kept)) {
       out->status = PoseStatus::degraded;
       out->reason = Reason::no_stereo_matches;
     }
   } else if (gaps_.renewal_due() && out->renewal_due) {
-    out->renewed = renew_scene(out);
+    FrameOutcome built;
+    built.stage_ms = out->stage_ms;
+    out->renewed = start_map(motion_.T_left_world(), motion_.stamp(), &built);
+    out->keyframe = out->keyframe || out->renewed;
+    out->stage_ms = built.stage_ms;
     // The old map continues if a new one cannot be built.
     gaps_.clear_renewal();
   }
 }
 
-bool Odometry::renew_scene(FrameOutcome* out) noexcept {
-  FrameOutcome built;
-  const bool renewed = start_scene(motion_.T_left_world(), motion_.stamp(), &built);
-  if (renewed) out->keyframe = true;
-  for (std::size_t i = 0; i < out->stage_ms.size(); ++i) out->stage_ms[i] += built.stage_ms[i];
-  return renewed;
-}
-
-bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept {
+bool Odometry::reexpress_map(const RigCalibration& rig, double* points_kept) noexcept {
   const RigCalibration before = rig_;
-  std::array<UndistortedCamera, kMaxCameras> old_lenses;
-  for (int k = 0; k < rig_.cameras; ++k)
-    old_lenses[static_cast<std::size_t>(k)] = front_end_.lens(k);
+  const std::array<UndistortedCamera, kMaxCameras> old_lenses = front_end_.lenses();
   const bool was_linked = link_ == Link::linked;
   if (was_linked) last_rig_ = before;
   const auto held =
       std::count_if(map_.points().begin(), map_.points().end(),
-                    [](const MapPoint& p) { return p.holds_poses() && p.now.cameras != 0; });
+                    [](const MapPoint& p) { return p.constrains_poses() && p.now.cameras != 0; });
   adopt(rig);
 
   // Converts a direction in the old model of camera k to a raw pixel, and to an ideal pixel of the
@@ -236,7 +209,7 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
   std::size_t n = 0;
   Transform T_left_world, T_right_left;
   for (const MapPoint& p : map_.points()) {
-    if (!p.holds_poses()) continue;
+    if (!p.constrains_poses()) continue;
     where(p, &T_left_world, &T_right_left);
     const Vec3 X = T_left_world * p.p_world;
     Vec3 again;
@@ -270,12 +243,10 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
 
   const EpipolarEvidence evidence = front_end_.weigh_points(map_);
   // Add the newest frame as a keyframe, so that the points are also adjusted to its observations.
-  const std::size_t newest_slot = map_.make_keyframe(motion_.T_left_world(), motion_.stamp());
-  map_.keyframe(newest_slot).T_camera_left = rig_.T_camera_left;
-  for (MapPoint& p : map_.points())
-    if (p.followed()) p.seen[newest_slot] = p.now;
-  if (window_.adjust(map_).usable)
-    std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
+  const std::size_t newest_slot =
+      map_.make_keyframe({motion_.T_left_world(), rig_.T_camera_left, motion_.stamp()});
+  (void)map_.observe(newest_slot);
+  if (window_.adjust(map_, true).usable) rig_.T_camera_left = window_.T_camera_left();
   const PoseFit newest = poses_.fit_linked(map_, map_.keyframe(newest_slot).T_left_world, false);
   *points_kept =
       held == 0 ? 1
@@ -290,7 +261,7 @@ bool Odometry::resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* 
   const RigCalibration now = rig_;
   adopt(*last_rig_);
   FrameOutcome resumed = *out;
-  if (start_scene(T_left_world, stamp, &resumed)) {
+  if (start_map(T_left_world, stamp, &resumed)) {
     *out = resumed;
     out->relinked = out->resumed = true;
     out->points_kept = 1;
