@@ -65,7 +65,7 @@ using Acquired = std::variant<AcquiredFrame, InsRecord, DeviceEvent>;
 }
 
 /// Converts the synchroniser's evidence to the estimator's pairing.
-[[nodiscard]] constexpr Pairing pairing_of(SyncMode mode, SyncProof proof) noexcept {
+[[nodiscard]] constexpr Pairing to_pairing(SyncMode mode, SyncProof proof) noexcept {
   if (!verifies_pairing(mode)) return Pairing::assumed;
   return proof == SyncProof::ambiguous ? Pairing::contradicted : Pairing::verified;
 }

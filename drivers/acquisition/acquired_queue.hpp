@@ -93,10 +93,10 @@ class PairingTracker {
   /// frame.
   [[nodiscard]] std::optional<Change> update(std::size_t camera, bool verified,
                                              HostStamp now) noexcept {
-    Camera& own = cameras_[camera];
-    if (verified == own.verified || !own.any) return std::nullopt;
-    const double seconds = verified ? (now - own.since).to_seconds() : 0;
-    own = {true, verified, now};
+    Camera& state = cameras_[camera];
+    if (verified == state.verified || !state.any) return std::nullopt;
+    const double seconds = verified ? (now - state.since).to_seconds() : 0;
+    state = {true, verified, now};
     return Change{verified, seconds};
   }
 

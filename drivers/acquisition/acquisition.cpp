@@ -192,7 +192,7 @@ void Acquisition::push_frame(std::size_t k) {
   in.camera = camera;
   in.slot = frame.slot;
   in.counter = frame.counter;
-  in.middle = clocks_[k].start_of(frame);
+  in.middle = clocks_[k].exposure_start(frame);
   counters_.cameras[k].observe(frame.exposure_start, in.middle);
   in.middle.host = in.middle.host + frame.exposure / 2;
   in.arrival = frame.arrival;
@@ -203,7 +203,7 @@ void Acquisition::push_frame(std::size_t k) {
   if (torn) sync_.lost(in.camera, in.counter);
   const bool taken = !torn && sync_.offer(in) == SyncResult::taken;
   pairing_.frame(k);
-  record_proofs(frame.arrival);
+  record_pairing_changes(frame.arrival);
   if (options_.sync.mode == SyncMode::master_strobe && k == 0) pause_pulses();
   if (taken) return;
   AcquiredQueue::Refused refused;
@@ -249,7 +249,7 @@ void Acquisition::hand_out_sets() {
                 stamp_of(set.stamp),
                 set.error,
                 set.spread,
-                pairing_of(options_.sync.mode, set.proof),
+                to_pairing(options_.sync.mode, set.proof),
                 static_cast<int>(cameras_.size()),
                 {}};
     if (set.number > kSettled)
@@ -292,13 +292,13 @@ void Acquisition::push_pulse(const Pulse& reported) {
   ++counters_.pulses;
   if (report.rebooted && !reported.mapped) counters_.board.restart();
   if (!sync_out_) counters_.board.observe(pulse.edge, {pulse.host, pulse.host_error});
-  if (!wants_pulses(options_.sync.mode)) return;
+  if (!requires_pulses(options_.sync.mode)) return;
   sync_.pulse(pulse);
-  record_proofs(pulse.arrival);
-  give_up_mute_cameras(pulse.arrival);
+  record_pairing_changes(pulse.arrival);
+  stop_silent_cameras(pulse.arrival);
 }
 
-void Acquisition::give_up_mute_cameras(HostStamp now) {
+void Acquisition::stop_silent_cameras(HostStamp now) {
   constexpr Duration kLongest = Duration::seconds(10);
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     auto& head = heads_[k];
@@ -340,7 +340,7 @@ void Acquisition::pause_pulses() {
   }
 }
 
-void Acquisition::record_proofs(HostStamp now) {
+void Acquisition::record_pairing_changes(HostStamp now) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     if (heads_[k].disconnected) continue;
     const auto change = pairing_.update(k, sync_.verified(static_cast<int>(k)), now);

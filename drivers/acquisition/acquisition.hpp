@@ -151,10 +151,10 @@ class Acquisition final : private Notifier {
   void pause_pulses();
   /// Stops cameras without a frame during ten seconds of pulses, whatever their drivers report, and
   /// retries them like disconnected ones.
-  void give_up_mute_cameras(HostStamp now);
+  void stop_silent_cameras(HostStamp now);
   void record_disconnect(int camera, HostStamp when);
   /// Reports cameras whose pairing is newly verified or no longer verified.
-  void record_proofs(HostStamp now);
+  void record_pairing_changes(HostStamp now);
   void hand_out_sets();
   void push_event(DeviceEvent::Kind kind, HostStamp when, int camera = 0, double seconds = 0);
   [[nodiscard]] Stamp stamp_of(HostStamp host) const noexcept;

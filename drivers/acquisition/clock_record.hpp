@@ -19,7 +19,7 @@ class CameraClock {
   explicit CameraClock(const ClockMapperOptions& clock) : clock_(clock) {}
 
   /// Start of the exposure on the host's clock.
-  [[nodiscard]] MappedStamp start_of(const Frame& frame) noexcept {
+  [[nodiscard]] MappedStamp exposure_start(const Frame& frame) noexcept {
     if (exposure_ == Duration{}) exposure_ = frame.exposure;
     const Duration longer = frame.exposure - exposure_;
     MappedStamp start = clock_.map(frame.exposure_start + longer, frame.arrival);
@@ -41,7 +41,7 @@ class CameraClock {
 class ClockRecord {
  public:
   void observe(DeviceStamp device, const MappedStamp& mapped) noexcept {
-    //  Number of stamps after which the mapping has settled.
+    // Number of stamps after which the mapping has settled.
     constexpr std::uint64_t kSettled = 60;
     // In ppm; a larger drift means that the clock was set.
     constexpr std::int64_t kOddDrift = 2'000;

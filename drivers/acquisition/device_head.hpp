@@ -14,10 +14,10 @@ namespace vergence {
 template <class Device, class Value>
 struct DeviceHead {
   /// Minimum interval of reconnection attempts, ns: opening a bus device takes time.
-  static constexpr std::int64_t kAskAgain = 1'000'000'000;
+  static constexpr std::int64_t kRetryIntervalNs = 1'000'000'000;
   /// Minimum pause after an attempt, as a multiple of its duration; the data of other devices wait
   /// during one.
-  static constexpr std::int64_t kRest = 10;
+  static constexpr std::int64_t kMinPauseFactor = 10;
 
   Device* device = nullptr;
   /// True while `value` waits to be consumed.
@@ -31,14 +31,14 @@ struct DeviceHead {
   /// Pulses reported since the newest frame of a camera.
   std::int64_t pulses_without = 0;
   /// Time of the next reconnection attempt, steady clock.
-  std::int64_t ask_ns = 0;
+  std::int64_t next_attempt_ns = 0;
   Value value{};
 
-  /// Polls the device. A restarted device notifies `ready`. With `ask_always` (virtual time) a
+  /// Polls the device. A restarted device notifies `ready`. With `retry_always` (virtual time) a
   /// disconnected device is retried at each poll.
-  void poll(Notifier* ready, bool ask_always) {
+  void poll(Notifier* ready, bool retry_always) {
     if (device == nullptr) ended = true;
-    if (held || ended || (disconnected && !start_again(ready, ask_always))) return;
+    if (held || ended || (disconnected && !start_again(ready, retry_always))) return;
     const DeviceStatus status = device->wait(Duration{}, &value);
     event = status == DeviceStatus::disconnected;
     held = status == DeviceStatus::ok || event;
@@ -46,13 +46,13 @@ struct DeviceHead {
   }
 
  private:
-  [[nodiscard]] bool start_again(Notifier* ready, bool ask_always) {
+  [[nodiscard]] bool start_again(Notifier* ready, bool retry_always) {
     const auto now = [] { return std::chrono::steady_clock::now().time_since_epoch().count(); };
     const std::int64_t begun = now();
-    if (!ask_always && begun < ask_ns) return false;
+    if (!retry_always && begun < next_attempt_ns) return false;
     const DeviceStatus status = device->start(ready);
     const std::int64_t done = now();
-    ask_ns = done + std::max(kAskAgain, kRest * (done - begun));
+    next_attempt_ns = done + std::max(kRetryIntervalNs, kMinPauseFactor * (done - begun));
     ended = status == DeviceStatus::ended;
     if (status != DeviceStatus::ok) return false;
     disconnected = false;

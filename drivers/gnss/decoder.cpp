@@ -22,9 +22,9 @@ unsigned bit(Type type) noexcept { return 1U << static_cast<unsigned>(type); }
 
 FixStatus to_fix_status(const Sentence& gga, bool has_height) noexcept {
   // NovAtel's 9 is a fix with satellite-based corrections.
-  constexpr std::uint8_t kFirstFix = 1, kLastFix = 5, kEstimated = 6, kOfNovatel = 9;
+  constexpr std::uint8_t kFirstFix = 1, kLastFix = 5, kEstimated = 6, kNovatelSbas = 9;
   if (gga.quality == kEstimated) return FixStatus::dead_reckoning;
-  if (gga.quality < kFirstFix || (gga.quality > kLastFix && gga.quality != kOfNovatel))
+  if (gga.quality < kFirstFix || (gga.quality > kLastFix && gga.quality != kNovatelSbas))
     return FixStatus::none;
   return has_height ? FixStatus::fix_3d : FixStatus::fix_2d;
 }
@@ -308,12 +308,12 @@ bool Decoder::next_ubx(Fix* fix) noexcept {
 }
 
 void Decoder::Period::add(Duration step) noexcept {
-  constexpr int kBelieved = 3;
-  constexpr double kAlike = 0.25;
+  constexpr int kMinConsistent = 3;
+  constexpr double kRelativeTolerance = 0.25;
   const double apart = std::abs(step.to_seconds() - newest_.to_seconds());
-  alike_ = alike_ > 0 && apart <= kAlike * newest_.to_seconds() ? alike_ + 1 : 1;
+  alike_ = alike_ > 0 && apart <= kRelativeTolerance * newest_.to_seconds() ? alike_ + 1 : 1;
   newest_ = step;
-  const bool believed = alike_ >= kBelieved;
+  const bool believed = alike_ >= kMinConsistent;
   if (interval_ == Duration{} || (believed && (!sure_ || step < interval_))) interval_ = step;
   sure_ = sure_ || believed;
 }

@@ -8,7 +8,7 @@ namespace vergence {
 RigSynchronizer::Step RigSynchronizer::number_of(const SyncFrame& frame, std::uint64_t* number,
                                                  SetImage* image) noexcept {
   const auto k = static_cast<std::size_t>(frame.camera);
-  if (proves_numbers(options_.mode)) return number_by_pulse(frame, number, image);
+  if (verifies_numbers(options_.mode)) return number_by_pulse(frame, number, image);
   if (pairs_by_time(options_.mode)) {
     image->time = by_time_.time_of(frame, sets_);
     const TimeNumbering::Number found = by_time_.number_of(k, image->time, &sets_);
@@ -30,7 +30,7 @@ Duration RigSynchronizer::noise_of(std::size_t camera) const noexcept {
 }
 
 void RigSynchronizer::pulse(const Pulse& pulse) noexcept {
-  if (!wants_pulses(options_.mode)) return;
+  if (!requires_pulses(options_.mode)) return;
   now_ = std::max(now_, pulse.arrival);
   add_pulse(pulse);
 }
@@ -72,7 +72,7 @@ std::uint32_t RigSynchronizer::wants_pause() noexcept {
   constexpr int kInVain = 8;
   // Number of pulses until a pause was seen or has had no effect.
   constexpr std::uint64_t kPatience = 3 * PulseMatcher::kRun;
-  if (!proves_numbers(options_.mode) || (asked_ && pulses_ < asked_at_ + kPatience)) return 0;
+  if (!verifies_numbers(options_.mode) || (asked_ && pulses_ < asked_at_ + kPatience)) return 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const bool settled = verified(static_cast<int>(k)) && !matchers_[k].suspect();
     if (!sources_[k].here || settled || matchers_[k].failures() < kInVain) continue;
@@ -85,7 +85,7 @@ std::uint32_t RigSynchronizer::wants_pause() noexcept {
 
 bool RigSynchronizer::verified(int camera) const noexcept {
   const bool is_master = options_.mode == SyncMode::master_strobe && camera == 0;
-  return !proves_numbers(options_.mode) || is_master ||
+  return !verifies_numbers(options_.mode) || is_master ||
          matchers_[static_cast<std::size_t>(camera)].verified();
 }
 

@@ -75,7 +75,7 @@ bool RigSynchronizer::ready(const OpenSet& open) const noexcept {
   if (finishing_ || sets_.crowded() || now_ - open.first >= options_.hold ||
       number < sets_.flushed_below())
     return true;
-  if (proves_numbers(options_.mode) && (train_.size() == 0 || train_.newest().number < number))
+  if (verifies_numbers(options_.mode) && (train_.size() == 0 || train_.newest().number < number))
     return false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const Source& s = sources_[k];
@@ -129,7 +129,7 @@ void RigSynchronizer::stamp_by_pulse(const OpenSet& open, SyncedSet* set) const 
 
 void RigSynchronizer::emit(OpenSet* open, SyncedSet* set) noexcept {
   *set = open->set;
-  const bool numbered = proves_numbers(options_.mode);
+  const bool numbered = verifies_numbers(options_.mode);
   // Pulses of an ended train are unknown; their cameras' own stamps are used.
   const bool of_train = numbered && train_.size() > 0 && set->number >= sets_.flushed_below();
   if (of_train) {
@@ -231,7 +231,7 @@ void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
     const auto number = by_counter_.number_of_lost(k, counter);
     if (!number) return;
     next = *number + 1;
-  } else if (proves_numbers(options_.mode) && matchers_[k].verified()) {
+  } else if (verifies_numbers(options_.mode) && matchers_[k].verified()) {
     next = matchers_[k].min_number(counter) + 1;
   } else {
     return;

@@ -25,7 +25,7 @@ const char* SyncOptions::validate() const noexcept {
            "trigger.rate)";
   if (mode == SyncMode::master_strobe && cameras < 2)
     return "camera 0 triggers the others, but no other camera is configured";
-  for (std::size_t k = 0; proves_numbers(mode) && k < static_cast<std::size_t>(cameras); ++k) {
+  for (std::size_t k = 0; verifies_numbers(mode) && k < static_cast<std::size_t>(cameras); ++k) {
     const SyncCameraOptions& c = camera[k];
     if (c.resolution < Duration{} || c.jitter < Duration{})
       return "cameras.N.stamp_jitter_us must be at least 0";

@@ -34,12 +34,12 @@ enum class SyncMode : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(SyncMode) noexcept;
 /// True if frames are associated with pulses given to RigSynchronizer::pulse().
-[[nodiscard]] constexpr bool wants_pulses(SyncMode m) noexcept {
+[[nodiscard]] constexpr bool requires_pulses(SyncMode m) noexcept {
   return m == SyncMode::board || m == SyncMode::ins_syncout;
 }
 /// True if frames are associated with numbered pulses and this is verified.
-[[nodiscard]] constexpr bool proves_numbers(SyncMode m) noexcept {
-  return wants_pulses(m) || m == SyncMode::master_strobe;
+[[nodiscard]] constexpr bool verifies_numbers(SyncMode m) noexcept {
+  return requires_pulses(m) || m == SyncMode::master_strobe;
 }
 /// True if the mode verifies that the images of a set were exposed together.
 [[nodiscard]] constexpr bool verifies_pairing(SyncMode m) noexcept {

@@ -79,7 +79,7 @@ TimeNumbering::Number TimeNumbering::number_of(std::size_t camera, std::int64_t 
     return {place(time, *sets), false};
   }
   ++astray_[camera];
-  if (++astray_in_a_row_ < kBelieved) return {};
+  if (++astray_in_a_row_ < kMinConsistent) return {};
   astray_ = {};
   astray_in_a_row_ = 0;
   sets->flush();

@@ -41,12 +41,12 @@ class TimeNumbering {
   [[nodiscard]] Number number_of(std::size_t camera, std::int64_t time, OpenSets* sets) noexcept;
   /// True if this camera's newest frames are all astray while others' fit.
   [[nodiscard]] bool apart(std::size_t camera) const noexcept {
-    return astray_[camera] >= kBelieved;
+    return astray_[camera] >= kMinConsistent;
   }
 
  private:
   // Frames in a row, to exclude single corrupt stamps.
-  static constexpr int kBelieved = 3;
+  static constexpr int kMinConsistent = 3;
 
   [[nodiscard]] std::optional<std::uint64_t> place(std::int64_t time,
                                                    const OpenSets& sets) const noexcept;

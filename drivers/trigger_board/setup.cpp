@@ -114,7 +114,7 @@ namespace {
 constexpr std::array<std::uint32_t, 3> kBauds{921600, 115200, 460800};
 constexpr Duration kHello = Duration::milliseconds(500);
 constexpr Duration kAnswer = Duration::seconds(1);
-constexpr Duration kAskAgain = Duration::milliseconds(150);
+constexpr Duration kRetryInterval = Duration::milliseconds(150);
 // Attempts of a request whose answer does not show the requested state yet.
 constexpr int kTurns = 3;
 
@@ -208,13 +208,13 @@ Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payloa
                          std::uint8_t requested, Duration limit) {
   const HostStamp end = frames_.now() + limit;
   std::uint8_t first = 0, last = 0;
-  // Each round listens for kAskAgain within the limit.
+  // Each round listens for kRetryInterval within the limit.
   for (bool again = false;; again = true) {
     const DeviceStatus sent = frames_.send(type, payload, &last);
     if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) return Answer::gone;
     if (!again) first = last;
     const Answer answer =
-        listen(type, first, last, requested, std::min(end, frames_.now() + kAskAgain));
+        listen(type, first, last, requested, std::min(end, frames_.now() + kRetryInterval));
     if (answer != Answer::silent || frames_.now() >= end) return answer;
   }
 }

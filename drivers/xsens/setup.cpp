@@ -14,7 +14,7 @@ namespace vergence::xsens {
 
 namespace {
 
-constexpr Duration kAskAgain = Duration::milliseconds(150);
+constexpr Duration kRetryInterval = Duration::milliseconds(150);
 constexpr Duration kListen = Duration::milliseconds(50);
 constexpr Duration kWrite = Duration::milliseconds(100);
 
@@ -27,14 +27,14 @@ void RequestReply::ask(xbus::MessageId id, std::span<const std::uint8_t> payload
       xbus::write_frame({xbus::kBusMaster, static_cast<std::uint8_t>(id), payload}, frame);
   const HostStamp end = line_.now() + limit;
   reply->answer = Answer::silent;
-  // Ends: each round listens for kAskAgain within the limit.
+  // Ends: each round listens for kRetryInterval within the limit.
   do {
     const DeviceStatus sent = line_.write(std::span(frame).first(w.size), kWrite);
     if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) {
       reply->answer = Answer::gone;
       return;
     }
-    const HostStamp until = std::min(end, line_.now() + kAskAgain);
+    const HostStamp until = std::min(end, line_.now() + kRetryInterval);
     reply->answer = listen(static_cast<std::uint8_t>(static_cast<unsigned>(id) + 1U), until, reply);
   } while (reply->answer == Answer::silent && line_.now() < end);
 }

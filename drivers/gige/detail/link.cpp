@@ -64,13 +64,13 @@ Interface find_interface(const std::string& address) {
   return found;
 }
 
-int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most,
+int choose_packet_size(int requested, int mtu, std::int64_t min_size, std::int64_t max_size,
                        std::int64_t step) noexcept {
-  std::int64_t size = wished > 0 ? wished : std::min(mtu, kMaxBySwitches);
-  size = std::min<std::int64_t>({size, most, mtu});
+  std::int64_t size = requested > 0 ? requested : std::min(mtu, kMaxBySwitches);
+  size = std::min<std::int64_t>({size, max_size, mtu});
   step = std::max<std::int64_t>(step, 1);
-  size = least + (size - least) / step * step;
-  return static_cast<int>(std::max(size, least));
+  size = min_size + (size - min_size) / step * step;
+  return static_cast<int>(std::max(size, min_size));
 }
 
 LinkPlan plan_link(const LinkLoad& load, int packet_size, std::int64_t speed,

@@ -40,9 +40,9 @@ struct LinkPlan {
 inline constexpr double kMaxOfPeriod = 0.9;
 
 /// Largest packet size that interface, camera and request allow, a multiple of the camera's step.
-/// If `wished` is 0, at most 9000, the limit of most switches.
-[[nodiscard]] int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most,
-                                     std::int64_t step) noexcept;
+/// If `requested` is 0, at most 9000, the limit of most switches.
+[[nodiscard]] int choose_packet_size(int requested, int mtu, std::int64_t min_size,
+                                     std::int64_t max_size, std::int64_t step) noexcept;
 
 /// Computes delay and transfer time for a packet size. The delay between two packets is (N − 1) ·
 /// (size + 38) · 8 / R plus 10 %, so that the packets of N cameras exposing simultaneously

@@ -33,7 +33,7 @@ TEST(CameraClock, growingExposureIsNoDrift) {
     // A fixed time after the exposure's end.
     frame.arrival = kHost + kInterval * n + frame.exposure + Duration::milliseconds(1) -
                     Duration::milliseconds(2);
-    const MappedStamp start = clock.start_of(frame);
+    const MappedStamp start = clock.exposure_start(frame);
     EXPECT_LE(magnitude(start.host - (kHost + kInterval * n)),
               start.error + Duration::microseconds(1))
         << n;
