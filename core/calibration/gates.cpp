@@ -229,34 +229,22 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
 }
 
 const char* reason(Gate gate) noexcept {
-  switch (gate) {
-    case Gate::open:
-      return "";
-    case Gate::not_solved:
-      return "the adjustment did not converge";
-    case Gate::needs_motion:
-      return "the path driven is too short";
-    case Gate::needs_near_structure:
-      return "too few points are near enough to determine the depth";
-    case Gate::cameras_swapped:
-      return "the right camera is on the left: its cable or its order in the configuration is "
-             "swapped";
-    case Gate::implausible_direction:
-      return "the direction between the cameras is far from the configured one";
-    case Gate::implausible_rotation:
-      return "the rotation between the cameras is far from the configured one";
-    case Gate::out_of_sync:
-      return "the cameras' images are not from the same instant";
-    case Gate::does_not_fit:
-      return "held-out frames do not fit it";
-    case Gate::no_better:
-      return "the calibration in use fits as well";
-    case Gate::rig_changed:
-      return "the rig changed during the frames of the solve";
-    case Gate::depth_unknown:
-      return "the tracks do not determine the depth well enough yet";
-  }
-  return "";
+  // In the order of Gate.
+  static constexpr std::array kReasons = {
+      "",
+      "the adjustment did not converge",
+      "the path driven is too short",
+      "too few points are near enough to determine the depth",
+      "the right camera is on the left: its cable or its order in the configuration is swapped",
+      "the direction between the cameras is far from the configured one",
+      "the rotation between the cameras is far from the configured one",
+      "the cameras' images are not from the same instant",
+      "held-out frames do not fit it",
+      "the calibration in use fits as well",
+      "the rig changed during the frames of the solve",
+      "the tracks do not determine the depth well enough yet"};
+  static_assert(kReasons.size() == static_cast<std::size_t>(Gate::depth_unknown) + 1);
+  return kReasons[static_cast<std::size_t>(gate)];
 }
 
 double depth_excess(const RigCalibration& rig, const CalibrationOptions& o,

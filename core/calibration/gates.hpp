@@ -104,23 +104,8 @@ enum class Gate : std::uint8_t {
 
 /// Returns true if a solution that this gate rejected is still a measurement of the present rig.
 [[nodiscard]] constexpr bool of_this_rig(Gate gate) noexcept {
-  switch (gate) {
-    case Gate::not_solved:
-    case Gate::cameras_swapped:
-    case Gate::implausible_direction:
-    case Gate::implausible_rotation:
-    case Gate::out_of_sync:
-    case Gate::does_not_fit:
-    case Gate::rig_changed:
-      return false;
-    case Gate::open:
-    case Gate::needs_motion:
-    case Gate::needs_near_structure:
-    case Gate::no_better:
-    case Gate::depth_unknown:
-      return true;
-  }
-  return false;
+  return gate == Gate::open || gate == Gate::needs_motion || gate == Gate::needs_near_structure ||
+         gate == Gate::no_better || gate == Gate::depth_unknown;
 }
 
 struct AcceptanceInput {

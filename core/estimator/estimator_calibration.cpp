@@ -19,18 +19,10 @@ std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now, int 
   return v.onset_frame;
 }
 
-CalibrationCause cause_of(calibration::MonitorResult::Kind kind) noexcept {
+CalibrationCause to_cause(calibration::MonitorResult::Kind kind) noexcept {
   using K = calibration::MonitorResult::Kind;
-  switch (kind) {
-    case K::drift:
-      return CalibrationCause::drift;
-    case K::collapse:
-      return CalibrationCause::collapse;
-    case K::knock:
-    case K::quiet:
-      break;
-  }
-  return CalibrationCause::knock;
+  if (kind == K::drift) return CalibrationCause::drift;
+  return kind == K::collapse ? CalibrationCause::collapse : CalibrationCause::knock;
 }
 
 const char* cause_message(CalibrationCause cause) noexcept {
@@ -127,7 +119,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
   } else if (v.kind != K::quiet) {
-    suspect_rig(cause_of(v.kind),
+    suspect_rig(to_cause(v.kind),
                 first_frame_of_use(v, frame.number, options.calibration.min_frames), frame,
                 v.evidence);
   }
