@@ -34,7 +34,8 @@ void keep_longest(TrajectoryEvaluation* e, EvaluationOptions* options) {
 /// Where the reference is.
 struct Reference {
   std::filesystem::path path{};
-  bool is_ins = false;  // readings of an INS; else poses
+  // True if the file contains INS samples, false if it contains poses.
+  bool is_ins = false;
 };
 
 Reference load_reference(const EvaluationRequest& a) {
@@ -137,8 +138,10 @@ bool counts_frames(const Trajectory& poses) {
 /// A reference at the estimate's body, and how it came there.
 struct Brought {
   Trajectory poses{};
-  FoundMount found{};                   // where a mount is asked for; not ok: there are no poses
-  std::optional<InsMount> estimated{};  // of an INS's readings, else
+  // Set if the extrinsics are to be estimated; `poses` is empty unless the status is ok.
+  FoundMount found{};
+  // Set if INS samples are used with extrinsics that are not estimated here.
+  std::optional<InsMount> estimated{};
 };
 
 Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readings,
@@ -148,9 +151,10 @@ Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readi
     throw InputError(readings.string() + ": has no reading with an attitude and a satellites' fix");
   Brought out;
   out.poses = poses_of(moments);
+  // With axes other than the camera's both bodies are forward, left, up.
   if (a.estimate_ins_extrinsics)
     out.found = find_ins_mount(estimate, moments);
-  else if (a.options.axes == BodyAxes::camera)  // else both are forward, left, up
+  else if (a.options.axes == BodyAxes::camera)
     out.estimated = load_ins_mount(a.estimate, readings);
   return out;
 }
@@ -187,7 +191,8 @@ constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
 
 /// Returns true if positions agree and rotations do not.
 bool rotations_differ(const TrajectoryEvaluation& e) {
-  constexpr double kPositionsAgree = 0.05;  // of the path
+  // Relative to the path length.
+  constexpr double kPositionsAgree = 0.05;
   return e.status == EvaluationStatus::ok && !e.se3.roll_unobservable &&
          e.ate_se3.rmse < kPositionsAgree * e.path_reference &&
          e.rotation_se3.median > kRotationsDiffer;

@@ -176,8 +176,10 @@ std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptio
 std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& options,
                        Duration interval) {
   if (e.gap <= e.matched || options.association == Association::nearest) return "";
-  constexpr double kRoom = 1.1;  // above the interval, whose length varies
-  constexpr double kSteps = 20;  // of the number that is proposed, in a second
+  // Margin above the median interval, because intervals vary.
+  constexpr double kRoom = 1.1;
+  // The proposed value is rounded up to multiples of 1/20 s.
+  constexpr double kSteps = 20;
   const double seconds = interval.to_seconds();
   return fmt::format(
       "{} poses are in gaps of the reference longer than --max-gap {:g}; its poses are {:.3g} s "

@@ -106,7 +106,8 @@ void InsEvents::record_attitude(const InsSample& sample) noexcept {
 }
 
 void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
-  constexpr std::uint64_t kSettled = 3;  // poses: one missed reading is no event
+  // Number of consecutive poses before a change is reported, so that one missed sample is not.
+  constexpr std::uint64_t kSettled = 3;
   match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
   last_match_ = pose.ins;
   if (match_run_ != kSettled) return;
@@ -206,7 +207,8 @@ void InsComparison::finish() noexcept {
 /// of a step, which is 0.2 %. A bend of radius R is cut by L²/24R²: at 30 m, by 0.3 % in steps of
 /// 8.5 m.
 void InsComparison::measure_way(const ComparedPose& pose) noexcept {
-  constexpr double kSigmas = 4, kMin = 0.5, kMax = 20;  // m: longer ones cut corners
+  // Limits in sigmas and in m; longer sections would cut corners.
+  constexpr double kSigmas = 4, kMin = 0.5, kMax = 20;
   if (!pose.ins_valid) return;
   const Vec2 place = pose.reference.T_enu_left.t.head<2>();
   if (!std::exchange(on_way_, true)) last_place_ = place;
@@ -220,7 +222,8 @@ void InsComparison::measure_errors(const ComparedPose& pose) noexcept {
   if (!pose.compared) return;
   EnuErrors& e = errors_;
   const double across = pose.error_enu.head<2>().norm(), up = pose.error_enu.z();
-  const double turn = -pose.error_yaw * (180.0 / std::numbers::pi);  // a compass counts clockwise
+  // A compass heading increases clockwise.
+  const double turn = -pose.error_yaw * (180.0 / std::numbers::pi);
   ++e.poses;
   e.horizontal_rms_m += across * across;
   e.horizontal_max_m = std::max(e.horizontal_max_m, across);

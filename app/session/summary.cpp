@@ -89,8 +89,8 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
   Json depth = Json::object();
   for (const double z : calibration::kHealthDepths) {
     const double percent = known ? calibration::depth_error_percent(rig, z) : 0.0;
-    depth[fmt::format("{:g}", z)] =
-        percent > 0 ? Json(percent) : Json();  // 0: so near that no point is seen by both
+    // At 0 % the depth is so small that no point is visible in both cameras.
+    depth[fmt::format("{:g}", z)] = percent > 0 ? Json(percent) : Json();
   }
   return {
       {"rating", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()},
@@ -102,9 +102,11 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
 /// sigmas.
 Json limited_by(const RigCalibration& rig) {
   if (!has_sigmas(rig) || !given(rig.sigma_noise[1])) return nullptr;
-  constexpr double kDepth = 20;  // m: where the word is found
+  // Depth in m at which the limiting cause is determined.
+  constexpr double kDepth = 20;
   RigCalibration noise = rig;
-  noise.sigma_total = rig.sigma_noise;  // without their correlations: no less than it is
+  // Without correlations the depth error is not smaller than the actual one.
+  noise.sigma_total = rig.sigma_noise;
   for (Mat6& covariance : noise.covariance_total) covariance.setZero();
   noise.covariance = {};
   const double wide = calibration::depth_error_percent(rig, 1, kDepth),
@@ -232,7 +234,8 @@ Json truth_json(const std::optional<TruthMetrics>& truth, const SummaryInput& in
 
 EvaluationOptions summary_evaluation_options() {
   EvaluationOptions options;
-  const std::vector<double> near{10, 20, 30, 40, 50};  // m
+  // Segment lengths in m.
+  const std::vector<double> near{10, 20, 30, 40, 50};
   options.segments = {SegmentOptions{}, {near, 1, false}, {near, 1, true}};
   return options;
 }

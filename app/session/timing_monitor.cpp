@@ -103,7 +103,8 @@ TimingMonitor::Message TimingMonitor::of_set(const SyncedSet& set) noexcept {
 }
 
 TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexcept {
-  constexpr int kMany = 3;  // satellites: one more or less is not worth a word
+  // Minimum change of the satellite count that is reported.
+  constexpr int kMany = 3;
   const InsQuality& q = reading.quality;
   const int count = q.satellites;
   const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
@@ -116,9 +117,8 @@ TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexc
   std::array<char, 32> satellites{};
   if (count > 0)
     (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
-  const bool given =
-      q.status != 0 ||
-      q.filter_valid;  // a device that says nothing of its filter has no status either
+  // A device that reports no filter state has no status either.
+  const bool given = q.status != 0 || q.filter_valid;
   return message("ins_status", false, "the INS has %s%s%s", fix_name(fix_), satellites.data(),
                  !given           ? ""
                  : q.filter_valid ? ", filter valid"
@@ -126,7 +126,8 @@ TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexc
 }
 
 TimingMonitor::Message TimingMonitor::of_utc(const InsRecord& reading) noexcept {
-  constexpr double kStep = 0.1;  // s: a clock that was set
+  // Minimum clock step in s that is reported.
+  constexpr double kStep = 0.1;
   if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
   const double ahead =
       static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
