@@ -11,6 +11,7 @@
 
 #include "app/commands/evaluation_report.hpp"
 #include "app/runtime/terminal_text.hpp"
+#include "app/session/ins_comparison.hpp"
 #include "app/session/ins_file.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/robust.hpp"
@@ -270,7 +271,9 @@ void print(const EvaluationRequest& a, const EvaluationOptions& options, const B
   if (a.json) {
     nlohmann::ordered_json out = evaluation_json(evaluation, options);
     if (a.estimate_ins_extrinsics) out["mount"] = mount_json(reference.found);
-    if (reference.estimated) out["ins_mount"] = ins_mount_json(*reference.estimated);
+    if (reference.estimated)
+      out["ins_mount"] =
+          ins_mount_json(reference.estimated->T_ins_left, reference.estimated->source);
     std::cout << out.dump(1) << '\n';
     return;
   }

@@ -45,8 +45,6 @@ struct InsMount {
 [[nodiscard]] InsMount load_ins_mount(const std::filesystem::path& estimate,
                                       const std::filesystem::path& readings);
 
-/// For a machine, as summary.json has it.
-[[nodiscard]] nlohmann::ordered_json ins_mount_json(const InsMount& mount);
 /// For a person, a line with its end.
 [[nodiscard]] std::string ins_mount_text(const InsMount& mount);
 

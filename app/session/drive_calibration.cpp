@@ -1,7 +1,6 @@
 #include "app/session/drive_calibration.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iostream>
 #include <iterator>

@@ -7,7 +7,6 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/recording/session_description.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/version.hpp"
 

@@ -12,7 +12,6 @@
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/session/records.hpp"
-#include "app/session/session_files.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {

@@ -10,7 +10,6 @@
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"
-#include "app/session/session_files.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/memory/frame_pool.hpp"
 

@@ -1,6 +1,5 @@
 #include "app/session/recorder.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <new>

@@ -1,7 +1,5 @@
 #include "app/session/session_files.hpp"
 
-#include <system_error>
-
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/background_thread.hpp"

@@ -21,13 +21,6 @@ constexpr double kPercent = 100.0;
 /// Times to the microsecond: what is behind it is the clock's noise.
 double ms(double value) { return std::round(value * 1e3) / 1e3; }
 
-Json distribution_json(const TimeHistogram& times) {
-  return {{"p50", ms(times.percentile(0.5))},
-          {"p99", ms(times.percentile(0.99))},
-          {"p99_9", ms(times.percentile(0.999))},
-          {"max", ms(times.max())}};
-}
-
 Json timing_json(const SessionTotals& t) {
   Json stages = {{"decode", ms(t.decode.mean())}};
   Json of_stages = {{"decode", distribution_json(t.decode)}};
@@ -112,15 +105,6 @@ Json limited_by(const RigCalibration& rig) {
   const double wide = calibration::depth_error_percent(rig, 1, kDepth),
                by_noise = calibration::depth_error_percent(noise, 1, kDepth);
   return by_noise * by_noise < 0.5 * wide * wide ? "intrinsics" : "noise";
-}
-
-Json matrix_json(const Transform& T) {
-  Json matrix = Json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) matrix.push_back(T.R(row, column));
-    matrix.push_back(T.t(row));
-  }
-  return matrix;
 }
 
 Json sigmas_json(const std::array<double, 6>& sigmas) {
@@ -231,6 +215,13 @@ Json truth_json(const std::optional<TruthMetrics>& truth, const SummaryInput& in
 }
 
 }  // namespace
+
+Json distribution_json(const TimeHistogram& times) {
+  return {{"p50", ms(times.percentile(0.5))},
+          {"p99", ms(times.percentile(0.99))},
+          {"p99_9", ms(times.percentile(0.999))},
+          {"max", ms(times.max())}};
+}
 
 EvaluationOptions summary_evaluation_options() {
   EvaluationOptions options;

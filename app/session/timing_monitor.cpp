@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/devices/drive_sync.hpp"
+#include "app/session/summary.hpp"
 
 namespace vergence::app {
 namespace {
@@ -54,12 +55,10 @@ Json clock_json(const std::string& device, const ClockRecord& clock) {
 
 Json latency_json(const TimeHistogram& latency, bool is_virtual) {
   if (latency.count() == 0) return nullptr;
-  return {{"mean", rounded(latency.mean())},
-          {"p50", rounded(latency.percentile(0.5))},
-          {"p99", rounded(latency.percentile(0.99))},
-          {"p99_9", rounded(latency.percentile(0.999))},
-          {"max", rounded(latency.max())},
-          {"virtual", is_virtual}};
+  Json json = {{"mean", rounded(latency.mean())}};
+  json.update(distribution_json(latency));
+  json["virtual"] = is_virtual;
+  return json;
 }
 
 }  // namespace
@@ -202,7 +201,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                           {"pulses_missed", c.sync.missed},
                           {"pushed_out", c.sync.pushed_out},
                           {"overtaken", c.dropped_sets},
-                          {"incomplete", c.torn}}},
+                          {"frames_incomplete", c.torn}}},
                         {"cameras", cameras}};
   return {{"clocks", clocks},
           {"clock_resets", c.clock_resets},
