@@ -20,8 +20,10 @@ namespace {
   throw cv::Exception(cv::Error::StsNoConv, why, "board_calibration", "", 0);
 }
 
-constexpr int kMaxRounds = 8;        // of rejecting views
-constexpr std::size_t kGroups = 10;  // of the jackknife: each costs a calibration
+// Maximum number of rounds of view rejection.
+constexpr int kMaxRounds = 8;
+// Number of jackknife groups. Each group costs one calibration.
+constexpr std::size_t kGroups = 10;
 const cv::TermCriteria kCriteria{cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-10};
 
 using Points3 = std::vector<std::vector<cv::Point3f>>;
@@ -149,7 +151,8 @@ void BoardCalibrator::calibrate_alone(std::size_t camera, const std::vector<std:
                                       const Solution* start, Solution* s) const {
   Points3 object;
   Points2 image;
-  std::vector<std::size_t> at;  // positions in `used`
+  // Positions in `used`.
+  std::vector<std::size_t> at;
   for (std::size_t i = 0; i < used.size(); ++i) {
     const BoardCorners& corners = views_[used[i]].corners[camera];
     if (corners.empty()) continue;

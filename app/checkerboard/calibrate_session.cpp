@@ -17,8 +17,10 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kSquarePixels = 0.03;  // fx over fy from 1
-constexpr double kVagueFocal = 0.01;    // sigma over focal length
+// Maximum deviation of fx over fy from 1.
+constexpr double kSquarePixels = 0.03;
+// Sigma of the focal length over the focal length.
+constexpr double kVagueFocal = 0.01;
 
 Coverage make_coverage(const CalibrateRequest& request, const CalibrationFile& file,
                        const std::vector<ImageSize>& sizes, const std::vector<BoardView>& views,
@@ -82,7 +84,8 @@ std::size_t distinct_views(const BoardCalibration& found) {
 /// Why the views say too little of the lenses: half a message; empty: they do not.
 std::string undetermined(const BoardCalibration& found) {
   constexpr std::size_t kFewest = 4;
-  constexpr double kMaxSigma = 0.02;  // of the focal length
+  // Maximum sigma as a fraction of the focal length.
+  constexpr double kMaxSigma = 0.02;
   if (const std::size_t distinct = distinct_views(found); distinct < kFewest)
     return fmt::format(
         "only {} of {} views show the board differently; {} are the least, better 15: move and "

@@ -10,8 +10,10 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kAlike = 0.02;      // of an exposure: what cameras round by
-constexpr double kAlikeGain = 0.15;  // dB
+// Relative difference of exposures to which cameras round.
+constexpr double kAlike = 0.02;
+// Difference of gains in dB to which cameras round.
+constexpr double kAlikeGain = 0.15;
 
 bool alike(const Duration& a, const Duration& b) noexcept {
   return std::abs(static_cast<double>((a - b).ns())) <=
@@ -95,7 +97,8 @@ void ExposureControl::ask(const ExposureSetting& requested) noexcept {
     return;
   }
   under_way_.store(true, std::memory_order_release);
-  (void)requests_.push(requested);  // one at a time: there is room
+  // The queue has room, because only one request is pending at a time.
+  (void)requests_.push(requested);
   wake_.signal();
 }
 

@@ -130,7 +130,8 @@ fs::path Machine::at(const std::string& path) const {
 
 std::optional<std::string> Machine::text(const std::string& path) const {
   std::error_code error;
-  if (!fs::is_regular_file(at(path), error)) return std::nullopt;  // a pipe would make us wait
+  // Opening a pipe would block.
+  if (!fs::is_regular_file(at(path), error)) return std::nullopt;
   std::ifstream in(at(path), std::ios::binary);
   std::string all(kMaxText, '\0');
   if (!in.read(all.data(), static_cast<std::streamsize>(all.size())) && !in.eof())
@@ -309,7 +310,8 @@ SerialKind serial_kind(std::uint16_t vendor, std::uint16_t product) noexcept {
   const bool xsens = vendor == kFtdi && product >= 0xD388 && product <= 0xD38F;
   if (vendor == kXsens || xsens) return SerialKind::ins;
   if (vendor == kFtdi) return SerialKind::ftdi;
-  if (vendor == 0x10C4 || vendor == 0x067B) return SerialKind::converter;  // Silicon Labs, Prolific
+  // The vendors are Silicon Labs and Prolific.
+  if (vendor == 0x10C4 || vendor == 0x067B) return SerialKind::converter;
   if (std::find(kBoardVendors.begin(), kBoardVendors.end(), vendor) != kBoardVendors.end())
     return SerialKind::board;
   return SerialKind::unknown;

@@ -219,7 +219,8 @@ std::string remarks_text(const Inventory& inventory, const Terminal& t) {
   return text.empty() ? "" : t.in(Terminal::Ink::bold, "Not found") + "\n" + text;
 }
 
-constexpr std::size_t kState = 9, kCheck = 19;  // columns
+// Column widths in characters.
+constexpr std::size_t kState = 9, kCheck = 19;
 
 std::string state_text(FindingState state, const Terminal& t) {
   constexpr std::array kInks{Terminal::Ink::green, Terminal::Ink::yellow, Terminal::Ink::red};
