@@ -21,7 +21,8 @@ constexpr std::size_t kMinTags = 4;
 constexpr double kWindowOfGap = 0.4;
 // Limits of the half window in px.
 constexpr int kNarrowestWindow = 2, kWidestWindow = 8;
-constexpr double kMaxRefined = 4;  // px: grown twice, corners lie 2.8 px in
+// Maximum correction in px. After growing twice, corners lie 2.8 px inside.
+constexpr double kMaxRefined = 4;
 // Maximum mean residual of a flat target over the tag's side. A larger one indicates another
 // layout.
 constexpr double kFlatToSide = 0.2;

@@ -45,13 +45,18 @@ struct Lens {
 
 /// A calibration of some of the views.
 struct Solution {
-  std::vector<Lens> lenses;              // by camera
-  std::vector<LensNumbers> lens_sigmas;  // from the residuals; 0: unknown
+  // Indexed by camera.
+  std::vector<Lens> lenses;
+  // Computed from the residuals. 0 if unknown.
+  std::vector<LensNumbers> lens_sigmas;
   std::vector<double> alone_rms;
   std::vector<Transform> T_camera_left;
-  std::vector<Transform> T_left_board;  // by view
-  std::vector<double> view_rms;         // by view
-  double rms = 0;                       // of camera 0 with camera 1; of one camera alone
+  // Indexed by view.
+  std::vector<Transform> T_left_board;
+  // Indexed by view.
+  std::vector<double> view_rms;
+  // RMS of camera 0 with camera 1, or of a single camera.
+  double rms = 0;
 };
 
 Transform transform_from(const cv::Mat& rotation, const cv::Mat& t) {

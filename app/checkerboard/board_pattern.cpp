@@ -14,7 +14,8 @@ namespace {
 
 // Limits of the number of inner corners per side.
 constexpr int kMin = 3, kMax = 100;
-constexpr int kMaxTagsAlong = 24, kFamily = 587;  // codes of 36h11
+// The family 36h11 has 587 codes.
+constexpr int kMaxTagsAlong = 24, kFamily = 587;
 // Limits of the square's side in m.
 constexpr double kSmallestSquare = 0.001, kLargest = 10.0;
 // Limits of the gap over the side of a tag.

@@ -11,14 +11,14 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kLargeImage =
-    1200;  // px: from this width on squares may be too large for the detector's windows
+// From this image width in px on, squares may be too large for the windows of the detector.
+constexpr int kLargeImage = 1200;
 // Limits of the half window in px.
 constexpr int kNarrowestWindow = 2, kWidestWindow = 11;
 // Half window over the smallest distance between two corners.
 constexpr double kWindowOfSquare = 0.3;
-constexpr double kBlur =
-    0.7;  // px: the refinement's interpolation shifts corners of sharper images
+// Blur in px. The interpolation of the refinement shifts corners of sharper images.
+constexpr double kBlur = 0.7;
 constexpr int kRefineSteps = 100;
 // Tolerance in px.
 constexpr double kRefineTolerance = 1e-4;

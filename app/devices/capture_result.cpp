@@ -21,8 +21,8 @@ namespace {
 
 // Limits in grey levels.
 constexpr int kSaturated = 254, kDark = 4;
-constexpr double kMuch = 0.5,
-                 kSome = 0.05;  // shares of an image: nothing left to see, a sky that may be lost
+// Fractions of an image. kMuch leaves nothing visible, and kSome may be a saturated sky.
+constexpr double kMuch = 0.5, kSome = 0.05;
 // Limits of the mean in grey levels.
 constexpr double kBlack = 6, kDim = 30;
 // Minimum contrast in grey levels. A smaller one is noise.

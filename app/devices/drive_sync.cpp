@@ -237,9 +237,9 @@ void fit_to_devices(const Configuration& c, const std::vector<DeviceTiming>& cam
                     SyncOptions* options) {
   for (std::size_t k = 0; k < cameras.size(); ++k)
     options->camera[k].resolution = cameras[k].resolution;
+  // Pulses of the trigger board do not wait for the host.
   options->align_start = c.cameras[0].trigger == CameraTrigger::hardware &&
-                         options->mode == SyncMode::frame_counter &&
-                         !trigger;  // the pulses do not wait for us
+                         options->mode == SyncMode::frame_counter && !trigger;
 }
 
 void check_sync_out(const Configuration& c, const DeviceInfo& ins) {

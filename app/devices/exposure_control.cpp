@@ -62,7 +62,8 @@ ExposureCounters ExposureControl::counters() const noexcept {
 void ExposureControl::on_frame(std::size_t k, const Frame& frame) noexcept {
   if (unsupported_.load(std::memory_order_relaxed) || under_way_.load(std::memory_order_acquire))
     return;
-  if (asked_) {  // it is done: from here on images may have it
+  // The request is done, so images may use it from here on.
+  if (asked_) {
     asked_ = false;
     controller_.restart_settling();
     frames_without_.fill(0);

@@ -213,17 +213,11 @@ namespace {
 constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
 
 /// Vendors of boards that bring USB with them, or a converter that hardly anything else has.
-constexpr std::array<std::uint16_t, 9> kBoardVendors{
-    0x2341,  // Arduino
-    0x2A03,  // Arduino (dog hunter)
-    0x16C0,  // Teensy, and others of that shared id
-    0x2E8A,  // Raspberry Pi: Pico
-    0x0483,  // STMicroelectronics: virtual COM port, ST-Link
-    0x239A,  // Adafruit
-    0x303A,  // Espressif
-    0x1B4F,  // SparkFun
-    0x1A86,  // QinHeng: the CH340 of cheap boards
-};
+/// The entries are, in order, Arduino, the dog hunter fork of Arduino, Teensy (a shared vendor
+/// identifier), Raspberry Pi (Pico), STMicroelectronics (virtual COM port, ST-Link), Adafruit,
+/// Espressif, SparkFun and QinHeng (the CH340 of cheap trigger boards).
+constexpr std::array<std::uint16_t, 9> kBoardVendors{0x2341, 0x2A03, 0x16C0, 0x2E8A, 0x0483,
+                                                     0x239A, 0x303A, 0x1B4F, 0x1A86};
 
 struct Search {
   std::vector<DeviceInfo> found;

@@ -283,9 +283,9 @@ std::string doctor_text(const std::vector<Finding>& findings, bool given, const 
       text += head + line + "\n";
       head = margin;
     }
+    // A command is never wrapped, because users copy it.
     for (const std::string& command : f.fix)
-      text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) +
-              "\n";  // never broken: it is copied
+      text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) + "\n";
     if (!f.fix.empty()) text += "\n";
   }
   if (!text.ends_with("\n\n")) text += "\n";

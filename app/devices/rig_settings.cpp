@@ -14,8 +14,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kFocalOfWidth =
-    0.72;  // of the image's width: 70° across, what machine-vision rigs on cars have
+// Fraction of the image width, a field of 70° as in machine-vision rigs on cars.
+constexpr double kFocalOfWidth = 0.72;
 
 Intrinsics read_intrinsics(const Configuration& c, const CameraSettings& camera) {
   Intrinsics lens;

@@ -15,8 +15,8 @@
 namespace vergence::app::report {
 namespace {
 
-constexpr double kAlignment =
-    100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
+// Length in m of the segment that aligns the trajectory with its reference, as with the INS.
+constexpr double kAlignment = 100.0;
 constexpr double kPercent = 100.0;
 // Maximum gap in frame intervals across which a line is drawn.
 constexpr double kWideGap = 4.0;

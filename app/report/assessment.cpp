@@ -277,7 +277,8 @@ class Assessor {
   /// The reason of most frames that are not ok; one that is no waiting goes before, where it is
   /// that of a quarter of them or more. Of frames that were not read, the kind of most events.
   [[nodiscard]] Main main_reason() const {
-    std::array<Main, 2> most{};  // of those that do not wait, of those that do
+    // The entries are for events that do not wait and for those that do.
+    std::array<Main, 2> most{};
     for (std::size_t i = 0; i < std::min(s_.reasons.size(), a_.by_reason.size()); ++i) {
       Main& main = most[is_waiting(s_.reasons[i]) ? 1 : 0];
       if (!s_.reasons[i].empty() && a_.by_reason[i] > main.frames)
@@ -590,9 +591,12 @@ class Assessor {
 
   const Session& s_;
   const Analysis& a_;
-  const std::size_t all_;  // frames, also those that were not read
-  bool broken_ = false;    // poses are missing within a long outage: the path's length means little
-  bool unverified_ = false;  // the run ended before it could verify its calibration
+  // Number of frames, including those that were not read.
+  const std::size_t all_;
+  // True if poses are missing within a long outage, so that the path length means little.
+  bool broken_ = false;
+  // True if the run ended before it could verify its calibration.
+  bool unverified_ = false;
   // Reasons, indexed by Grade.
   std::array<std::vector<std::string>, 3> reasons_;
   Assessment out_;

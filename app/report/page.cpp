@@ -409,7 +409,8 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
   for (int camera = 1; camera < kMaxCameras; ++camera) {
     if (!changed(s, camera)) continue;
     const std::string whose = camera == 1 ? "Right camera" : fmt::format("Camera {}", camera);
-    for (const int component : {0, 3, 1, 4, 2, 5})  // rotation and translation side by side
+    // Rotation and translation are shown side by side.
+    for (const int component : {0, 3, 1, 4, 2, 5})
       plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]),
                       calibration_plot(s, a, camera, component));
   }

@@ -87,8 +87,8 @@ Line PlotBox::line(const Line& data) const {
 
 void PlotBox::fit_y(double low, double high, bool from_zero) {
   if (from_zero) low = std::min(0.0, low);
-  const double least =
-      std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;  // what doubles can show apart
+  // Minimum range that doubles can resolve.
+  const double least = std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;
   const double air = std::max(0.06 * (high - low), least);
   y0 = from_zero && low == 0.0 ? 0.0 : low - air;
   y1 = high + air;
@@ -356,8 +356,8 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
 
 namespace {
 
-constexpr double kMargin = 16, kFoot = 38, kMin = 190,
-                 kMax = 420;  // of the paper; kFoot: room for the scale bar
+// Sizes in the drawing. kFoot is the room for the scale bar.
+constexpr double kMargin = 16, kFoot = 38, kMin = 190, kMax = 420;
 // Distance in the drawing that is smaller than the line width.
 constexpr double kThin = 0.4;
 constexpr std::size_t kMaxPoints = 20'000;
@@ -382,8 +382,8 @@ struct MapScale {
 };
 
 MapScale scale_for(const Bounds& b) {
-  constexpr double kSmallest =
-      1;  // m: a vehicle that stands still is a dot, not its noise enlarged
+  // Minimum extent in m, so that the noise of a vehicle at rest is not enlarged.
+  constexpr double kSmallest = 1;
   const double width = std::max(b.x1 - b.x0, kSmallest), depth = std::max(b.y1 - b.y0, kSmallest);
   MapScale s;
   s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);

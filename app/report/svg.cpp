@@ -167,9 +167,9 @@ std::string escape(std::string_view text, std::size_t most) {
 
 std::string coordinate(double value) {
   if (!std::isfinite(value)) return "0";
+  // Adding 0.0 turns a negative zero into a positive one.
   const double v =
-      std::round(std::clamp(value, -kLargestCoordinate, kLargestCoordinate) * 10) / 10 +
-      0.0;  // + 0.0: no negative zero
+      std::round(std::clamp(value, -kLargestCoordinate, kLargestCoordinate) * 10) / 10 + 0.0;
   return v == std::floor(v) ? fmt::format("{:.0f}", v) : fmt::format("{:.1f}", v);
 }
 
@@ -196,8 +196,8 @@ std::string tick_label(double value, double step) {
   const int decimals =
       step > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6) : 2;
   const std::string text = fmt::format("{:.{}f}", std::abs(v) < step * 1e-6 ? 0.0 : v, decimals);
-  return v < 0 && text.front() == '-' ? "−" + text.substr(1)
-                                      : text;  // a minus sign of a digit's width
+  // The minus sign is as wide as a digit.
+  return v < 0 && text.front() == '-' ? "−" + text.substr(1) : text;
 }
 
 std::string time_label(double seconds, double step) {

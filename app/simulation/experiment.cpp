@@ -17,8 +17,8 @@ namespace {
 
 // Sigma in m of the supplied length with `--length measured`.
 constexpr double kMeasuredSigma = 1e-3;
-constexpr double kFailedRatio =
-    1.2;  // rms above so many times what the noise explains is a failed run
+// An RMS above this multiple of what the noise explains is a failed run.
+constexpr double kFailedRatio = 1.2;
 // Mean reprojection error in px of a failed run without noise.
 constexpr double kFailedExact = 1e-6;
 

@@ -26,7 +26,8 @@ Camera pinhole() {
 }
 
 Vec3 direction(Random& random) {
-  for (;;) {  // ends: each draw succeeds with probability 1 but for the null vector
+  // The loop ends, because each draw succeeds with probability 1 except for the null vector.
+  for (;;) {
     const Vec3 v(random.normal(), random.normal(), random.normal());
     if (v.norm() > 1e-6) return v.normalized();
   }
