@@ -287,7 +287,8 @@ CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int came
       curve.used.push_back(value);
     } else if (!c.kept) {
       curve.rejected.push_back({at, at, value.value, 0});
-    } else if (std::isfinite(c.depth_sigma_percent)) {  // else the solve came to nothing
+    } else if (std::isfinite(c.depth_sigma_percent)) {
+      // A sigma that is not finite marks a failed solve, which is not drawn.
       curve.measured.push_back(value);
     }
   }
