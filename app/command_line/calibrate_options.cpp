@@ -38,7 +38,8 @@ ExitCode run_checkerboard_tool(const ProgramArguments& arguments) {
         "it: scripts/setup",
         kCheckerboardTool, folder.string(), (folder.parent_path() / "libexec/vergence").string()));
   std::vector<char*> argv;
-  for (const char* word : arguments) argv.push_back(const_cast<char*>(word));  // execv() only reads
+  // execv() only reads its arguments.
+  for (const char* word : arguments) argv.push_back(const_cast<char*>(word));
   argv.push_back(nullptr);
   std::cout.flush();
   ::execv(tool->c_str(), argv.data());

@@ -22,9 +22,10 @@ CLI::Validator one_of(std::vector<std::string> values) {
 }
 
 void CommonOptions::declare_set(CLI::App& command) {
+  // Each --set takes one argument, so that the next word is not read as another KEY=VALUE.
   add_option(command, "--set", set, "Set a configuration key (docs/configuration.md); repeatable",
              "KEY=VALUE")
-      ->allow_extra_args(false)  // one argument each: the next word is not another KEY=VALUE
+      ->allow_extra_args(false)
       ->group("Configuration");
 }
 

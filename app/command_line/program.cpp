@@ -163,7 +163,7 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
   check_command(root, argc, argv);
   try {
     root.parse(argc, argv);
-  } catch (const CLI::Success& asked) {  // --help, --version
+  } catch (const CLI::Success& asked) {
     root.exit(asked, std::cout, std::cerr);
     return ExitCode::done;
   } catch (const CLI::ParseError& error) {
@@ -174,7 +174,8 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
 
 /// A thread's stack is as large as the limit says, and there is no message after an overflow.
 void check_stack() {
-  constexpr rlim_t kMin = rlim_t{1} << 20;  // bytes; what is used is below half of it
+  // Minimum in bytes; the program uses less than half of it.
+  constexpr rlim_t kMin = rlim_t{1} << 20;
   struct rlimit stack {};
   if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kMin) return;
   throw InputError("the stack is limited to " + std::to_string(stack.rlim_cur >> 10U) +

@@ -15,8 +15,10 @@ namespace {
 
 struct DevicesArguments {
   bool json = false;
-  std::string rig;    // configuration; empty: whatever is plugged in
-  std::string rules;  // `-`: standard output
+  // Path of the configuration; all connected devices are listed if it is empty.
+  std::string rig;
+  // Path of the rules; `-` is the standard output.
+  std::string rules;
 };
 
 void write_rules(const std::string& file, const std::string& rules) {

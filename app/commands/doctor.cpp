@@ -24,7 +24,8 @@ ExitCode examine_machine(const DoctorArguments& a) {
   std::optional<Configuration> drive;
   if (!a.configuration.empty()) drive = load_configuration(a.configuration, a.set);
   InventoryOptions options;
-  for (int k = 0; drive && k < camera_count(*drive); ++k)  // without a configuration: all
+  // Without a configuration all drivers are examined.
+  for (int k = 0; drive && k < camera_count(*drive); ++k)
     options.drivers.push_back(drive->cameras[static_cast<std::size_t>(k)].driver);
   const Machine machine = Machine::here();
   const Inventory inventory = make_inventory(machine, options);

@@ -17,13 +17,16 @@ namespace {
 /// The words as given; checked when the command runs.
 struct EvaluateArguments {
   EvaluationRequest request;
-  std::optional<std::string> lengths;  // m
+  // Segment lengths in m.
+  std::optional<std::string> lengths;
   std::optional<int> step;
   std::string associate = "interpolate";
-  double max_gap = 0.2;           // s
-  double max_difference = 0.005;  // s
+  // Limits in s.
+  double max_gap = 0.2;
+  double max_difference = 0.005;
   std::string axes = "camera";
-  std::string unit, quaternion;  // ESTIMATE[,REFERENCE]
+  // Each is ESTIMATE[,REFERENCE].
+  std::string unit, quaternion;
 };
 
 std::vector<double> parse_lengths(const std::string& text) {
@@ -41,7 +44,8 @@ std::vector<double> parse_lengths(const std::string& text) {
 }
 
 Duration parse_duration(const char* option, double seconds) {
-  constexpr double kLongest = 1e6;  // s: eleven days, longer than a drive
+  // Maximum in s: eleven days, longer than any recording.
+  constexpr double kLongest = 1e6;
   if (!(seconds >= 0) || seconds > kLongest)
     throw InputError(std::string(option) + " needs seconds between 0 and 1e6");
   return Duration::seconds(seconds);

@@ -11,6 +11,7 @@
 
 #include "app/commands/evaluation_report.hpp"
 #include "app/runtime/terminal_text.hpp"
+#include "app/session/ins_comparison.hpp"
 #include "app/session/ins_file.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/robust.hpp"
@@ -34,7 +35,8 @@ void keep_longest(TrajectoryEvaluation* e, EvaluationOptions* options) {
 /// Where the reference is.
 struct Reference {
   std::filesystem::path path{};
-  bool is_ins = false;  // readings of an INS; else poses
+  // True if the file contains INS samples, false if it contains poses.
+  bool is_ins = false;
 };
 
 Reference load_reference(const EvaluationRequest& a) {
@@ -137,8 +139,10 @@ bool counts_frames(const Trajectory& poses) {
 /// A reference at the estimate's body, and how it came there.
 struct Brought {
   Trajectory poses{};
-  FoundMount found{};                   // where a mount is asked for; not ok: there are no poses
-  std::optional<InsMount> estimated{};  // of an INS's readings, else
+  // Set if the extrinsics are to be estimated; `poses` is empty unless the status is ok.
+  FoundMount found{};
+  // Set if INS samples are used with extrinsics that are not estimated here.
+  std::optional<InsMount> estimated{};
 };
 
 Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readings,
@@ -148,9 +152,10 @@ Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readi
     throw InputError(readings.string() + ": has no reading with an attitude and a satellites' fix");
   Brought out;
   out.poses = poses_of(moments);
+  // With axes other than the camera's both bodies are forward, left, up.
   if (a.estimate_ins_extrinsics)
     out.found = find_ins_mount(estimate, moments);
-  else if (a.options.axes == BodyAxes::camera)  // else both are forward, left, up
+  else if (a.options.axes == BodyAxes::camera)
     out.estimated = load_ins_mount(a.estimate, readings);
   return out;
 }
@@ -187,7 +192,8 @@ constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
 
 /// Returns true if positions agree and rotations do not.
 bool rotations_differ(const TrajectoryEvaluation& e) {
-  constexpr double kPositionsAgree = 0.05;  // of the path
+  // Relative to the path length.
+  constexpr double kPositionsAgree = 0.05;
   return e.status == EvaluationStatus::ok && !e.se3.roll_unobservable &&
          e.ate_se3.rmse < kPositionsAgree * e.path_reference &&
          e.rotation_se3.median > kRotationsDiffer;
@@ -265,7 +271,9 @@ void print(const EvaluationRequest& a, const EvaluationOptions& options, const B
   if (a.json) {
     nlohmann::ordered_json out = evaluation_json(evaluation, options);
     if (a.estimate_ins_extrinsics) out["mount"] = mount_json(reference.found);
-    if (reference.estimated) out["ins_mount"] = ins_mount_json(*reference.estimated);
+    if (reference.estimated)
+      out["ins_mount"] =
+          ins_mount_json(reference.estimated->T_ins_left, reference.estimated->source);
     std::cout << out.dump(1) << '\n';
     return;
   }

@@ -73,16 +73,20 @@ std::string left_out(const TrajectoryEvaluation& e, const EvaluationOptions& opt
                      inside);
 }
 
+void table_row(std::string* out, const char* name, const std::array<double, 4>& values, double unit,
+               const char* symbol) {
+  fmt::format_to(std::back_inserter(*out), "  {:<34}{:>11.4f} {:>11.4f} {:>11.4f} {:>11.4f}  {}\n",
+                 name, values[0] * unit, values[1] * unit, values[2] * unit, values[3] * unit,
+                 symbol);
+}
+
 void statistics_row(std::string* out, const char* name, const ErrorStatistics& s, double unit,
                     const char* symbol) {
-  fmt::format_to(std::back_inserter(*out), "  {:<34}{:>11.4f} {:>11.4f} {:>11.4f} {:>11.4f}  {}\n",
-                 name, s.rmse * unit, s.mean * unit, s.median * unit, s.max * unit, symbol);
+  table_row(out, name, {s.rmse, s.mean, s.median, s.max}, unit, symbol);
 }
 
 void heading_row(std::string* out, const char* name, const HeadingErrors& h) {
-  fmt::format_to(std::back_inserter(*out), "  {:<34}{:>11.4f} {:>11.4f} {:>11.4f} {:>11.4f}  deg\n",
-                 name, h.rms * kDegreesPerRadian, h.mean * kDegreesPerRadian,
-                 h.max_abs * kDegreesPerRadian, h.last * kDegreesPerRadian);
+  table_row(out, name, {h.rms, h.mean, h.max_abs, h.last}, kDegreesPerRadian, "deg");
 }
 
 void segment_rows(std::string* out, const SegmentErrors& segments) {
@@ -176,8 +180,10 @@ std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptio
 std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& options,
                        Duration interval) {
   if (e.gap <= e.matched || options.association == Association::nearest) return "";
-  constexpr double kRoom = 1.1;  // above the interval, whose length varies
-  constexpr double kSteps = 20;  // of the number that is proposed, in a second
+  // Margin above the median interval, because intervals vary.
+  constexpr double kRoom = 1.1;
+  // The proposed value is rounded up to multiples of 1/20 s.
+  constexpr double kSteps = 20;
   const double seconds = interval.to_seconds();
   return fmt::format(
       "{} poses are in gaps of the reference longer than --max-gap {:g}; its poses are {:.3g} s "
@@ -208,8 +214,6 @@ std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOp
 }
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// Nothing: no three finite numbers.
 std::optional<Vec3> read_vector(const Json& mount, const char* key) {
@@ -252,14 +256,6 @@ InsMount load_ins_mount(const std::filesystem::path& estimate,
   return {mount_of(Vec3::Zero(), Vec3::Zero()), "the axes only", true};
 }
 
-Json ins_mount_json(const InsMount& mount) {
-  const Vec3& arm = mount.T_ins_left.t;
-  const Vec3 turn = boresight_of(mount.T_ins_left.R) * kDegreesPerRadian;
-  return {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
-          {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
-          {"source", mount.source}};
-}
-
 std::string ins_mount_text(const InsMount& mount) {
   if (mount.axes_only)
     return "the data set has no INS-to-camera extrinsics: the camera is assumed to look along the "
@@ -269,8 +265,6 @@ std::string ins_mount_text(const InsMount& mount) {
 }
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json value_json(const MountValue& v, double unit) {
   return {{"value", v.observable ? Json(v.value * unit) : Json(nullptr)},

@@ -34,8 +34,10 @@ namespace vergence::app {
 /// INS extrinsics used if none are estimated.
 struct InsMount {
   Transform T_ins_left{};
-  std::string source{};    // where it is from
-  bool axes_only = false;  // unknown extrinsics: a camera along the INS's x axis, at its origin
+  // Where the extrinsics were read.
+  std::string source{};
+  // True if the extrinsics are unknown: the camera looks along the INS's x axis, at its origin.
+  bool axes_only = false;
 };
 
 /// The mount that the sessions around these files or folders compared with, of the first that has
@@ -43,8 +45,6 @@ struct InsMount {
 [[nodiscard]] InsMount load_ins_mount(const std::filesystem::path& estimate,
                                       const std::filesystem::path& readings);
 
-/// For a machine, as summary.json has it.
-[[nodiscard]] nlohmann::ordered_json ins_mount_json(const InsMount& mount);
 /// For a person, a line with its end.
 [[nodiscard]] std::string ins_mount_text(const InsMount& mount);
 
@@ -54,8 +54,9 @@ struct FoundMount {
   MountStatus status = MountStatus::too_few;
   Mount mount{};
   Mat3 nominal = Mat3::Identity();
-  bool of_ins = false;  // the reference is an INS and the estimate a camera: what is found is what
-                        // the configuration calls the mount
+  // True if the reference is an INS and the estimate a camera: the result is then what the
+  // configuration calls INS-to-camera extrinsics.
+  bool of_ins = false;
 };
 [[nodiscard]] FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference);
 

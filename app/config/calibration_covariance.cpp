@@ -18,8 +18,9 @@ namespace vergence::app {
 
 namespace {
 
-constexpr double kRounding = 1e-6;  // of a correlation, and of the least eigenvalue of their
-                                    // matrix: what nine digits a number leave
+// Tolerance for a correlation and for the smallest eigenvalue of the correlation matrix: the
+// rounding error of numbers with nine digits.
+constexpr double kRounding = 1e-6;
 constexpr std::array kPlaceNames{"rx", "ry", "rz", "tx", "ty", "tz"};
 constexpr std::array kRadtanNames{"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
 constexpr std::array kEquidistantNames{"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
@@ -196,18 +197,23 @@ void clear_places(RigCovariance* covariance) {
 
 namespace {
 
-constexpr int kSmallestImage = 16, kLargestImage = 16384;  // px a side
+// Limits of an image side in px.
+constexpr int kSmallestImage = 16, kLargestImage = 16384;
 // Focal length over the larger side: 0.2 is wider than any fisheye lens, 5 a telephoto lens of 11°.
 constexpr double kShortestFocal = 0.2, kLongestFocal = 5.0;
-constexpr double kLargestAspect = 2.0;  // fx : fy; 2 for half-height (interlaced) images
+// Maximum of fx : fy; half-height (interlaced) images have 2.
+constexpr double kLargestAspect = 2.0;
 // Shift of a corner of the image by the lens, as a part of its distance from the centre. Strong
 // wide-angle lenses reach 0.4.
 constexpr double kLargestDistortion = 0.8;
-constexpr double kSameRotation = 1e-6;  // largest entry of RᵀR − I: taken as it is
-constexpr double kNearRotation =
-    1e-3;  // up to here replaced by the nearest rotation, from here on refused
-constexpr double kShortestBaseline = 0.005, kLongestBaseline = 20;  // m: outside, the unit is wrong
-constexpr double kBaselineTolerance = 0.02;  // relative, beside four sigmas of the measured length
+// A rotation is used unchanged if no entry of RᵀR − I exceeds this.
+constexpr double kSameRotation = 1e-6;
+// Up to this entry of RᵀR − I the nearest rotation is used; a larger one is refused.
+constexpr double kNearRotation = 1e-3;
+// Baselines in m outside these limits indicate a wrong unit.
+constexpr double kShortestBaseline = 0.005, kLongestBaseline = 20;
+// Relative tolerance, in addition to four sigmas of the measured length.
+constexpr double kBaselineTolerance = 0.02;
 
 using Finding = std::optional<ValidationError>;
 
@@ -359,7 +365,8 @@ std::string baseline_message(const RigCalibration& rig) {
 }
 
 std::string baseline_warning(const RigCalibration& rig) {
-  constexpr double kUsuallyShortest = 0.02, kUsuallyLongest = 2;  // m
+  // Usual limits in m.
+  constexpr double kUsuallyShortest = 0.02, kUsuallyLongest = 2;
   const double length = rig.T_camera_left[1].t.norm();
   if (length >= kUsuallyShortest && length <= kUsuallyLongest) return "";
   return fmt::format(

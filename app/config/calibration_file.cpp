@@ -20,7 +20,8 @@ namespace {
 constexpr std::int64_t kVersion = 1;
 constexpr const char* kRadtan = "pinhole-radtan";
 constexpr const char* kEquidistant = "pinhole-equidistant";
-constexpr std::size_t kTriangle = 21;  // numbers in the upper triangle of a 6×6 matrix
+// Number of entries in the upper triangle of a 6×6 matrix.
+constexpr std::size_t kTriangle = 21;
 
 /// One group of the file: its node, its name in messages, its fields by name.
 class Section {
@@ -78,8 +79,8 @@ std::size_t max_coefficients(const Intrinsics& k) {
 }
 
 Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
-  constexpr std::int64_t kAnySize =
-      std::numeric_limits<int>::max();  // what a size may be is checked with the rest
+  // The allowed range of a size is checked with the other values.
+  constexpr std::int64_t kAnySize = std::numeric_limits<int>::max();
   Intrinsics k;
   const YAML::Node size = camera.need("size");
   if (!size.IsSequence() || size.size() != 2)
@@ -200,7 +201,8 @@ YAML::Node locate(const YAML::Node& root, const std::string& field) {
   for (std::size_t from = 0; from < field.size();) {
     const std::size_t dot = std::min(field.find('.', from), field.size());
     const std::string part = field.substr(from, dot - from);
-    const YAML::Node& here = node;  // const: looking must not add the key
+    // The reference is const because a lookup in a mutable node adds the key.
+    const YAML::Node& here = node;
     const YAML::Node below = here.IsSequence() ? here[std::stoul(part)] : here[part];
     if (!below) break;
     node.reset(below);

@@ -26,10 +26,14 @@ constexpr int kDeepest = 8;
 
 /// One value of the user: a leaf of the YAML tree, list items by number.
 struct Entry {
-  std::string name;    // cameras.0.serial
-  std::string value;   // the scalar's text
-  bool scalar = true;  // false: an empty group or list
-  std::string origin;  // for the message: file:line, or the --set argument
+  // Full key, such as cameras.0.serial.
+  std::string name;
+  // Text of the scalar.
+  std::string value;
+  // False for an empty group or list.
+  bool scalar = true;
+  // Source for messages: file:line, or the --set argument.
+  std::string origin;
 };
 
 /// Unfolds a YAML tree into entries. `origin`: for every entry instead of its file:line; empty: by
@@ -198,7 +202,7 @@ void apply(const Entry& entry, Configuration* configuration) {
   if (is_group(entry.name)) {
     if (entry.scalar && !entry.value.empty())
       throw InputError(entry.origin + ": " + entry.name + " is a group of keys, not a value");
-    return;  // an empty group
+    return;
   }
   const Key* key = find_key(entry.name);
   if (key == nullptr) refuse_unknown(entry);
@@ -234,8 +238,8 @@ void apply(const Entry& entry, Configuration* configuration) {
 /// NAME=NUMBER …`.
 std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
   std::vector<Entry> out;
-  std::map<std::string, std::map<std::string, Entry>>
-      faults;  // by `faults.N`, then by name; the last one wins
+  // The keys are `faults.N`, then the name; the last value of a name is used.
+  std::map<std::string, std::map<std::string, Entry>> faults;
   for (const Entry& entry : entries) {
     const auto dot = entry.name.find('.', 7);
     if (!entry.name.starts_with("faults.") || dot == std::string::npos) {
@@ -288,7 +292,7 @@ void apply_camera_options(const std::vector<Entry>& entries, Configuration* conf
     CameraSettings& settings = configuration->cameras[*camera];
     std::string why;
     if (name.empty() && !entry.scalar)
-      settings.options = {};  // an empty group
+      settings.options = {};
     else if (name.empty())
       why = set_camera_options(entry.value, &settings);
     else if (!entry.scalar || entry.value.empty() ||
@@ -397,7 +401,8 @@ std::string canonical_text(const Configuration& configuration) {
 }
 
 std::string configuration_hash(const Configuration& configuration) {
-  std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a, 64 bit: offset basis and prime
+  // Offset basis and prime are those of the 64-bit FNV-1a hash.
+  std::uint64_t hash = 0xcbf29ce484222325U;
   for (const char c : canonical_text(configuration))
     hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
   return fmt::format("{:016x}", hash);
@@ -405,7 +410,8 @@ std::string configuration_hash(const Configuration& configuration) {
 
 namespace {
 
-constexpr std::size_t kShown = 60;  // bytes of a text from outside in a message
+// Maximum number of bytes of an input text that a message repeats.
+constexpr std::size_t kShown = 60;
 
 std::string no_such_option(const std::string& name, const CameraSettings& camera) {
   std::vector<std::string> names;

@@ -31,6 +31,11 @@ class Rows {
     group_.meaning = std::move(meaning);
   }
 
+  /// `part` is the member of the configuration that has the fields.
+  Rows(std::string prefix, std::string meaning, Settings Configuration::*part)
+      : Rows(
+            std::move(prefix), std::move(meaning), [part](auto& c) -> auto& { return c.*part; }) {}
+
   /// Any integral field.
   template <class Integer>
   Rows& integer(const char* name, Integer Settings::*field, std::int64_t least, std::int64_t most,
@@ -140,7 +145,7 @@ class Rows {
   void add(const std::string& name, KeyType type, double least, double most, const char* unit,
            const char* meaning, std::function<void(Settings&, const KeyValue&)> set,
            std::function<KeyValue(const Settings&)> get) {
-    group_.keys.push_back({prefix_ + "." + name,
+    group_.keys.push_back({prefix_.empty() ? name : prefix_ + "." + name,
                            type,
                            unit,
                            least,
@@ -160,24 +165,20 @@ class Rows {
   Group group_;
 };
 
+/// The part that is the configuration itself.
+constexpr auto whole = [](auto& c) -> auto& { return c; };
+
 Group general() {
-  Group group;
-  group.meaning = "Keys that belong to no group.";
-  group.keys.push_back(
-      {"threads", KeyType::integer, "", 1, 2,
-       "Threads of the estimator: 2 processes both images in parallel; the poses are the same.",
-       [](Configuration& c, const KeyValue& v) {
-         c.threads = static_cast<int>(std::get<std::int64_t>(v));
-       },
-       [](const Configuration& c) -> KeyValue { return std::int64_t{c.threads}; }});
-  return group;
+  return Rows<Configuration>("", "Keys that belong to no group.", whole)
+      .integer(
+          "threads", &Configuration::threads, 1, 2, "",
+          "Threads of the estimator: 2 processes both images in parallel; the poses are the same.")
+      .done();
 }
 
 Group kitti_raw() {
   using K = KittiRawSettings;
-  return Rows<K>(
-             "kitti_raw", "Replays of KITTI raw drives.",
-             [](auto& c) -> auto& { return c.kitti_raw; })
+  return Rows("kitti_raw", "Replays of KITTI raw drives.", &Configuration::kitti_raw)
       .integer("left", &K::left, 0, 3, "", "Left camera of a drive, `image_NN`: 0 grey, 2 colour.")
       .integer("right", &K::right, 0, 3, "", "Right camera: 1 grey, 3 colour.")
       .done();
@@ -186,11 +187,10 @@ Group kitti_raw() {
 Group record() {
   using R = RecordSettings;
   const std::vector<std::string> off_on{"off", "on"};
-  return Rows<R>(
-             "record",
-             "What is recorded into `drive.mcap` of the session (docs/session_files.md). A list, "
-             "`record: [poses, ins, images]`, enables the listed topics.",
-             [](auto& c) -> auto& { return c.record; })
+  return Rows("record",
+              "What is recorded into `drive.mcap` of the session (docs/session_files.md). A list, "
+              "`record: [poses, ins, images]`, enables the listed topics.",
+              &Configuration::record)
       .choice("poses", &R::poses, off_on, "Odometry and transforms of every frame.")
       .choice("ins", &R::ins, off_on, "All INS samples, as compared.")
       .choice(
@@ -204,10 +204,9 @@ Group record() {
 
 Group publish() {
   using P = PublishSettings;
-  return Rows<P>(
-             "publish",
-             "Pose stream and live page of a running session or replay (docs/live_interface.md).",
-             [](auto& c) -> auto& { return c.publish; })
+  return Rows("publish",
+              "Pose stream and live page of a running session or replay (docs/live_interface.md).",
+              &Configuration::publish)
       .text("pose_stream", &P::pose_stream, 200,
             "Address of the pose stream, one JSON object per frame: `unix:///PATH` (stream socket) "
             "or `udp://HOST:PORT`; empty: off.")
@@ -222,9 +221,8 @@ Group publish() {
 
 Group sessions() {
   using S = SessionsSettings;
-  return Rows<S>(
-             "sessions", "Session directories next to the one of `--out`.",
-             [](auto& c) -> auto& { return c.sessions; })
+  return Rows("sessions", "Session directories next to the one of `--out`.",
+              &Configuration::sessions)
       .integer(
           "quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
           "Maximum total size: before a run the oldest sessions beyond it are removed. 0: never.")
@@ -233,11 +231,10 @@ Group sessions() {
 
 Group realtime() {
   using R = RealtimeSettings;
-  return Rows<R>(
-             "realtime",
-             "Scheduling and memory of a live run (docs/deployment.md). If the system refuses a "
-             "setting, a warning is printed and the run continues.",
-             [](auto& c) -> auto& { return c.realtime; })
+  return Rows("realtime",
+              "Scheduling and memory of a live run (docs/deployment.md). If the system refuses a "
+              "setting, a warning is printed and the run continues.",
+              &Configuration::realtime)
       .integer("priority", &R::priority, 0, 90, "",
                "SCHED_FIFO priority of the threads of cameras, trigger and synchroniser; the "
                "estimator has one less, the INS two, files three, the solver none. 0: off.")
@@ -269,8 +266,7 @@ std::vector<std::pair<std::string, SyncMode>> sync_modes() {
 
 Group rig() {
   using R = RigSettings;
-  return Rows<R>(
-             "rig", "The rig as a whole.", [](auto& c) -> auto& { return c.rig; })
+  return Rows("rig", "The rig as a whole.", &Configuration::rig)
       .text("name", &R::name, 64, "Name of the rig in the calibration.yaml that a session writes.")
       .number("nominal.baseline_m", &R::baseline_m, 0.02, 10, "m",
               "Distance of the right camera from the left one, to its right.")
@@ -366,10 +362,9 @@ Group cameras() {
 
 Group exposure() {
   using E = ExposureSettings;
-  return Rows<E>(
-             "exposure",
-             "Exposure and gain of all cameras together, while driving (docs/cameras.md).",
-             [](auto& c) -> auto& { return c.exposure; })
+  return Rows("exposure",
+              "Exposure and gain of all cameras together, while driving (docs/cameras.md).",
+              &Configuration::exposure)
       .choice("mode", &E::mode, {"fixed", "auto"},
               "`fixed`: as configured in `cameras`. `auto`: controlled by the brightness of camera "
               "0, equal for all cameras, starting with the settings of camera 0.")
@@ -387,8 +382,7 @@ Group exposure() {
 
 Group trigger() {
   using T = TriggerSettings;
-  return Rows<T>(
-             "trigger", "Trigger of the cameras.", [](auto& c) -> auto& { return c.trigger; })
+  return Rows("trigger", "Trigger of the cameras.", &Configuration::trigger)
       .word("driver", &T::driver, {"none", "mock", "board"},
             "Source of the pulses: `board`, a trigger board on a serial port "
             "(docs/synchronisation.md); `mock`, with mock cameras; `none`: a source that reports "
@@ -425,8 +419,7 @@ Group trigger() {
 
 Group sync() {
   using S = SyncSettings;
-  return Rows<S>(
-             "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
+  return Rows("sync", "How images are paired.", &Configuration::sync)
       .choice<SyncMode>(
           "mode", &S::mode, sync_modes(),
           "How images are paired and verified (docs/synchronisation.md). Verified: `board`, by a "
@@ -448,9 +441,8 @@ Group sync() {
 
 Group ins() {
   using I = InsSettings;
-  return Rows<I>(
-             "ins", "Inertial navigation system that the pose is compared with.",
-             [](auto& c) -> auto& { return c.ins; })
+  return Rows("ins", "Inertial navigation system that the pose is compared with.",
+              &Configuration::ins)
       .word("driver", &I::driver, {"none", "mock", "xsens", "nmea", "ubx"},
             "Driver: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock cameras).")
       .text("port", &I::port, 200,
@@ -478,9 +470,7 @@ Group ins() {
 
 Group comparison() {
   using C = ComparisonSettings;
-  return Rows<C>(
-             "comparison", "The comparison with the INS.",
-             [](auto& c) -> auto& { return c.comparison; })
+  return Rows("comparison", "The comparison with the INS.", &Configuration::comparison)
       .number("alignment_distance_m", &C::alignment_distance_m, 1, 100000, "m",
               "Distance travelled with a valid fix after which the path is aligned with ENU.")
       .number("correlation_s", &C::correlation_s, 0.1, 3600, "s",
@@ -502,11 +492,10 @@ Group comparison() {
 Group odometry() {
   using O = OdometryOptions;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  Rows<O> rows(
-      "odometry",
-      "Motion estimation. The defaults suit road vehicles and hand-held rigs; "
-      "change one at a time.",
-      [](auto& c) -> auto& { return c.odometry; });
+  Rows<O> rows("odometry",
+               "Motion estimation. The defaults suit road vehicles and hand-held rigs; "
+               "change one at a time.",
+               &Configuration::odometry);
   rows.integer("features", &O::features, 50, 1000, "points",
                "Points tracked in each image, spread over a grid: more cost time and constrain the "
                "pose better where texture is poor.")
@@ -548,8 +537,7 @@ Group odometry() {
       .integer("seed", &O::seed, 0, kLargestSeed, "",
                "Seed of that sampling: the same seed gives the same poses.");
   return rows
-      .also(Rows<Configuration>(
-                "odometry", "", [](auto& c) -> auto& { return c; })
+      .also(Rows<Configuration>("odometry", "", whole)
                 .choice("preset", &Configuration::preset, {"default", "small"},
                         "`small`, for small boards: `odometry.features` 250, "
                         "`odometry.window_keyframes` 8, `calibration.max_frames` 100 and "
@@ -561,9 +549,8 @@ Group odometry() {
 
 Group calibration_options() {
   using C = calibration::CalibrationOptions;
-  return Rows<C>(
-             "calibration", "Online calibration of the rig; see docs/calibration.md.",
-             [](auto& c) -> auto& { return c.calibration; })
+  return Rows("calibration", "Online calibration of the rig; see docs/calibration.md.",
+              &Configuration::calibration)
       .integer("min_frames", &C::min_frames, 5, 150, "frames",
                "Moving frames before a calibration is solved; not above `max_frames`.")
       .integer("max_frames", &C::max_frames, 10, 150, "frames",
@@ -617,8 +604,7 @@ Group calibration_options() {
           "usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
           "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is `poor`. A "
           "solution with a larger one at `reference_depth_m` is not adopted.")
-      .also(Rows<Configuration>(
-                "calibration", "", [](auto& c) -> auto& { return c; })
+      .also(Rows<Configuration>("calibration", "", whole)
                 .choice("online", &Configuration::online, {"off", "on"},
                         "`off`: the rig is not monitored, and the initial calibration is used "
                         "throughout.")
@@ -628,9 +614,7 @@ Group calibration_options() {
 
 Group monitor() {
   using M = calibration::MonitorOptions;
-  return Rows<M>(
-             "monitor", "Monitoring of the calibration in use.",
-             [](auto& c) -> auto& { return c.monitor; })
+  return Rows("monitor", "Monitoring of the calibration in use.", &Configuration::monitor)
       .number("threshold", &M::threshold, 20, 500, "",
               "Test statistic that reports a knock or a drift: higher for fewer false alarms, "
               "lower for smaller knocks and faster detection.")
@@ -694,9 +678,8 @@ Group mock() {
   using M = MockSettings;
   using Kind = vergence::mock::DriveKind;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  return Rows<M>(
-             "mock", "World and vehicle of the simulated rig (docs/simulated_rig.md).",
-             [](auto& c) -> auto& { return c.mock; })
+  return Rows("mock", "World and vehicle of the simulated rig (docs/simulated_rig.md).",
+              &Configuration::mock)
       .word("world", &M::world, {"suburb"}, "Rendered world.")
       .choice("drive", &M::drive,
               {{"loop", Kind::loop},

@@ -27,7 +27,8 @@ std::string contents(const std::filesystem::path& path) {
     throw InputError(path.string() + ": no such file; check the path");
   if (std::filesystem::is_directory(status))
     throw InputError(path.string() + ": is a directory; name a YAML file");
-  if (!std::filesystem::is_regular_file(status))  // reading a pipe would wait for ever
+  // Reading a pipe would block indefinitely.
+  if (!std::filesystem::is_regular_file(status))
     throw InputError(path.string() + ": is a pipe or a device; name a YAML file");
   errno = 0;
   std::ifstream in(path, std::ios::binary);
@@ -44,7 +45,8 @@ std::string contents(const std::filesystem::path& path) {
 
 /// A scalar as it may stand in a message.
 std::string shown(const std::string& scalar) {
-  constexpr std::size_t kShown = 60;  // bytes: enough to recognise it
+  // Number of bytes that suffice to recognise the scalar.
+  constexpr std::size_t kShown = 60;
   return scalar.size() <= kShown ? scalar : fmt::format("{}…", scalar.substr(0, kShown));
 }
 

@@ -14,9 +14,11 @@ namespace vergence::app {
 
 namespace {
 
-constexpr int kNice =
-    5;  // a third of the share of a thread at 0: poses come first, and the solver still ends
-constexpr std::chrono::microseconds kSpin{20};  // a wake-up through the kernel costs 5 to 50 µs
+// The solver gets a third of the share of a thread with nice value 0: poses come first, and the
+// solver still finishes.
+constexpr int kNice = 5;
+// Spinning is worthwhile because a wake-up through the kernel takes 5 to 50 µs.
+constexpr std::chrono::microseconds kSpin{20};
 
 void relax() noexcept {
 #if defined(__x86_64__) || defined(__i386__)
@@ -28,7 +30,8 @@ void relax() noexcept {
 
 /// Returns when `counter` is no longer `old`: spins first, then sleeps.
 void await_change(const std::atomic<std::uint32_t>& counter, std::uint32_t old) noexcept {
-  constexpr int kPausesPerPoll = 32;  // about 1 µs: reading the clock is not for free
+  // Pauses of about 1 µs in total, because reading the clock has a cost.
+  constexpr int kPausesPerPoll = 32;
   const auto until = std::chrono::steady_clock::now() + kSpin;
   do {
     for (int i = 0; i < kPausesPerPoll; ++i) {
@@ -39,7 +42,8 @@ void await_change(const std::atomic<std::uint32_t>& counter, std::uint32_t old) 
   counter.wait(old, std::memory_order_acquire);
 }
 
-constexpr std::array kNames{"vergence-calib", "vergence-front", "vergence-right"};  // by Role
+// Thread names indexed by Role.
+constexpr std::array kNames{"vergence-calib", "vergence-front", "vergence-right"};
 
 }  // namespace
 

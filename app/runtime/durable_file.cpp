@@ -44,8 +44,8 @@ int synchronise_folder(const std::filesystem::path& folder) {
 
 void replace_durably(const std::filesystem::path& file, std::string_view text) {
   struct stat old {};
-  if (::stat(file.c_str(), &old) == 0 &&
-      !S_ISREG(old.st_mode))  // a device in whose place a file came would be gone for all
+  // A regular file in place of a device would remove the device for all programs.
+  if (::stat(file.c_str(), &old) == 0 && !S_ISREG(old.st_mode))
     throw InputError(file.string() + ": cannot be replaced: not a regular file; name another file");
   std::filesystem::path fresh = file;
   fresh += ".new";

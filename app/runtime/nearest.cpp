@@ -6,8 +6,8 @@ namespace vergence::app {
 
 namespace {
 
-constexpr std::size_t kLongest =
-    256;  // bytes: no key is near a word longer than this, and the cost stays bounded
+// No key is similar to a word with more bytes than this; the limit bounds the cost.
+constexpr std::size_t kLongest = 256;
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 

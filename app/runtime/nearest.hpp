@@ -47,8 +47,10 @@ namespace vergence::app {
 /// A name of an earlier version that a user may still write.
 struct Renamed {
   enum class Kind { key, value, option } kind;
-  std::string_view name;  // record.roll_mb, sync.mode bus, run --page
-  std::string_view now;   // the new name
+  // Former name, such as `record.roll_mb`, `sync.mode bus` or `run --page`.
+  std::string_view name;
+  // Current name.
+  std::string_view now;
 };
 
 [[nodiscard]] std::span<const Renamed> renamed();

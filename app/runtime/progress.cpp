@@ -16,9 +16,12 @@ namespace {
 
 constexpr Duration kBetweenRedraws = Duration::milliseconds(100);
 constexpr Duration kBetweenLines = Duration::seconds(10);
-constexpr Duration kFirstEstimate = Duration::seconds(1);  // sooner the rate is that of the start
-constexpr int kUnknownWidth = 80;                          // columns
-constexpr double kLongestLeft = 360'000;  // s, 100 hours: longer estimates tell nothing
+// Before this time the measured rate is that of the start-up.
+constexpr Duration kFirstEstimate = Duration::seconds(1);
+// Number of columns assumed if the terminal's width is unknown.
+constexpr int kUnknownWidth = 80;
+// Maximum in s (100 hours) of a remaining time that is shown.
+constexpr double kLongestLeft = 360'000;
 
 /// A code point of UTF-8 starts at every byte that does not continue one. Each takes one column
 /// here: the line holds no others.

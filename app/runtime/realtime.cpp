@@ -119,10 +119,12 @@ std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>
   });
   for (const ProcessThread& thread : threads) {
     const ThreadRole role = thread_role(thread.name);
-    if (role == ThreadRole::other) continue;  // it may still be about to get its name
+    // The thread may not have set its name yet.
+    if (role == ThreadRole::other) continue;
     const auto [at, is_new] = done_.try_emplace(thread.id, role);
     if (!is_new && at->second == role) continue;
-    at->second = role;  // the number of a thread that has ended is given again
+    // The kernel reuses the id of a thread that has ended.
+    at->second = role;
     apply(thread, &messages);
   }
   return messages;

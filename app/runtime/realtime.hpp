@@ -51,8 +51,10 @@ enum class ThreadRole : std::uint8_t {
 
 /// `realtime:` of the configuration.
 struct RealtimeRequest {
-  int priority = 0;                     // of ThreadRole::capture; 0: no thread asks for one
-  std::optional<cpu_set_t> affinity{};  // of all roles but `other` and the solver's
+  // Priority of ThreadRole::capture; 0 means that no thread is given a real-time priority.
+  int priority = 0;
+  // CPUs of all roles except `other` and the solver.
+  std::optional<cpu_set_t> affinity{};
   std::optional<cpu_set_t> solver_affinity{};
   bool lock_memory = false;
 };

@@ -12,8 +12,10 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kSigns = 3;  // of life in an interval of the watchdog
-constexpr std::chrono::nanoseconds kUnwatched = std::chrono::seconds(1);  // between two otherwise
+// Number of watchdog messages per watchdog interval.
+constexpr int kSigns = 3;
+// Interval between messages if the unit has no watchdog.
+constexpr std::chrono::nanoseconds kUnwatched = std::chrono::seconds(1);
 constexpr std::chrono::minutes kLongestClosing{10};
 constexpr const char* kMoreTime = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=60000000";
 
@@ -59,7 +61,8 @@ void ServiceManager::stopping() noexcept {
         if (ended.wait_for(lock, end, interval, [&end] { return end.stop_requested(); })) return;
       }
     });
-  } catch (const std::exception&) {  // no thread: the limits of the unit hold
+  } catch (const std::exception&) {
+    // Without a thread the limits of the unit apply.
   }
 }
 

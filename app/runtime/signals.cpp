@@ -5,7 +5,8 @@
 namespace vergence::app {
 namespace {
 
-std::atomic<int> caught{0};  // the first signal's number; all a handler may touch
+// Number of the first signal received; a signal handler may only access atomics.
+std::atomic<int> caught{0};
 std::atomic<bool> calibration_asked{false};
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
@@ -24,7 +25,8 @@ void install(int number, void (*handler)(int), bool once, struct sigaction* form
   sigemptyset(&action.sa_mask);
   action.sa_flags = static_cast<int>(static_cast<unsigned>(SA_RESTART) |
                                      (once ? static_cast<unsigned>(SA_RESETHAND) : 0U));
-  sigaction(number, &action, former);  // fails only for numbers that cannot be caught
+  // sigaction() fails only for signals that cannot be caught.
+  sigaction(number, &action, former);
 }
 
 struct Handled {
@@ -48,8 +50,8 @@ SignalGuard::SignalGuard() {
   calibration_asked.store(false);
   for (std::size_t i = 0; i < kHandled.size(); ++i)
     install(kHandled[i].number, kHandled[i].handler, kHandled[i].once, &former_[i]);
-  if (former_[0].sa_handler == SIG_IGN)  // nohup: the run is to outlive its terminal
-    install(SIGHUP, SIG_IGN, false, nullptr);
+  // Under nohup the run continues after its terminal is closed.
+  if (former_[0].sa_handler == SIG_IGN) install(SIGHUP, SIG_IGN, false, nullptr);
 }
 
 SignalGuard::~SignalGuard() {

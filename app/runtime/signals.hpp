@@ -29,7 +29,8 @@ class SignalGuard {
   [[nodiscard]] bool poll_calibration_request() const noexcept;
 
  private:
-  std::array<struct sigaction, 7> former_{};  // in the order of their installation
+  // Former actions in the order of installation.
+  std::array<struct sigaction, 7> former_{};
 };
 
 }  // namespace vergence::app

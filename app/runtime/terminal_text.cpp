@@ -81,8 +81,8 @@ std::size_t utf8_length(std::string_view text) {
   const bool overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
   const bool surrogate = first == 0xed && second >= 0xa0;
   const bool beyond = first == 0xf4 && second >= 0x90;
-  const bool nonce = first == 0xef && second == 0xbf &&
-                     static_cast<unsigned char>(text[2]) >= 0xbe;  // U+FFFE, U+FFFF are no XML
+  // U+FFFE and U+FFFF are not allowed in XML.
+  const bool nonce = first == 0xef && second == 0xbf && static_cast<unsigned char>(text[2]) >= 0xbe;
   return overlong || surrogate || beyond || nonce ? 0 : n;
 }
 

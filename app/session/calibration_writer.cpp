@@ -10,7 +10,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kPending = std::size_t{1} << 18;  // bytes: some 300 lines
+// Bytes for about 300 lines.
+constexpr std::size_t kPending = std::size_t{1} << 18;
 
 }  // namespace
 

@@ -1,7 +1,6 @@
 #include "app/session/drive_calibration.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iostream>
 #include <iterator>
@@ -27,11 +26,13 @@ namespace {
 // Depth in metres at which independent solutions are compared.
 constexpr double kComparedDepth = 20;
 constexpr const char* kInterrupted = "interrupted";
-constexpr int kMoreFeatures = 2,
-              kMaxFeatures = 1000;  // of a calibration pass, which is not bound to the frame rate
-constexpr int kObservations = 240'000;  // of a solve in the background
-constexpr std::size_t kAloneFrames =
-    40;  // of a stretch by itself, at most about: short drives, too, are to have two
+// Limits of a calibration pass, which need not keep up with the frame rate.
+constexpr int kMoreFeatures = 2, kMaxFeatures = 1000;
+// Maximum number of observations in a background solve.
+constexpr int kObservations = 240'000;
+// Approximate maximum length of an independently solved segment, so that short sequences also have
+// two.
+constexpr std::size_t kAloneFrames = 40;
 
 calibration::AcceptanceInput make_gate_input(const calibration::RigSolution& s,
                                              const StartingCalibration& given,
@@ -182,7 +183,8 @@ DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCa
   DrivePass watched = pass;
   watched.stopped = [&] { return signals.stop_requested(); };
   watched.progress = [&](std::size_t done) {
-    if (done < last) before += last;  // the next pass
+    // A smaller count means that the next pass has begun.
+    if (done < last) before += last;
     last = done;
     ProgressState state;
     state.state = "calibrating from the sequence";

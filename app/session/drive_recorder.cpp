@@ -7,7 +7,6 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/recording/session_description.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/version.hpp"
 
@@ -39,9 +38,12 @@ std::vector<std::string> recorded_names(const CalibrationFile& file) {
   return distinct_names({file.names.begin(), file.names.begin() + file.rig.cameras});
 }
 
-constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue without images
-constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
-constexpr std::size_t kPulseQueue = std::size_t{1} << 20;  // bytes
+// Bytes of a queue without images.
+constexpr std::size_t kSmall = std::size_t{4} << 20;
+// Duration in s of a disk stall that the queues absorb: 1 s more than is permitted.
+constexpr double kDiskS = 6;
+// Bytes of the queue for pulses.
+constexpr std::size_t kPulseQueue = std::size_t{1} << 20;
 
 std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
@@ -65,8 +67,8 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file) {
 std::vector<std::string> list_settings(const Configuration& c) {
   std::vector<std::string> out;
   for (auto& [key, value] : changed_settings(c)) {
-    if (key.ends_with(".mask"))  // beside the configuration, wherever the replay runs
-      value = std::filesystem::absolute(c.folder / value).string();
+    // Masks are relative to the configuration, and a replay may run in another directory.
+    if (key.ends_with(".mask")) value = std::filesystem::absolute(c.folder / value).string();
     out.push_back(key + "=" + value);
   }
   return out;
@@ -106,7 +108,8 @@ double frame_bytes(const SourceFacts& facts) {
   return bytes;
 }
 
-constexpr double kMinHeld = 16;  // frames that wait: a replay waits for room
+// Number of frames that may be queued before a replay waits for room.
+constexpr double kMinHeld = 16;
 
 /// Size of the estimator thread's queue, which holds images while the disk stalls.
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
@@ -199,7 +202,8 @@ void DriveRecorder::post_image(const RigFrame& frame, std::size_t camera) noexce
 
 void DriveRecorder::post_rig(Stamp stamp) noexcept {
   const auto cameras = static_cast<std::size_t>(rig_.cameras);
-  const std::uint64_t files = recording_.counters().files;  // before: it is in that one or a later
+  // Read before the message is posted, which then is in this file or a later one.
+  const std::uint64_t files = recording_.counters().files;
   post(tf_static_topic, stamp, [&](CdrWriter* out) {
     write_rig_transforms(out, stamp, rig_, std::span(frame_names_).first(cameras));
     rig_in_file_ = files;

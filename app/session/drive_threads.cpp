@@ -28,14 +28,16 @@ void print(const std::vector<std::string>& messages, Progress* progress) {
 
 DriveThreads::DriveThreads(const RealtimeSettings& settings)
     : realtime_(make_request(settings), system_) {
-  constexpr std::size_t kThreads = 64;  // more than a drive has, so that polling does not allocate
+  // A run has fewer threads than this, so polling does not allocate.
+  constexpr std::size_t kThreads = 64;
   threads_.reserve(kThreads);
 }
 
 void DriveThreads::lock_memory(Progress* progress) { print(realtime_.lock_memory(), progress); }
 
 void DriveThreads::poll(Progress* progress) {
-  constexpr int kAtFirst = 20, kLater = 20;  // in the first second always, then once a second
+  // Threads are examined at every poll in the first second, then once per second.
+  constexpr int kAtFirst = 20, kLater = 20;
   const int count = polls_++;
   if (count >= kAtFirst && count % kLater != 0) return;
   process_threads(&threads_);

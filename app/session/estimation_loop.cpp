@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "app/session/drive_threads.hpp"
 #include "app/session/session_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "core/memory/thread_allocations.hpp"

@@ -80,7 +80,8 @@ class EstimationLoop {
   [[nodiscard]] const Arena& comparison_arena() const noexcept { return comparison_arena_; }
 
  private:
-  struct Beat {  // for the check that the loop does not hang
+  // Progress of the loop for the hang detection.
+  struct Beat {
     std::atomic<std::uint64_t> items{0};
     std::atomic<bool> waiting{false};
   };
@@ -94,7 +95,8 @@ class EstimationLoop {
 
   FrameSource& source_;
   const SourceFacts& facts_;
-  SessionRequests* const requests_;  // null: no requests are possible
+  // Null if no requests are possible.
+  SessionRequests* const requests_;
   const ReferenceTrack reference_;
   const CameraMasks masks_;
   const EstimatorOptions options_;
@@ -113,7 +115,8 @@ class EstimationLoop {
   std::optional<Vec3> newest_position_{};
   std::atomic<bool> calibration_asked_{false}, drained_{false};
   Beat beat_;
-  bool delivering_ = false;  // a frame has come
+  // True after the first frame.
+  bool delivering_ = false;
 };
 
 }  // namespace vergence::app

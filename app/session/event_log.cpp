@@ -9,7 +9,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kWholeAgain = 100;  // frames, after which dropped work is news
+// Number of frames without dropped work after which the next drop is reported again.
+constexpr int kWholeAgain = 100;
 
 /// Events printed immediately.
 bool is_for_user(EstimatorEvent::Kind kind) noexcept {

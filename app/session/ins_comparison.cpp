@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include <nlohmann/json.hpp>
 
@@ -17,13 +16,8 @@ using Json = nlohmann::ordered_json;
 
 Json enu_alignment_json(const EnuAlignmentRecord& record) {
   const EnuAlignment& p = record.alignment;
-  Json rows = Json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) rows.push_back(p.T_enu_world.R(row, column));
-    rows.push_back(p.T_enu_world.t(row));
-  }
   return {{"stamp_ns", record.stamp.ns()},
-          {"T_enu_world", rows},
+          {"T_enu_world", matrix_json(p.T_enu_world)},
           {"fitted_over_m", p.distance},
           {"residual_m", p.residual},
           {"heading_sigma_deg", p.rotation_sigma.z() * kDegreesPerRadian}};
@@ -46,10 +40,25 @@ Json errors_json(const EnuErrors& e) {
 
 }  // namespace
 
+Json matrix_json(const Transform& T) {
+  Json matrix = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) matrix.push_back(T.R(row, column));
+    matrix.push_back(T.t(row));
+  }
+  return matrix;
+}
+
+Json ins_mount_json(const Transform& T_ins_left, const std::string& source) {
+  const Vec3 turn = boresight_of(T_ins_left.R) * kDegreesPerRadian;
+  const Vec3& arm = T_ins_left.t;
+  return {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
+          {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
+          {"source", source}};
+}
+
 Json enu_json(const EnuMetrics& metrics) {
   if (!metrics.origin) return nullptr;
-  const Vec3 turn = boresight_of(metrics.T_ins_left.R) * kDegreesPerRadian;
-  const Vec3& arm = metrics.T_ins_left.t;
   Json alignments = Json::array();
   for (const EnuAlignmentRecord& record : metrics.alignments)
     alignments.push_back(enu_alignment_json(record));
@@ -57,10 +66,7 @@ Json enu_json(const EnuMetrics& metrics) {
            {{"latitude_deg", metrics.origin->latitude_deg},
             {"longitude_deg", metrics.origin->longitude_deg},
             {"height_m", metrics.origin->height_m}}},
-          {"mount",
-           {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
-            {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
-            {"source", metrics.mount_source}}},
+          {"mount", ins_mount_json(metrics.T_ins_left, metrics.mount_source)},
           {"alignments", alignments},
           {"ins_path_m", metrics.errors.ins_path_m},
           {"errors", errors_json(metrics.errors)}};
@@ -106,7 +112,8 @@ void InsEvents::record_attitude(const InsSample& sample) noexcept {
 }
 
 void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
-  constexpr std::uint64_t kSettled = 3;  // poses: one missed reading is no event
+  // Number of consecutive poses before a change is reported, so that one missed sample is not.
+  constexpr std::uint64_t kSettled = 3;
   match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
   last_match_ = pose.ins;
   if (match_run_ != kSettled) return;
@@ -206,7 +213,8 @@ void InsComparison::finish() noexcept {
 /// of a step, which is 0.2 %. A bend of radius R is cut by L²/24R²: at 30 m, by 0.3 % in steps of
 /// 8.5 m.
 void InsComparison::measure_way(const ComparedPose& pose) noexcept {
-  constexpr double kSigmas = 4, kMin = 0.5, kMax = 20;  // m: longer ones cut corners
+  // Limits in sigmas and in m; longer sections would cut corners.
+  constexpr double kSigmas = 4, kMin = 0.5, kMax = 20;
   if (!pose.ins_valid) return;
   const Vec2 place = pose.reference.T_enu_left.t.head<2>();
   if (!std::exchange(on_way_, true)) last_place_ = place;
@@ -220,7 +228,8 @@ void InsComparison::measure_errors(const ComparedPose& pose) noexcept {
   if (!pose.compared) return;
   EnuErrors& e = errors_;
   const double across = pose.error_enu.head<2>().norm(), up = pose.error_enu.z();
-  const double turn = -pose.error_yaw * (180.0 / std::numbers::pi);  // a compass counts clockwise
+  // A compass heading increases clockwise.
+  const double turn = -pose.error_yaw * kDegreesPerRadian;
   ++e.poses;
   e.horizontal_rms_m += across * across;
   e.horizontal_max_m = std::max(e.horizontal_max_m, across);

@@ -48,6 +48,11 @@ struct EnuMetrics {
   std::string mount_source{};
 };
 
+/// Rows of [R t], as summary.json has a transform.
+[[nodiscard]] nlohmann::ordered_json matrix_json(const Transform& T);
+/// INS-to-camera extrinsics and where they were read.
+[[nodiscard]] nlohmann::ordered_json ins_mount_json(const Transform& T_ins_left,
+                                                    const std::string& source);
 /// Null without an origin.
 [[nodiscard]] nlohmann::ordered_json enu_json(const EnuMetrics& metrics);
 

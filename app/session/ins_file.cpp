@@ -20,8 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kQuaternionLength =
-    0.02;  // how far from 1: nine decimals keep it far closer, other columns rarely do
+// Maximum deviation from length 1: nine decimals are much closer, and other columns rarely are.
+constexpr double kQuaternionLength = 0.02;
 constexpr std::array<std::string_view, 4> kFixes{"none", "dead_reckoning", "fix_2d", "fix_3d"};
 constexpr std::size_t kColumns = 23;
 static_assert(std::count(kInsHeader.begin(), kInsHeader.end(), ',') + 1 == kColumns);
@@ -168,7 +168,8 @@ fs::path find_ins_file(const fs::path& path) {
 
 std::vector<InsRecord> read_ins_file(const fs::path& file) {
   std::string text = read_text(file);
-  text.resize(text.rfind('\n') + 1);  // npos + 1 is 0
+  // The file is cut after its last complete line; npos + 1 is 0.
+  text.resize(text.rfind('\n') + 1);
   Lines lines(text);
   std::string_view line;
   if (!lines.next(&line) || line != kInsHeader)

@@ -12,15 +12,13 @@
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/session/records.hpp"
-#include "app/session/session_files.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr Stamp kVirtualEpoch{
-    1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same
-                                 // stamps on every run
+// 2020-01-01 00:00 UTC, so that every run in virtual time has the same stamps.
+constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};
 
 std::vector<std::string> list_serials(const std::vector<CameraDevice*>& cameras) {
   std::vector<std::string> serials;
@@ -110,7 +108,8 @@ void LiveSource::start(std::vector<std::string>* faults) {
   const HostStamp assumed = devices_.start();
   start_acquisition(acquisition_.get(), pulse_observer_);
   begun_ = std::chrono::steady_clock::now();
-  start_ = start_ + (devices_.start() - assumed);  // in real time the simulated rig sets it now
+  // In real time the simulated rig sets its start only now.
+  start_ = start_ + (devices_.start() - assumed);
   if (devices_.mock() == nullptr) return;
   truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
   if (!truth_.empty()) write_truth(faults);
@@ -213,7 +212,8 @@ void LiveSource::finish(Progress* progress, std::vector<std::string>* /*faults*/
 void LiveSource::write_truth(std::vector<std::string>* faults) const {
   try {
     LineFile file(request_.session.out / "truth.tum");
-    constexpr std::size_t kTogether = 1000;  // lines: a tenth of what a file keeps waiting
+    // Number of lines per flush, a tenth of the file's buffer.
+    constexpr std::size_t kTogether = 1000;
     std::size_t lines = 0;
     std::string line;
     for (const StampedPose& pose : truth_) {
@@ -318,10 +318,12 @@ std::optional<ExitCode> LiveSource::verdict(Progress* progress) const {
 }
 
 ExitCode run_drive(const RunRequest& request) {
-  const SignalGuard signals;  // before a mock's world is built, which takes seconds
+  // Signals are handled before the simulated world is rendered, which takes seconds.
+  const SignalGuard signals;
   try {
     const auto source = with_plain_errors([&] { return std::make_unique<LiveSource>(request); });
-    if (const auto stopped = signals.stop_code()) return *stopped;  // devices are opened in seconds
+    // A signal may arrive while devices are opened, which takes seconds.
+    if (const auto stopped = signals.stop_code()) return *stopped;
     return run_session(*source, request.configuration, request.session, signals);
   } catch (const DeviceError&) {
     // After a stop by the user a missing device is no error.

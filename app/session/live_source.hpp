@@ -58,7 +58,8 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override;
 
  private:
-  [[nodiscard]] std::chrono::steady_clock::time_point end() const;  // with a duration
+  // Time when the run ends, if it has a duration.
+  [[nodiscard]] std::chrono::steady_clock::time_point end() const;
   void make_facts();
   void make_acquisition();
   /// An event that goes before the frame in hand. False: none is left.
@@ -72,18 +73,23 @@ class LiveSource final : public FrameSource {
   const Configuration& configuration_;
   DriveDevices devices_;
   SourceFacts facts_;
-  std::unique_ptr<ExposureControl> exposure_;  // null: exposures are fixed
-  PulseObserver* pulse_observer_ = nullptr;    // null: pulses are not recorded
+  // Null if exposures are fixed.
+  std::unique_ptr<ExposureControl> exposure_;
+  // Null if pulses are not recorded.
+  PulseObserver* pulse_observer_ = nullptr;
   std::unique_ptr<Acquisition> acquisition_;
-  Stamp start_{};  // of the drive
+  // First stamp of the run.
+  Stamp start_{};
   std::chrono::steady_clock::time_point begun_{};
   std::vector<StampedPose> truth_;
 
   // Used by the estimator's thread; read by others after it has joined.
   TimingMonitor time_;
   std::vector<bool> fault_logged_;
-  Acquired in_hand_{};    // given, or held back behind its events
-  bool waiting_ = false;  // in_hand_ is a frame that was not given yet
+  // Last item returned, or the one that waits until its events have been returned.
+  Acquired in_hand_{};
+  // True if `in_hand_` is a frame that was not returned yet.
+  bool waiting_ = false;
 };
 
 /// Drives: the cameras, INS and board of the configuration into a session folder (run_session()).

@@ -16,13 +16,13 @@ namespace vergence::app {
 
 namespace {
 
-constexpr Duration kAround =
-    Duration::seconds(1);  // readings before the first frame and after the last that are kept
-constexpr double kPublishedHeading =
-    0.3 * std::numbers::pi /
-    180;  // a mount from a calibration of three sensors, a lens whose centre is 5 px off
-constexpr double kMaxOfInterval =
-    1.5;  // one reading late by half an interval is no hole, one that is missing is
+// Samples this long before the first frame and after the last one are used.
+constexpr Duration kAround = Duration::seconds(1);
+// Heading sigma of extrinsics from a calibration of three sensors, with a principal point error of
+// 5 px.
+constexpr double kPublishedHeading = 0.3 * std::numbers::pi / 180;
+// A sample that is late by half an interval is no gap; a missing one is.
+constexpr double kMaxOfInterval = 1.5;
 
 bool has_mount(const InsSettings& ins) {
   const auto zero = [](double v) { return v == 0; };

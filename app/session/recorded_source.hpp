@@ -10,7 +10,6 @@
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"
-#include "app/session/session_files.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/memory/frame_pool.hpp"
 
@@ -58,18 +57,23 @@ class RecordedSource final : public FrameSource {
   const ReplayRequest& request_;
   const StereoSequence sequence_;
   const ReplayedIns ins_;
-  const std::size_t count_;  // frames of this replay
+  // Number of frames in this replay.
+  const std::size_t count_;
   Arena frames_arena_;
   FramePool pool_;
   SourceFacts facts_;
   std::unique_ptr<FrameDecoder> decoder_;
 
   // Used by the estimator's thread; read by others after it has joined.
-  DecodedPair pair_{};    // given, or held back behind its readings
-  bool waiting_ = false;  // pair_ was not given yet
-  bool ended_ = false;    // there are no more pairs
+  // Last pair returned, or the one that waits until its INS samples have been returned.
+  DecodedPair pair_{};
+  // True if `pair_` was not returned yet.
+  bool waiting_ = false;
+  // True if there are no more pairs.
+  bool ended_ = false;
   std::size_t next_reading_ = 0;
-  std::uint64_t unread_ = 0;  // of skipped_, those that the decoder came to
+  // Number of frames in `skipped_` that the decoder reached.
+  std::uint64_t unread_ = 0;
   std::uint64_t skipped_ = 0;
 };
 

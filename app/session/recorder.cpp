@@ -1,6 +1,5 @@
 #include "app/session/recorder.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <new>
@@ -23,7 +22,8 @@ struct Recorder::Files {
         poses(session / "poses.csv"),
         events(session / "events.jsonl"),
         all{&trajectory, &reference, &poses, &events} {
-    constexpr std::size_t kMinutes = std::size_t{16} << 20;  // bytes: readings are many
+    // Buffer in bytes for minutes of INS samples.
+    constexpr std::size_t kMinutes = std::size_t{16} << 20;
     if (options.ins) all.push_back(&ins.emplace(session / "ins.csv", kMinutes));
   }
   /// The first line of a table; empty: the file has none.
@@ -33,13 +33,15 @@ struct Recorder::Files {
   }
   LineFile trajectory, reference, poses, events;
   std::optional<LineFile> ins{};
-  bool has_reference = false;  // a line was written there
+  // True if a line was written to `reference`.
+  bool has_reference = false;
   std::vector<LineFile*> all;
 };
 
 namespace {
 
-constexpr std::size_t kLongestLine = 2048;  // bytes: an event's message may be of \u.... alone
+// Bytes of a line in which every character of an event's message is escaped as \uXXXX.
+constexpr std::size_t kLongestLine = 2048;
 
 }  // namespace
 
@@ -68,7 +70,8 @@ void Recorder::post(const Record& record) noexcept {
 }
 
 void Recorder::begin() {
-  flush();  // the heads of the tables
+  // Writes the headers of the tables.
+  flush();
   flushed_ = written_back_ = std::chrono::steady_clock::now();
   AllocationGuard::seal_thread();
 }
@@ -130,7 +133,8 @@ void Recorder::flush() {
 void Recorder::pretend(Stamp stamp) {
   const bool full = options_.disk_full(stamp);
   if (full == pretended_) return;
-  if (full) flush();  // what came before has found room
+  // Lines from before the simulated full disk are still written.
+  if (full) flush();
   pretended_ = full;
   for (LineFile* file : files_->all) file->pretend_full(full);
   retry_due_ = {};
@@ -151,7 +155,8 @@ void Recorder::record_disk(const LineFile* failed, int fault) {
   std::array<char, 256> text{};
   const auto out = text.begin();
   if (disk_full_) {
-    const char* words = ::strerrordesc_np(fault);  // strerror() may take memory
+    // strerror() may allocate.
+    const char* words = ::strerrordesc_np(fault);
     if (words == nullptr) words = "unknown error";
     report_error(
         "{}: cannot be written ({}); the session goes on and writing is tried again every "

@@ -92,7 +92,8 @@ class Recorder final : public SessionObserver {
   void pretend(Stamp stamp);
   void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
-  using ErrorMessage = std::array<char, 512>;  // ends with 0, cut at the array's end
+  // Null-terminated text, truncated at the end of the array.
+  using ErrorMessage = std::array<char, 512>;
   template <class... Arguments>
   void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
@@ -101,7 +102,8 @@ class Recorder final : public SessionObserver {
   Options options_;
   std::unique_ptr<Files> files_;
   TotalsBuilder totals_;
-  std::string line_;  // being formatted
+  // Buffer of the line that is being formatted.
+  std::string line_;
   std::size_t memory_ = 0;
   // Newest stamp of the poses.
   Stamp newest_;

@@ -59,7 +59,8 @@ bool LineFile::flush() {
 }
 
 void LineFile::write_back() noexcept {
-  (void)::sync_file_range(fd_, 0, 0, SYNC_FILE_RANGE_WRITE);  // a pipe refuses: nothing is lost
+  // sync_file_range() fails for a pipe, which has nothing to write back.
+  (void)::sync_file_range(fd_, 0, 0, SYNC_FILE_RANGE_WRITE);
 }
 
 bool LineFile::close() {
@@ -76,8 +77,10 @@ namespace {
 /// Representation of an event of the estimator in events.jsonl.
 struct EventFormat {
   const char* kind;
-  const char* opening;  // before the estimator's own words; empty: nothing
-  const char* field;    // the name of EstimatorEvent::value; null: nothing is counted
+  // Text before the estimator's message; may be empty.
+  const char* opening;
+  // JSON name of EstimatorEvent::value; null if the event has no value.
+  const char* field;
 };
 /// In the order of EstimatorEvent::Kind.
 constexpr std::array kEventFormats{

@@ -17,9 +17,10 @@ namespace {
 /// The truth that lies with the data set, for the stamps that its frames have; empty when there is
 /// none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
+  // The layouts of these formats have no ground truth.
   if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
       is_bag(request.format) || request.format == SequenceFormat::session)
-    return {};  // their layouts have no truth
+    return {};
   const bool plain = request.format == SequenceFormat::folder;
   std::error_code ignored;
   if (plain && std::filesystem::exists(request.data / "truth.tum", ignored))

@@ -1,7 +1,5 @@
 #include "app/session/session_files.hpp"
 
-#include <system_error>
-
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/background_thread.hpp"
@@ -53,14 +51,16 @@ SessionReport write_session_report(const std::filesystem::path& session) {
   try {
     report.outcome = write_report(session);
   } catch (const InputError& e) {
-    report.failure = e.what();  // the outcome stays as it is
+    // The outcome keeps its default.
+    report.failure = e.what();
   }
   return report;
 }
 
 void print_verdict(const SessionReport& report, bool quiet, Progress* progress) {
   if (!quiet) {
-    constexpr std::size_t kWidth = 110;  // columns
+    // Number of columns.
+    constexpr std::size_t kWidth = 110;
     for (const std::string& message : closing_lines(report.outcome, report.failure)) {
       std::string text;
       for (const std::string& line : wrapped(message, kWidth))

@@ -33,7 +33,8 @@ void write_session_summary(const std::filesystem::path& session, const SessionTo
 /// Result of writing report.html.
 struct SessionReport {
   ReportOutcome outcome{};
-  std::string failure{};  // why there is none; empty: it is there
+  // Reason why there is no report; empty if there is one.
+  std::string failure{};
 };
 [[nodiscard]] SessionReport write_session_report(const std::filesystem::path& session);
 

@@ -67,17 +67,24 @@ class SessionRunner {
   EstimationLoop loop_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<CalibrationWriter> calibrations_;
-  std::unique_ptr<DriveRecorder> recording_;  // null: nothing is recorded
+  // Null if nothing is recorded.
+  std::unique_ptr<DriveRecorder> recording_;
   std::vector<SessionObserver*> observers_;
 
-  ServiceManager service_;  // of the caller's thread
-  std::mutex mutex_;        // with done_, for the caller's thread that waits
+  // Used by the caller's thread only.
+  ServiceManager service_;
+  // Guards `done_` for the caller's thread, which waits on `changed_`.
+  std::mutex mutex_;
   std::condition_variable changed_;
   bool done_ = false;
-  bool folder_made_ = false;          // it was not there before
-  std::vector<std::string> removed_;  // sessions over the quota: a message each
-  bool halted_ = false;               // the caller's thread alone
-  DriveThreads threads_;              // of the caller's thread
+  // True if this session created its directory.
+  bool folder_made_ = false;
+  // One message per session that was deleted to respect the quota.
+  std::vector<std::string> removed_;
+  // Used by the caller's thread only.
+  bool halted_ = false;
+  // Used by the caller's thread only.
+  DriveThreads threads_;
 };
 
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -130,7 +137,8 @@ void SessionRunner::start_source(std::vector<std::string>* faults) {
   try {
     source_.start(faults);
   } catch (const std::exception&) {
-    halt_source();  // of the devices that did start some already bring what is recorded
+    // Devices that did start may already deliver data to the recording.
+    halt_source();
     leave_no_folder();
     throw;
   }
@@ -328,7 +336,8 @@ ExitCode SessionRunner::run() {
   Progress progress = Progress::on_stderr(request_.quiet);
   const auto allocations_before = AllocationGuard::runtime_allocations();
   print_remarks(&progress);
-  (void)::malloc_trim(0);  // what setting up took and gave back goes to the system
+  // Returns the memory that was used during set-up to the system.
+  (void)::malloc_trim(0);
   threads_.lock_memory(&progress);
   start_source(&faults);
   std::thread estimating = start_estimating();
@@ -352,7 +361,8 @@ ExitCode SessionRunner::run() {
   write_files(*totals, input, &faults, &progress);
   if (!request_.quiet) print_metrics(*totals, input, &progress);
   // The report reads the files: of a day's drive two are not held at once.
-  totals->trajectory = std::vector<StampedPose>();  // not {}, which keeps the memory
+  // Assigning {} would keep the memory.
+  totals->trajectory = std::vector<StampedPose>();
   totals->reference = std::vector<StampedPose>();
   const SessionReport report = write_session_report(request_.out);
   ExitCode code = verdict(*totals, faults, &progress);

@@ -170,7 +170,8 @@ void SessionSource::finish(Progress* progress, std::vector<std::string>* /*fault
                     "processed without "
                     "them",
                     images_missing_));
-  session_.clear_frames();  // the report is not to be written on top of them
+  // Frees memory before the report is written.
+  session_.clear_frames();
 }
 
 void SessionSource::describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,

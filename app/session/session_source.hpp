@@ -43,18 +43,24 @@ class SessionSource final : public FrameSource {
   [[nodiscard]] SourceFrame load(const RecordedFrame& frame) noexcept;
 
   const ReplayRequest& request_;
-  RecordedSession session_;  // without frames after finish()
-  const bool other_;         // another beginning than the drive's
-  const std::size_t end_;    // behind the last frame of this replay
+  // Has no frames after finish().
+  RecordedSession session_;
+  // True if the replay begins at another frame than the recorded run.
+  const bool other_;
+  // Index after the last frame of this replay.
+  const std::size_t end_;
   SourceFacts facts_;
-  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;  // of the frame in hand
+  // Images of the current frame.
+  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;
   std::atomic<bool> stopped_{false};
 
   // Used by the estimator's thread; read by others after it has joined.
   std::size_t next_frame_ = 0, next_reading_ = 0;
-  bool recalibration_reported_ = false;  // of the next frame
+  // True if the recalibration of the next frame was reported.
+  bool recalibration_reported_ = false;
   std::uint64_t images_missing_ = 0;
-  ThreadRunner reader_{BackgroundThread::Role::reader};  // decoding takes heap
+  // Decoding allocates and therefore runs in its own thread.
+  ThreadRunner reader_{BackgroundThread::Role::reader};
 };
 
 /// Returns the initial calibration of a recorded session. InputError: the recording's description

@@ -56,7 +56,8 @@ void TotalsBuilder::add(const EventRecord& e) {
 
 bool CalibrationTotals::add(const CalibrationRecord& c) {
   if (c.focal.measured_px > 0) focal = c.focal;
-  if (c.is_refinement && !c.accepted) return false;  // the drive goes on: nothing was attempted
+  // A rejected refinement changes nothing, so it does not count as an attempt.
+  if (c.is_refinement && !c.accepted) return false;
   ++(c.accepted ? accepted : rejected);
   if (attempts.size() == kMaxAttempts) attempts.erase(attempts.begin());
   const CalibrationAttempt attempt{c.stamp,          c.cause_name(),       c.reason,  c.accepted,

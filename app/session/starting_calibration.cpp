@@ -134,8 +134,8 @@ RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibratio
   RigCalibration nominal = given;
   apply_use({.length_only = true}, &nominal);
   const double length = mounted.T_camera_left[1].t.norm();
-  const double factor =
-      length > 0 ? given.baseline / length : 1;  // the user may have measured another length
+  // The user may have measured another baseline.
+  const double factor = length > 0 ? given.baseline / length : 1;
   for (std::size_t k = 1; k < static_cast<std::size_t>(nominal.cameras); ++k) {
     const Transform& T = mounted.T_camera_left[k];
     if (log_so3(T.R).norm() > options.max_rotation_deg * kRadiansPerDegree ||

@@ -21,13 +21,6 @@ constexpr double kPercent = 100.0;
 /// Times to the microsecond: what is behind it is the clock's noise.
 double ms(double value) { return std::round(value * 1e3) / 1e3; }
 
-Json distribution_json(const TimeHistogram& times) {
-  return {{"p50", ms(times.percentile(0.5))},
-          {"p99", ms(times.percentile(0.99))},
-          {"p99_9", ms(times.percentile(0.999))},
-          {"max", ms(times.max())}};
-}
-
 Json timing_json(const SessionTotals& t) {
   Json stages = {{"decode", ms(t.decode.mean())}};
   Json of_stages = {{"decode", distribution_json(t.decode)}};
@@ -89,8 +82,8 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
   Json depth = Json::object();
   for (const double z : calibration::kHealthDepths) {
     const double percent = known ? calibration::depth_error_percent(rig, z) : 0.0;
-    depth[fmt::format("{:g}", z)] =
-        percent > 0 ? Json(percent) : Json();  // 0: so near that no point is seen by both
+    // At 0 % the depth is so small that no point is visible in both cameras.
+    depth[fmt::format("{:g}", z)] = percent > 0 ? Json(percent) : Json();
   }
   return {
       {"rating", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()},
@@ -102,23 +95,16 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
 /// sigmas.
 Json limited_by(const RigCalibration& rig) {
   if (!has_sigmas(rig) || !given(rig.sigma_noise[1])) return nullptr;
-  constexpr double kDepth = 20;  // m: where the word is found
+  // Depth in m at which the limiting cause is determined.
+  constexpr double kDepth = 20;
   RigCalibration noise = rig;
-  noise.sigma_total = rig.sigma_noise;  // without their correlations: no less than it is
+  // Without correlations the depth error is not smaller than the actual one.
+  noise.sigma_total = rig.sigma_noise;
   for (Mat6& covariance : noise.covariance_total) covariance.setZero();
   noise.covariance = {};
   const double wide = calibration::depth_error_percent(rig, 1, kDepth),
                by_noise = calibration::depth_error_percent(noise, 1, kDepth);
   return by_noise * by_noise < 0.5 * wide * wide ? "intrinsics" : "noise";
-}
-
-Json matrix_json(const Transform& T) {
-  Json matrix = Json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) matrix.push_back(T.R(row, column));
-    matrix.push_back(T.t(row));
-  }
-  return matrix;
 }
 
 Json sigmas_json(const std::array<double, 6>& sigmas) {
@@ -230,9 +216,17 @@ Json truth_json(const std::optional<TruthMetrics>& truth, const SummaryInput& in
 
 }  // namespace
 
+Json distribution_json(const TimeHistogram& times) {
+  return {{"p50", ms(times.percentile(0.5))},
+          {"p99", ms(times.percentile(0.99))},
+          {"p99_9", ms(times.percentile(0.999))},
+          {"max", ms(times.max())}};
+}
+
 EvaluationOptions summary_evaluation_options() {
   EvaluationOptions options;
-  const std::vector<double> near{10, 20, 30, 40, 50};  // m
+  // Segment lengths in m.
+  const std::vector<double> near{10, 20, 30, 40, 50};
   options.segments = {SegmentOptions{}, {near, 1, false}, {near, 1, true}};
   return options;
 }

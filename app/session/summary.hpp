@@ -34,6 +34,9 @@ struct ThreadAllocationCounts {
   std::vector<std::pair<std::string, std::uint64_t>> libraries{};
 };
 
+/// Percentiles and maximum of times, in ms to the microsecond.
+[[nodiscard]] nlohmann::ordered_json distribution_json(const TimeHistogram& times);
+
 /// Input of summary.json in addition to the recorder's totals.
 struct SummaryInput {
   /// Frames that were not used: incomplete, missing or with an implausible stamp.

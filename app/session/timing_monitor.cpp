@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/devices/drive_sync.hpp"
+#include "app/session/summary.hpp"
 
 namespace vergence::app {
 namespace {
@@ -54,12 +55,10 @@ Json clock_json(const std::string& device, const ClockRecord& clock) {
 
 Json latency_json(const TimeHistogram& latency, bool is_virtual) {
   if (latency.count() == 0) return nullptr;
-  return {{"mean", rounded(latency.mean())},
-          {"p50", rounded(latency.percentile(0.5))},
-          {"p99", rounded(latency.percentile(0.99))},
-          {"p99_9", rounded(latency.percentile(0.999))},
-          {"max", rounded(latency.max())},
-          {"virtual", is_virtual}};
+  Json json = {{"mean", rounded(latency.mean())}};
+  json.update(distribution_json(latency));
+  json["virtual"] = is_virtual;
+  return json;
 }
 
 }  // namespace
@@ -103,7 +102,8 @@ TimingMonitor::Message TimingMonitor::of_set(const SyncedSet& set) noexcept {
 }
 
 TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexcept {
-  constexpr int kMany = 3;  // satellites: one more or less is not worth a word
+  // Minimum change of the satellite count that is reported.
+  constexpr int kMany = 3;
   const InsQuality& q = reading.quality;
   const int count = q.satellites;
   const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
@@ -116,9 +116,8 @@ TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexc
   std::array<char, 32> satellites{};
   if (count > 0)
     (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
-  const bool given =
-      q.status != 0 ||
-      q.filter_valid;  // a device that says nothing of its filter has no status either
+  // A device that reports no filter state has no status either.
+  const bool given = q.status != 0 || q.filter_valid;
   return message("ins_status", false, "the INS has %s%s%s", fix_name(fix_), satellites.data(),
                  !given           ? ""
                  : q.filter_valid ? ", filter valid"
@@ -126,7 +125,8 @@ TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexc
 }
 
 TimingMonitor::Message TimingMonitor::of_utc(const InsRecord& reading) noexcept {
-  constexpr double kStep = 0.1;  // s: a clock that was set
+  // Minimum clock step in s that is reported.
+  constexpr double kStep = 0.1;
   if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
   const double ahead =
       static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
@@ -201,7 +201,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                           {"pulses_missed", c.sync.missed},
                           {"pushed_out", c.sync.pushed_out},
                           {"overtaken", c.dropped_sets},
-                          {"incomplete", c.torn}}},
+                          {"frames_incomplete", c.torn}}},
                         {"cameras", cameras}};
   return {{"clocks", clocks},
           {"clock_resets", c.clock_resets},

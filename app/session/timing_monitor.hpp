@@ -17,7 +17,8 @@ namespace vergence::app {
 class TimingMonitor {
  public:
   struct Message {
-    const char* kind = nullptr;  // null: nothing to tell
+    // Null if there is nothing to report.
+    const char* kind = nullptr;
     std::array<char, 200> text{};
     bool to_user = false;
   };
@@ -45,12 +46,15 @@ class TimingMonitor {
 
   SyncMode mode_;
   bool virtual_;
-  bool ambiguous_ = false;  // the last set
+  // True if the last set was ambiguous.
+  bool ambiguous_ = false;
   TimeHistogram latency_;
-  InsQuality quality_{};  // as told last
+  // Quality reported last.
+  InsQuality quality_{};
   FixStatus fix_ = FixStatus::none;
   bool any_quality_ = false, utc_reported_ = false;
-  double reported_ahead_s_ = 0;  // of the session's stamps ahead of the INS's UTC
+  // Last reported lead of the session's stamps over the INS's UTC, in s.
+  double reported_ahead_s_ = 0;
 };
 
 }  // namespace vergence::app
