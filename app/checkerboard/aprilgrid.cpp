@@ -14,16 +14,23 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kWrongBits = 1;  // of 36; codes differ in 11
+// Number of wrong bits accepted of 36. Codes differ in at least 11 bits.
+constexpr int kWrongBits = 1;
 constexpr std::size_t kMinTags = 4;
-constexpr double kWindowOfGap = 0.4;  // half window: a wider one meets the next tag's edge
-constexpr int kNarrowestWindow = 2, kWidestWindow = 8;  // px, half windows
-constexpr double kMaxRefined = 4;                       // px: grown twice, corners lie 2.8 px in
-constexpr double kFlatToSide = 0.2;  // mean residual of a flat board: more is another layout
+// Half window over the gap between tags. A wider window meets the next tag's edge.
+constexpr double kWindowOfGap = 0.4;
+// Limits of the half window in px.
+constexpr int kNarrowestWindow = 2, kWidestWindow = 8;
+// Maximum correction in px. After growing twice, corners lie 2.8 px inside.
+constexpr double kMaxRefined = 4;
+// Maximum mean residual of a flat target over the tag's side. A larger one indicates another
+// layout.
+constexpr double kFlatToSide = 0.2;
 
 struct Tag {
   std::size_t id = 0;
-  std::array<cv::Point2f, 4> corners;  // counter-clockwise on the board
+  // The corners are counter-clockwise on the calibration target.
+  std::array<cv::Point2f, 4> corners;
 };
 
 struct DetectorDeleter {
@@ -104,8 +111,10 @@ class TagDetector {
 
 /// Numbering of tags and their corners.
 struct Layout {
-  bool from_below = true;  // tag 0 is at the lower left
-  std::size_t turn = 0;    // corner i of the detection is corner i + turn of the tag
+  // True if tag 0 is at the lower left.
+  bool from_below = true;
+  // Corner i of the detection is corner i + turn of the tag.
+  std::size_t turn = 0;
 
   [[nodiscard]] std::size_t index(const BoardPattern& board, std::size_t id,
                                   std::size_t corner) const {
@@ -153,7 +162,8 @@ BoardCorners refined(const cv::Mat& image, const BoardPattern& board, const Layo
 
 BoardCorners find_aprilgrid(const ImageView& image, const BoardPattern& board, BoardSearch search) {
   if (image.empty()) return {};
-  thread_local TagDetector detector;  // threads look at different cameras
+  // Each thread has its own detector, because threads process different cameras.
+  thread_local TagDetector detector;
   const std::size_t ids = board.corners() / 4;
   const cv::Mat pixels = to_mat(image);
   std::vector<Tag> tags = detector.detect(pixels, 1, ids);

@@ -20,8 +20,10 @@ namespace {
   throw cv::Exception(cv::Error::StsNoConv, why, "board_calibration", "", 0);
 }
 
-constexpr int kMaxRounds = 8;        // of rejecting views
-constexpr std::size_t kGroups = 10;  // of the jackknife: each costs a calibration
+// Maximum number of rounds of view rejection.
+constexpr int kMaxRounds = 8;
+// Number of jackknife groups. Each group costs one calibration.
+constexpr std::size_t kGroups = 10;
 const cv::TermCriteria kCriteria{cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-10};
 
 using Points3 = std::vector<std::vector<cv::Point3f>>;
@@ -43,13 +45,18 @@ struct Lens {
 
 /// A calibration of some of the views.
 struct Solution {
-  std::vector<Lens> lenses;              // by camera
-  std::vector<LensNumbers> lens_sigmas;  // from the residuals; 0: unknown
+  // Indexed by camera.
+  std::vector<Lens> lenses;
+  // Computed from the residuals. 0 if unknown.
+  std::vector<LensNumbers> lens_sigmas;
   std::vector<double> alone_rms;
   std::vector<Transform> T_camera_left;
-  std::vector<Transform> T_left_board;  // by view
-  std::vector<double> view_rms;         // by view
-  double rms = 0;                       // of camera 0 with camera 1; of one camera alone
+  // Indexed by view.
+  std::vector<Transform> T_left_board;
+  // Indexed by view.
+  std::vector<double> view_rms;
+  // RMS of camera 0 with camera 1, or of a single camera.
+  double rms = 0;
 };
 
 Transform transform_from(const cv::Mat& rotation, const cv::Mat& t) {
@@ -149,7 +156,8 @@ void BoardCalibrator::calibrate_alone(std::size_t camera, const std::vector<std:
                                       const Solution* start, Solution* s) const {
   Points3 object;
   Points2 image;
-  std::vector<std::size_t> at;  // positions in `used`
+  // Positions in `used`.
+  std::vector<std::size_t> at;
   for (std::size_t i = 0; i < used.size(); ++i) {
     const BoardCorners& corners = views_[used[i]].corners[camera];
     if (corners.empty()) continue;

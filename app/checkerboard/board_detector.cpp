@@ -48,7 +48,8 @@ BoardCorners find_board(const ImageView& image, const BoardPattern& board, Board
     BoardCorners corners = find_any_board(image, board, search, reference);
     return determine_a_homography(corners, board) ? corners : BoardCorners();
   } catch (const cv::Exception&) {
-    return {};  // what the detector stumbles over is no board
+    // An image on which the detector throws contains no calibration target.
+    return {};
   }
 }
 

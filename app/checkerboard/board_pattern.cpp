@@ -12,11 +12,16 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kMin = 3, kMax = 100;                             // inner corners a side
-constexpr int kMaxTagsAlong = 24, kFamily = 587;                // codes of 36h11
-constexpr double kSmallestSquare = 0.001, kLargest = 10.0;      // m
-constexpr double kNarrowest = 0.05, kWidest = 2;                // gap over the side of a tag
-constexpr double kSmallestMarker = 0.3, kLargestMarker = 0.95;  // of the side of a square
+// Limits of the number of inner corners per side.
+constexpr int kMin = 3, kMax = 100;
+// The family 36h11 has 587 codes.
+constexpr int kMaxTagsAlong = 24, kFamily = 587;
+// Limits of the square's side in m.
+constexpr double kSmallestSquare = 0.001, kLargest = 10.0;
+// Limits of the gap over the side of a tag.
+constexpr double kNarrowest = 0.05, kWidest = 2;
+// Limits of the marker's side over the side of a square.
+constexpr double kSmallestMarker = 0.3, kLargestMarker = 0.95;
 
 bool parse_whole(std::string_view text, int* value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
@@ -132,7 +137,8 @@ BoardPattern parse_charuco(const std::string& squares, double square, double mar
         fmt::format("--marker is {}; it takes the side of a marker in metres, {} to {} with this "
                     "--square",
                     marker, kSmallestMarker * square, kLargestMarker * square));
-  --board.columns, --board.rows;  // inner corners
+  // The pattern counts inner corners, not squares.
+  --board.columns, --board.rows;
   board.square = square;
   board.marker = marker;
   board.dictionary = parse_dictionary(dictionary);

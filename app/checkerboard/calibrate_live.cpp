@@ -136,7 +136,8 @@ CalibratedRig make_rig(const Configuration& c, const DriveDevices& devices) {
     rig.serials.push_back(devices.cameras()[k]->info().serial);
     rig.sizes.push_back({s.width, s.height});
   }
-  rig.names = distinct_names(rig.names);  // the files of --keep-views are called like this
+  // The files of --keep-views are named after the cameras.
+  rig.names = distinct_names(rig.names);
   return rig;
 }
 

@@ -17,8 +17,10 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kSquarePixels = 0.03;  // fx over fy from 1
-constexpr double kVagueFocal = 0.01;    // sigma over focal length
+// Maximum deviation of fx over fy from 1.
+constexpr double kSquarePixels = 0.03;
+// Sigma of the focal length over the focal length.
+constexpr double kVagueFocal = 0.01;
 
 Coverage make_coverage(const CalibrateRequest& request, const CalibrationFile& file,
                        const std::vector<ImageSize>& sizes, const std::vector<BoardView>& views,
@@ -82,7 +84,8 @@ std::size_t distinct_views(const BoardCalibration& found) {
 /// Why the views say too little of the lenses: half a message; empty: they do not.
 std::string undetermined(const BoardCalibration& found) {
   constexpr std::size_t kFewest = 4;
-  constexpr double kMaxSigma = 0.02;  // of the focal length
+  // Maximum sigma as a fraction of the focal length.
+  constexpr double kMaxSigma = 0.02;
   if (const std::size_t distinct = distinct_views(found); distinct < kFewest)
     return fmt::format(
         "only {} of {} views show the board differently; {} are the least, better 15: move and "
@@ -104,7 +107,8 @@ std::string undetermined(const BoardCalibration& found) {
 
 /// Squares of real boards have between 2 mm and half a metre.
 void remark_square(double square, Progress* progress) {
-  constexpr double kSmallest = 0.002, kLargest = 0.5;  // m
+  // Limits in m.
+  constexpr double kSmallest = 0.002, kLargest = 0.5;
   if (square < kSmallest || square > kLargest)
     progress->print(
         fmt::format("vergence: --square is {:g} m, unusually {}: it takes metres, and the baseline "
@@ -118,7 +122,8 @@ void remark_square(double square, Progress* progress) {
 BoardCalibration calibrate_with_k3(const std::vector<BoardView>& views,
                                    BoardCalibrationOptions options, BoardCalibration without,
                                    Progress* progress) {
-  constexpr double kSigmas = 5, kBetter = 0.97;  // of the residuals without
+  // Limits relative to the residuals without the change.
+  constexpr double kSigmas = 5, kBetter = 0.97;
   if (options.sixth_order || options.model != CameraModelKind::pinhole_radtan ||
       !without.error.empty())
     return without;
@@ -201,7 +206,8 @@ ExitCode calibrate_images(const CalibrateRequest& request,
       });
   progress.finish();
   for (const std::string& message : remarks) progress.print("vergence: " + message);
-  if (images.views.empty())  // a message a view would only hide the one that helps
+  // One message per view would hide the message that helps.
+  if (images.views.empty())
     throw InputError(
         fmt::format("no view has the board of {}{}; {} ({})", request.board.describe(),
                     patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.board.kind),

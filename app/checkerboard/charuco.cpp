@@ -17,14 +17,19 @@ static_assert(cv::aruco::DICT_4X4_50 == 0 &&
               cv::aruco::DICT_APRILTAG_36h11 == kMarkerDictionaries.size() - 1);
 
 constexpr std::size_t kMinMarkers = 4;
-constexpr double kMaxMisfit = 0.2;    // mean residual over a marker's side: more is another layout
-constexpr double kWindowOfGap = 0.8;  // half window: a wider one meets the marker's corner
-constexpr int kMinWindow = 2, kMaxWindow = 8;  // px, half windows
-constexpr double kMaxMoved = 0.25;             // of a square
+// Maximum mean residual over a marker's side. A larger one indicates another layout.
+constexpr double kMaxMisfit = 0.2;
+// Half window over the gap. A wider window meets the marker's corner.
+constexpr double kWindowOfGap = 0.8;
+// Limits of the half window in px.
+constexpr int kMinWindow = 2, kMaxWindow = 8;
+// Maximum correction as a fraction of a square's side.
+constexpr double kMaxMoved = 0.25;
 
 struct Markers {
   std::vector<int> ids;
-  std::vector<std::vector<cv::Point2f>> corners;  // from the upper left on, clockwise
+  // The corners start at the upper left and run clockwise.
+  std::vector<std::vector<cv::Point2f>> corners;
 
   [[nodiscard]] double mean_side() const {
     double sum = 0;
@@ -97,7 +102,8 @@ BoardCorners find_charuco(const ImageView& image, const BoardPattern& board) {
     if (ids[i] >= first_corner)
       rough.push_back(
           {static_cast<std::size_t>(ids[i] - first_corner), Vec2(corners[i].x, corners[i].y)});
-  const double side = markers.mean_side(), square = side * board.square / board.marker;  // px
+  // Sides of a marker and a square in px.
+  const double side = markers.mean_side(), square = side * board.square / board.marker;
   const int window =
       std::clamp(static_cast<int>(kWindowOfGap * (square - side) / 2), kMinWindow, kMaxWindow);
   return refine_corners(pixels, rough, window, kMaxMoved * square);

@@ -11,14 +11,17 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kLargeImage =
-    1200;  // px: from this width on squares may be too large for the detector's windows
-constexpr int kNarrowestWindow = 2, kWidestWindow = 11;  // px, half windows
-constexpr double kWindowOfSquare = 0.3;  // half window over the smallest distance of two corners
-constexpr double kBlur =
-    0.7;  // px: the refinement's interpolation shifts corners of sharper images
+// From this image width in px on, squares may be too large for the windows of the detector.
+constexpr int kLargeImage = 1200;
+// Limits of the half window in px.
+constexpr int kNarrowestWindow = 2, kWidestWindow = 11;
+// Half window over the smallest distance between two corners.
+constexpr double kWindowOfSquare = 0.3;
+// Blur in px. The interpolation of the refinement shifts corners of sharper images.
+constexpr double kBlur = 0.7;
 constexpr int kRefineSteps = 100;
-constexpr double kRefineTolerance = 1e-4;  // px
+// Tolerance in px.
+constexpr double kRefineTolerance = 1e-4;
 
 double smallest_spacing(const std::vector<cv::Point2f>& corners, const BoardPattern& board) {
   const auto n = static_cast<std::size_t>(board.columns);
@@ -40,7 +43,8 @@ bool detect(const cv::Mat& image, const BoardPattern& board, BoardSearch search,
   cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
   if (cv::findChessboardCorners(half, size, *corners, flags)) {
     for (cv::Point2f& c : *corners)
-      c = 2 * c + cv::Point2f(0.5F, 0.5F);  // centres of pixels at integers
+      // Pixel centres are at integer coordinates.
+      c = 2 * c + cv::Point2f(0.5F, 0.5F);
     return true;
   }
   return search == BoardSearch::thorough && cv::findChessboardCorners(image, size, *corners, flags);

@@ -66,7 +66,8 @@ Coverage::Stand Coverage::pose_bin(const BoardView& view) const {
   try {
     if (!cv::solvePnP(object, image, K, cv::noArray(), turn, place)) return stand;
   } catch (const cv::Exception&) {
-    return stand;  // e.g. corners that lie on a line in the image: its tilts are not known
+    // The tilts are unknown, for example if the corners lie on a line in the image.
+    return stand;
   }
   cv::Rodrigues(turn, R);
   // The board's normal away from the camera: where it leans to the right, the right edge is the

@@ -18,7 +18,8 @@ cv::Mat to_mat(const Mat3& m) {
 
 std::string format_matrix(const char* key, const cv::Mat& m) {
   std::vector<double> values(m.begin<double>(), m.end<double>());
-  for (double& v : values) v += 0.0;  // no −0
+  // Adding 0.0 turns a negative zero into a positive one.
+  for (double& v : values) v += 0.0;
   return fmt::format("{}:\n  rows: {}\n  cols: {}\n  data: {}\n", key, m.rows, m.cols,
                      number_list(values));
 }

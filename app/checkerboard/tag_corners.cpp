@@ -9,9 +9,11 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kBlur = 0.7;  // px, as for checkerboards
+// Blur in px, equal to that used for checkerboards.
+constexpr double kBlur = 0.7;
 constexpr int kRefineSteps = 100;
-constexpr double kRefineTolerance = 1e-4;  // px
+// Tolerance in px.
+constexpr double kRefineTolerance = 1e-4;
 
 }  // namespace
 

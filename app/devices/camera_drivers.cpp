@@ -91,7 +91,8 @@ class Openings {
     for (std::size_t k = 0; k < static_cast<std::size_t>(camera_count(c)); ++k) {
       const CameraSettings& camera = c.cameras[k];
       check_half(c, k);
-      if (camera.half == ImageHalf::right) continue;  // its left half stands for the camera
+      // The left half represents the camera.
+      if (camera.half == ImageHalf::right) continue;
       ++sharing_[camera.driver];
       if (!camera.serial.empty()) reserved_.emplace_back(camera.driver, camera.serial);
     }
@@ -162,8 +163,10 @@ class Openings {
   const Configuration& configuration_;
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;
   std::map<std::string, int> sharing_;
-  std::vector<OpenHalf> halves_;  // opened with the other one, not asked for yet
-  std::vector<std::pair<std::string, std::string>> reserved_;  // driver, serial
+  // Halves that were opened together with the other half and are not requested yet.
+  std::vector<OpenHalf> halves_;
+  // Pairs of driver and serial number.
+  std::vector<std::pair<std::string, std::string>> reserved_;
 };
 
 }  // namespace

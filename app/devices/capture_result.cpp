@@ -19,12 +19,16 @@ namespace vergence::app {
 
 namespace {
 
-constexpr int kSaturated = 254, kDark = 4;  // grey levels
-constexpr double kMuch = 0.5,
-                 kSome = 0.05;  // shares of an image: nothing left to see, a sky that may be lost
-constexpr double kBlack = 6, kDim = 30;  // mean, grey levels
-constexpr double kFlat = 1.5;            // contrast, grey levels: less is noise
-constexpr double kBlurred = 0.2;         // of the sharpest camera's sharpness
+// Limits in grey levels.
+constexpr int kSaturated = 254, kDark = 4;
+// Fractions of an image. kMuch leaves nothing visible, and kSome may be a saturated sky.
+constexpr double kMuch = 0.5, kSome = 0.05;
+// Limits of the mean in grey levels.
+constexpr double kBlack = 6, kDim = 30;
+// Minimum contrast in grey levels. A smaller one is noise.
+constexpr double kFlat = 1.5;
+// Minimum sharpness relative to the sharpest camera.
+constexpr double kBlurred = 0.2;
 
 ImageIssue remark(bool unusable, std::string message) { return {unusable, std::move(message)}; }
 

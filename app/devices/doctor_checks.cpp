@@ -24,7 +24,8 @@ double bytes_per_pixel(const CameraSettings& s) {
   const std::string& f = s.pixel_format;
   const auto has = [&f](const char* part) { return f.find(part) != std::string::npos; };
   if (f.empty())
-    return s.driver == "v4l2" ? 2 : 1;  // YUYV is what cameras of the USB video class have
+    // Cameras of the USB video class send YUYV.
+    return s.driver == "v4l2" ? 2 : 1;
   if (has("10P") || has("10p")) return 1.25;
   if (has("422") || has("YU") || has("VY") || has("16") || has("14") || has("12") || has("10"))
     return 2;
@@ -221,7 +222,8 @@ void check_serial_permission(const CheckContext& p, std::vector<Finding>* findin
 }
 
 void check_latency(const CheckContext& p, std::vector<Finding>* findings) {
-  constexpr int kAdvisedLatency = 16;  // ms: docs/ins.md
+  // Recommended latency in ms, see docs/ins.md.
+  constexpr int kAdvisedLatency = 16;
   for (const FoundPort* port : find_ports(p, true, false)) {
     const bool ins = port->kind == SerialKind::ins || port->kind == SerialKind::ftdi;
     if (!port->info.latency_timer_ms || !ins) continue;
@@ -280,7 +282,8 @@ namespace {
 constexpr double kBufferedImages = 8, kMinImages = 2;
 constexpr std::int64_t kMinBuffer = std::int64_t{4} << 20;
 constexpr std::int64_t kRecommendedBuffer = 10'485'760;
-constexpr int kJumbo = 9000, kStandard = 1500;  // bytes
+// Packet sizes in bytes.
+constexpr int kJumbo = 9000, kStandard = 1500;
 
 std::optional<std::uint32_t> ipv4(const std::string& text) {
   in_addr a{};
@@ -303,9 +306,12 @@ const InterfaceAddress* way_to(const Machine& m, std::uint32_t address) {
 
 /// A camera and the way to it.
 struct Reached {
-  std::string place;                          // its address
-  bool found = false;                         // it answered the broadcast
-  const InterfaceAddress* through = nullptr;  // null: in no network of this host
+  // Address of the camera.
+  std::string place;
+  // True if the camera answered the broadcast.
+  bool found = false;
+  // Null if the camera is in no network of this host.
+  const InterfaceAddress* through = nullptr;
 };
 
 std::vector<Reached> gige_cameras(const CheckContext& p) {
@@ -407,13 +413,16 @@ namespace {
 
 /// Limits of this process, where threads or memory ask for them.
 void check_limits(const CheckContext& p, std::vector<Finding>* findings) {
-  constexpr std::int64_t kLockedMemory = std::int64_t{512} << 20;  // of two cameras and threads
+  // Locked memory in bytes that two cameras and the threads need.
+  constexpr std::int64_t kLockedMemory = std::int64_t{512} << 20;
   struct Limit {
     const char* check;
     const char* key;
-    const char* name;  // in /proc/self/limits
+    // Name of the limit in /proc/self/limits.
+    const char* name;
     unsigned capability;
-    std::int64_t wanted;  // 0: not asked for
+    // 0 if the limit is not checked.
+    std::int64_t wanted;
     FindingState refused;
     std::string item;
   };

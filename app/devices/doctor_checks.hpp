@@ -49,7 +49,8 @@ struct CheckContext {
 
 // The checks by topic; each appends its findings in any order.
 void check_devices(const CheckContext& context, std::vector<Finding>* findings);
-void check_network(const CheckContext& context, std::vector<Finding>* findings);  // GigE Vision
+// Checks the network for GigE Vision cameras.
+void check_network(const CheckContext& context, std::vector<Finding>* findings);
 void check_system(const CheckContext& context, std::vector<Finding>* findings);
 
 /// The found camera that a configuration means: by serial or place; an empty serial is the next

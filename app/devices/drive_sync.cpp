@@ -94,7 +94,8 @@ void SoftwareTrigger::pace() {
     }
     due += period;
     const auto now = steady_clock::now();
-    if (now > due) due = now + period;  // a camera took long to answer: no burst to catch up
+    // After a slow answer of a camera the schedule restarts, which avoids a burst.
+    if (now > due) due = now + period;
   }
 }
 
@@ -199,7 +200,8 @@ void check_exposures(const Configuration& c, int cameras) {
 /// Default stamp jitter: the V4L2 kernel stamps by the host's clock, the
 /// others have their own.
 Duration max_jitter(const CameraSettings& s) {
-  constexpr double kOwnClock = 20, kHostClock = 1000;  // µs
+  // Uncertainties in µs.
+  constexpr double kOwnClock = 20, kHostClock = 1000;
   const double us = s.stamp_jitter_us > 0 ? s.stamp_jitter_us
                     : s.driver == "v4l2"  ? kHostClock
                                           : kOwnClock;
@@ -235,9 +237,9 @@ void fit_to_devices(const Configuration& c, const std::vector<DeviceTiming>& cam
                     SyncOptions* options) {
   for (std::size_t k = 0; k < cameras.size(); ++k)
     options->camera[k].resolution = cameras[k].resolution;
+  // Pulses of the trigger board do not wait for the host.
   options->align_start = c.cameras[0].trigger == CameraTrigger::hardware &&
-                         options->mode == SyncMode::frame_counter &&
-                         !trigger;  // the pulses do not wait for us
+                         options->mode == SyncMode::frame_counter && !trigger;
 }
 
 void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
@@ -247,7 +249,8 @@ void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
                   "nothing could prove the pairs; set sync.mode to frame_counter (not verified), "
                   "or to board with a trigger board",
                   ins_title(ins)));
-  constexpr double kBase = 400;  // Hz, over n
+  // Base frequency in Hz, divided by n.
+  constexpr double kBase = 400;
   const double nearest = kBase / std::max(1.0, std::round(kBase / c.trigger.rate));
   if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
   throw InputError(

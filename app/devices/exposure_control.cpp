@@ -10,8 +10,10 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kAlike = 0.02;      // of an exposure: what cameras round by
-constexpr double kAlikeGain = 0.15;  // dB
+// Relative difference of exposures to which cameras round.
+constexpr double kAlike = 0.02;
+// Difference of gains in dB to which cameras round.
+constexpr double kAlikeGain = 0.15;
 
 bool alike(const Duration& a, const Duration& b) noexcept {
   return std::abs(static_cast<double>((a - b).ns())) <=
@@ -60,7 +62,8 @@ ExposureCounters ExposureControl::counters() const noexcept {
 void ExposureControl::on_frame(std::size_t k, const Frame& frame) noexcept {
   if (unsupported_.load(std::memory_order_relaxed) || under_way_.load(std::memory_order_acquire))
     return;
-  if (asked_) {  // it is done: from here on images may have it
+  // The request is done, so images may use it from here on.
+  if (asked_) {
     asked_ = false;
     controller_.restart_settling();
     frames_without_.fill(0);
@@ -95,7 +98,8 @@ void ExposureControl::ask(const ExposureSetting& requested) noexcept {
     return;
   }
   under_way_.store(true, std::memory_order_release);
-  (void)requests_.push(requested);  // one at a time: there is room
+  // The queue has room, because only one request is pending at a time.
+  (void)requests_.push(requested);
   wake_.signal();
 }
 

@@ -130,7 +130,8 @@ fs::path Machine::at(const std::string& path) const {
 
 std::optional<std::string> Machine::text(const std::string& path) const {
   std::error_code error;
-  if (!fs::is_regular_file(at(path), error)) return std::nullopt;  // a pipe would make us wait
+  // Opening a pipe would block.
+  if (!fs::is_regular_file(at(path), error)) return std::nullopt;
   std::ifstream in(at(path), std::ios::binary);
   std::string all(kMaxText, '\0');
   if (!in.read(all.data(), static_cast<std::streamsize>(all.size())) && !in.eof())
@@ -212,17 +213,11 @@ namespace {
 constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
 
 /// Vendors of boards that bring USB with them, or a converter that hardly anything else has.
-constexpr std::array<std::uint16_t, 9> kBoardVendors{
-    0x2341,  // Arduino
-    0x2A03,  // Arduino (dog hunter)
-    0x16C0,  // Teensy, and others of that shared id
-    0x2E8A,  // Raspberry Pi: Pico
-    0x0483,  // STMicroelectronics: virtual COM port, ST-Link
-    0x239A,  // Adafruit
-    0x303A,  // Espressif
-    0x1B4F,  // SparkFun
-    0x1A86,  // QinHeng: the CH340 of cheap boards
-};
+/// The entries are, in order, Arduino, the dog hunter fork of Arduino, Teensy (a shared vendor
+/// identifier), Raspberry Pi (Pico), STMicroelectronics (virtual COM port, ST-Link), Adafruit,
+/// Espressif, SparkFun and QinHeng (the CH340 of cheap trigger boards).
+constexpr std::array<std::uint16_t, 9> kBoardVendors{0x2341, 0x2A03, 0x16C0, 0x2E8A, 0x0483,
+                                                     0x239A, 0x303A, 0x1B4F, 0x1A86};
 
 struct Search {
   std::vector<DeviceInfo> found;
@@ -309,7 +304,8 @@ SerialKind serial_kind(std::uint16_t vendor, std::uint16_t product) noexcept {
   const bool xsens = vendor == kFtdi && product >= 0xD388 && product <= 0xD38F;
   if (vendor == kXsens || xsens) return SerialKind::ins;
   if (vendor == kFtdi) return SerialKind::ftdi;
-  if (vendor == 0x10C4 || vendor == 0x067B) return SerialKind::converter;  // Silicon Labs, Prolific
+  // The vendors are Silicon Labs and Prolific.
+  if (vendor == 0x10C4 || vendor == 0x067B) return SerialKind::converter;
   if (std::find(kBoardVendors.begin(), kBoardVendors.end(), vendor) != kBoardVendors.end())
     return SerialKind::board;
   return SerialKind::unknown;

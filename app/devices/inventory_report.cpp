@@ -219,7 +219,8 @@ std::string remarks_text(const Inventory& inventory, const Terminal& t) {
   return text.empty() ? "" : t.in(Terminal::Ink::bold, "Not found") + "\n" + text;
 }
 
-constexpr std::size_t kState = 9, kCheck = 19;  // columns
+// Column widths in characters.
+constexpr std::size_t kState = 9, kCheck = 19;
 
 std::string state_text(FindingState state, const Terminal& t) {
   constexpr std::array kInks{Terminal::Ink::green, Terminal::Ink::yellow, Terminal::Ink::red};
@@ -282,9 +283,9 @@ std::string doctor_text(const std::vector<Finding>& findings, bool given, const 
       text += head + line + "\n";
       head = margin;
     }
+    // A command is never wrapped, because users copy it.
     for (const std::string& command : f.fix)
-      text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) +
-              "\n";  // never broken: it is copied
+      text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) + "\n";
     if (!f.fix.empty()) text += "\n";
   }
   if (!text.ends_with("\n\n")) text += "\n";

@@ -14,8 +14,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kFocalOfWidth =
-    0.72;  // of the image's width: 70° across, what machine-vision rigs on cars have
+// Fraction of the image width, a field of 70° as in machine-vision rigs on cars.
+constexpr double kFocalOfWidth = 0.72;
 
 Intrinsics read_intrinsics(const Configuration& c, const CameraSettings& camera) {
   Intrinsics lens;
@@ -140,7 +140,8 @@ ComparisonOptions comparison_options(const Configuration& c) {
   o.heading_sigma_rad = c.comparison.heading_sigma_deg * (std::numbers::pi / 180);
   o.max_gap = Duration::seconds(c.comparison.max_gap_ms * 1e-3);
   o.max_wait = Duration::seconds(c.comparison.max_wait_ms * 1e-3);
-  if (c.ins.driver == "nmea" || c.ins.driver == "ubx") {  // readings 0.1 to 1 s apart
+  // Samples of these protocols are 0.1 to 1 s apart.
+  if (c.ins.driver == "nmea" || c.ins.driver == "ubx") {
     o.max_gap = std::max(o.max_gap, Duration::seconds(1.5 / c.ins.rate));
     o.max_wait = std::max(o.max_wait, Duration::seconds(0.5 + 1.5 / c.ins.rate));
   }

@@ -15,10 +15,11 @@
 namespace vergence::app::report {
 namespace {
 
-constexpr double kAlignment =
-    100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
+// Length in m of the segment that aligns the trajectory with its reference, as with the INS.
+constexpr double kAlignment = 100.0;
 constexpr double kPercent = 100.0;
-constexpr double kWideGap = 4.0;  // frame intervals: nothing is drawn across more
+// Maximum gap in frame intervals across which a line is drawn.
+constexpr double kWideGap = 4.0;
 
 void measure_time(const Session& s, Analysis* a) {
   std::vector<double> steps;
@@ -125,7 +126,8 @@ Mat3 mean_rotation(std::span<const StampedPose> estimate, std::span<const Stampe
 
 struct Laid {
   Transform T_reference_world{};
-  double stretch = 0;  // m
+  // Length in m.
+  double stretch = 0;
   bool by_rotations = false;
 };
 
@@ -139,7 +141,8 @@ Laid lay_on(const MatchedTrajectories& m) {
   const Alignment fit = align(estimate, reference, AlignmentScale::one);
   laid.T_reference_world = {fit.R_reference_estimate, fit.t_reference_estimate};
   // Positions on a straight line, or all in one place, hold no rotation: the attitudes do.
-  constexpr double kHeld = 0.02;  // of the stretch
+  // Fraction of the segment's length.
+  constexpr double kHeld = 0.02;
   laid.by_rotations = n < 3 || fit.roll_unobservable || fit.lateral_extent < kHeld * laid.stretch;
   if (!laid.by_rotations) return laid;
   const Mat3 R = mean_rotation(estimate, reference);

@@ -134,15 +134,19 @@ struct Main {
   std::size_t frames = 0;
 };
 
-constexpr double kLong = 2.0;  // s: the motion across a shorter hole is carried on
-constexpr double kLag = 1.0;   // s: frames that are under way when a device goes
+// Duration in s. The motion across a shorter gap is extrapolated.
+constexpr double kLong = 2.0;
+// Duration in s of frames that are in transit when a device disconnects.
+constexpr double kLag = 1.0;
 
 /// Outages of one device: how many, and how long.
 struct Outages {
   std::size_t count = 0;
-  double seconds = 0, longest_s = 0;  // of those that ended
+  // Durations of the outages that ended.
+  double seconds = 0, longest_s = 0;
   Stamp first{};
-  std::optional<Stamp> open{};  // it never came back
+  // Start of an outage that never ended.
+  std::optional<Stamp> open{};
 };
 
 /// `camera 1` of `camera 1 is disconnected; …`.
@@ -178,7 +182,8 @@ std::map<std::string, Outages> outages_of(std::span<const Event> events) {
 
 /// Rejected because the one in use is as good: no reason for doubt.
 bool fits_as_well(const CalibrationRow& rejected) {
-  constexpr double kBetter = 0.9;  // of the held-out error before: clearly better
+  // Fraction of the earlier held-out error below which a result is clearly better.
+  constexpr double kBetter = 0.9;
   return rejected.held_out_before_px > 0 &&
          rejected.held_out_after_px > kBetter * rejected.held_out_before_px;
 }
@@ -192,7 +197,8 @@ constexpr double kGoodScale = 0.02, kWorstScale = 0.05;
 // Share of frames without a pose: a handful is a bump; a tenth are holes that no one can drive by.
 constexpr double kFewLost = 0.002, kManyLost = 0.10;
 constexpr double kFewDegraded = 0.05;
-constexpr double kFewOverBudget = 0.01;  // the 99th percentile is what the summary keeps
+// The summary keeps only the 99th percentile.
+constexpr double kFewOverBudget = 0.01;
 constexpr double kPercent = 100.0;
 
 std::string percent(double share) {
@@ -271,7 +277,8 @@ class Assessor {
   /// The reason of most frames that are not ok; one that is no waiting goes before, where it is
   /// that of a quarter of them or more. Of frames that were not read, the kind of most events.
   [[nodiscard]] Main main_reason() const {
-    std::array<Main, 2> most{};  // of those that do not wait, of those that do
+    // The entries are for events that do not wait and for those that do.
+    std::array<Main, 2> most{};
     for (std::size_t i = 0; i < std::min(s_.reasons.size(), a_.by_reason.size()); ++i) {
       Main& main = most[is_waiting(s_.reasons[i]) ? 1 : 0];
       if (!s_.reasons[i].empty() && a_.by_reason[i] > main.frames)
@@ -286,7 +293,8 @@ class Assessor {
 
   /// Frames that a calibration can be verified from: those that moved.
   [[nodiscard]] std::size_t moving_frames() const {
-    constexpr double kStep = 0.1;  // of the baseline; EuRoC's excerpt moves by 0.12 a frame
+    // Fraction of the baseline. The EuRoC excerpt moves by 0.12 baselines per frame.
+    constexpr double kStep = 0.1;
     const double least = kStep * number_at(s_.summary, "calibration.baseline_m").value_or(0);
     if (!(least > 0)) return a_.read;
     std::size_t count = 0;
@@ -400,8 +408,10 @@ class Assessor {
   /// The last measurement at the depth where a rig of that baseline is evaluated, if the depth is
   /// known well there.
   [[nodiscard]] const CalibrationRow* known_well_near() const {
-    constexpr double kKnown = 2.0;  // %, rated `good`
-    constexpr double kFar = 20;     // m, where the rating is evaluated
+    // Depth error in percent that is rated `good`.
+    constexpr double kKnown = 2.0;
+    // Depth in m at which the rating is evaluated.
+    constexpr double kFar = 20;
     const auto last = std::find_if(
         s_.calibrations.rbegin(), s_.calibrations.rend(),
         [](const auto& c) { return (c.accepted || c.kept) && std::isfinite(c.reference_depth_m); });
@@ -581,10 +591,14 @@ class Assessor {
 
   const Session& s_;
   const Analysis& a_;
-  const std::size_t all_;  // frames, also those that were not read
-  bool broken_ = false;    // poses are missing within a long outage: the path's length means little
-  bool unverified_ = false;  // the run ended before it could verify its calibration
-  std::array<std::vector<std::string>, 3> reasons_;  // by Grade
+  // Number of frames, including those that were not read.
+  const std::size_t all_;
+  // True if poses are missing within a long outage, so that the path length means little.
+  bool broken_ = false;
+  // True if the run ended before it could verify its calibration.
+  bool unverified_ = false;
+  // Reasons, indexed by Grade.
+  std::array<std::vector<std::string>, 3> reasons_;
   Assessment out_;
 };
 

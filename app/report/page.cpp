@@ -76,7 +76,8 @@ void error_group(const Analysis& a, MetricTable* f) {
 std::string event_time(const Session& s, Stamp stamp) {
   if (s.frames.empty()) return "";
   const Stamp first = s.frames.front().stamp;
-  constexpr double kRounds = 0.05;  // s, below it a time is printed as 0.0 without a sign
+  // Duration in s below which a time is printed as 0.0 without a sign.
+  constexpr double kRounds = 0.05;
   const double before = stamp < first ? seconds_between(stamp, first) : 0;
   return before < kRounds ? time_label(before > 0 ? 0 : seconds_between(first, stamp), 0.1)
                           : "−" + time_label(before, 0.1);
@@ -189,7 +190,8 @@ std::string calibrations_table(const Session& session) {
       "class=\"stack\"><tr><th>time, "
       "s</th><th>outcome</th><th>cause</th><th>latency</th><th>held-out "
       "RMS</th><th>depth error</th><th>reason</th></tr>\n";
-  std::vector<const CalibrationRow*> rows;  // one for all cameras: they are decided together
+  // There is one row for all cameras if they are decided together.
+  std::vector<const CalibrationRow*> rows;
   for (const CalibrationRow& c : session.calibrations)
     if (c.camera == 1) rows.push_back(&c);
   const std::size_t n = rows.size();
@@ -261,7 +263,8 @@ std::string list(const std::vector<std::string>& messages) {
 
 /// `2026-03-01 10:15:00 UTC`; empty for stamps that count from a drive's start.
 std::string format_date(Stamp stamp) {
-  constexpr std::int64_t kYear2000 = 946'684'800, kYear2200 = 7'258'118'400;  // s since 1970
+  // Seconds since 1970.
+  constexpr std::int64_t kYear2000 = 946'684'800, kYear2200 = 7'258'118'400;
   const std::int64_t seconds = stamp.ns() / 1'000'000'000;
   if (seconds < kYear2000 || seconds > kYear2200) return "";
   return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(static_cast<std::time_t>(seconds)));
@@ -406,7 +409,8 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
   for (int camera = 1; camera < kMaxCameras; ++camera) {
     if (!changed(s, camera)) continue;
     const std::string whose = camera == 1 ? "Right camera" : fmt::format("Camera {}", camera);
-    for (const int component : {0, 3, 1, 4, 2, 5})  // rotation and translation side by side
+    // Rotation and translation are shown side by side.
+    for (const int component : {0, 3, 1, 4, 2, 5})
       plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]),
                       calibration_plot(s, a, camera, component));
   }

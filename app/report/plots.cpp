@@ -15,8 +15,10 @@ namespace {
 
 /// The box of a plot: where data lies on the paper, and its axes.
 struct PlotBox {
-  double left = 58, right = kPlotWidth - 12, top = 8, bottom = kPlotHeight - 36;  // on the paper
-  double x0 = 0, x1 = 1, y0 = 0, y1 = 1;  // of the data, x0 < x1, y0 < y1
+  // Edges of the plot in the drawing.
+  double left = 58, right = kPlotWidth - 12, top = 8, bottom = kPlotHeight - 36;
+  // Range of the data, with x0 < x1 and y0 < y1.
+  double x0 = 0, x1 = 1, y0 = 0, y1 = 1;
 
   [[nodiscard]] double x(double v) const noexcept {
     return left + (v - x0) / (x1 - x0) * (right - left);
@@ -35,7 +37,9 @@ struct PlotBox {
 
 namespace {
 
-constexpr int kColumns = 740;  // of a curve, two a unit of the paper: sharp on a fine screen
+// Number of columns of a curve, two per unit of the drawing, which is sharp on high-resolution
+// screens.
+constexpr int kColumns = 740;
 
 std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
   std::vector<Line> placed;
@@ -69,7 +73,8 @@ void draw_holes(const PlotBox& box, std::span<const double> time, std::span<cons
 /// From the first frame to the last along x.
 [[nodiscard]] static PlotBox time_box(const Analysis& a) {
   PlotBox box;
-  box.x1 = a.duration_s > 0 ? a.duration_s : 1;  // never empty
+  // The range is never empty.
+  box.x1 = a.duration_s > 0 ? a.duration_s : 1;
   return box;
 }
 
@@ -82,8 +87,8 @@ Line PlotBox::line(const Line& data) const {
 
 void PlotBox::fit_y(double low, double high, bool from_zero) {
   if (from_zero) low = std::min(0.0, low);
-  const double least =
-      std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;  // what doubles can show apart
+  // Minimum range that doubles can resolve.
+  const double least = std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;
   const double air = std::max(0.06 * (high - low), least);
   y0 = from_zero && low == 0.0 ? 0.0 : low - air;
   y1 = high + air;
@@ -146,7 +151,8 @@ namespace {
 struct Lane {
   std::string name;
   const char* css;
-  std::vector<std::uint8_t> columns;  // 1: it occurred there
+  // A column is 1 if the status occurred in it.
+  std::vector<std::uint8_t> columns;
 };
 
 constexpr double kLaneHeight = 21, kBandLeft = 148;
@@ -193,7 +199,8 @@ std::vector<Lane> make_lanes(const Session& s, const Analysis& a, const PlotBox&
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
     mark(&lanes[static_cast<std::size_t>(f.status)], box, a, i);
-    if (f.state == State::lost) continue;  // that state and that status are the same frames
+    // The state and the status `lost` describe the same frames.
+    if (f.state == State::lost) continue;
     auto& lane = states[static_cast<std::size_t>(f.state)];
     if (!lane) {
       std::string name(to_string(f.state));
@@ -230,7 +237,8 @@ std::string bands_plot(const Session& session, const Analysis& analysis) {
   box.top = 2;
   const std::vector<Lane> lanes = make_lanes(session, analysis, box);
   constexpr std::size_t kStatuses = 3;
-  constexpr double kApart = 8;  // between statuses, states and events
+  // Distance between statuses, states and events.
+  constexpr double kApart = 8;
   const double events_top = box.top + kLaneHeight * static_cast<double>(lanes.size()) + 2 * kApart;
   box.bottom = events_top + kLaneHeight;
   Svg svg(kPlotWidth, box.bottom + 36,
@@ -252,7 +260,8 @@ constexpr double kMillimetres = 1e3;
 /// A value of a calibration parameter and how long it was in use.
 struct CalibrationValue {
   double from = 0, to = 0, value = 0;
-  double two_sigma = 0;  // 0: unknown
+  // 0 if unknown.
+  double two_sigma = 0;
 };
 
 struct CalibrationCurve {
@@ -278,7 +287,8 @@ CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int came
       curve.used.push_back(value);
     } else if (!c.kept) {
       curve.rejected.push_back({at, at, value.value, 0});
-    } else if (std::isfinite(c.depth_sigma_percent)) {  // else the solve came to nothing
+    } else if (std::isfinite(c.depth_sigma_percent)) {
+      // A sigma that is not finite marks a failed solve, which is not drawn.
       curve.measured.push_back(value);
     }
   }
@@ -332,7 +342,8 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
   const CalibrationCurve curve = calibration_curve(session, analysis, camera, component);
   if (curve.empty()) return {};
   PlotBox box = time_box(analysis);
-  box.left = 74;  // four decimals
+  // The left margin has room for four decimals.
+  box.left = 74;
   fit_calibration(curve, &box);
   Svg svg(kPlotWidth, kPlotHeight, "A calibration parameter over time with its 2 sigma band");
   box.draw_time_axis(&svg);
@@ -346,9 +357,10 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
 
 namespace {
 
-constexpr double kMargin = 16, kFoot = 38, kMin = 190,
-                 kMax = 420;   // of the paper; kFoot: room for the scale bar
-constexpr double kThin = 0.4;  // of the paper: finer than the line is wide
+// Sizes in the drawing. kFoot is the room for the scale bar.
+constexpr double kMargin = 16, kFoot = 38, kMin = 190, kMax = 420;
+// Distance in the drawing that is smaller than the line width.
+constexpr double kThin = 0.4;
 constexpr std::size_t kMaxPoints = 20'000;
 
 struct Bounds {
@@ -371,8 +383,8 @@ struct MapScale {
 };
 
 MapScale scale_for(const Bounds& b) {
-  constexpr double kSmallest =
-      1;  // m: a vehicle that stands still is a dot, not its noise enlarged
+  // Minimum extent in m, so that the noise of a vehicle at rest is not enlarged.
+  constexpr double kSmallest = 1;
   const double width = std::max(b.x1 - b.x0, kSmallest), depth = std::max(b.y1 - b.y0, kSmallest);
   MapScale s;
   s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
@@ -404,7 +416,8 @@ std::vector<std::uint8_t> breaks_of_ours(const Analysis& a) {
 
 /// Where the path breaks off because there was no pose, a small red mark.
 void draw_breaks(const Analysis& a, const MapScale& s, Svg* svg) {
-  constexpr double kApart = 6;  // of the paper: marks nearer than that say the same
+  // Distance in the drawing below which two marks are merged.
+  constexpr double kApart = 6;
   Point last{-1e9, -1e9};
   for (std::size_t i = 1; i < a.ours_x.size(); ++i) {
     const bool ends =

@@ -10,9 +10,11 @@ namespace vergence::app {
 
 /// Result of writing a report.
 struct ReportOutcome {
-  std::filesystem::path page{};  // SESSION/report.html
+  // The page is SESSION/report.html.
+  std::filesystem::path page{};
   report::Assessment assessment{};
-  std::vector<std::string> missing{};  // messages: files or lines that were not there, not whole
+  // Messages about files or lines that are missing or truncated.
+  std::vector<std::string> missing{};
 };
 
 /// Three closing lines for the terminal: usable or not with the reason, what to do, and the path of

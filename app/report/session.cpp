@@ -22,9 +22,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargestSummary = std::size_t{16} << 20U;  // bytes
+// Size in bytes.
+constexpr std::size_t kLargestSummary = std::size_t{16} << 20U;
 constexpr std::size_t kLongestEventLine = std::size_t{64} << 10U;
-constexpr std::size_t kLongestLine = std::size_t{1} << 20U;  // bytes; longer ones are passed over
+// Length in bytes. Longer lines are skipped.
+constexpr std::size_t kLongestLine = std::size_t{1} << 20U;
 
 /// The lines of a file one after the other as Lines gives those of a text, whatever the file's
 /// length. What follows the last line's end is left out: a killed writer leaves it, and a number
@@ -38,7 +40,8 @@ class FileLines {
     std::error_code ignored;
     const auto status = fs::status(file, ignored);
     if (fs::exists(status) && !fs::is_regular_file(status))
-      refuse(file, 0, "is no file: a folder, a pipe or a device");  // a pipe would wait for ever
+      // Reading a pipe would block indefinitely.
+      refuse(file, 0, "is no file: a folder, a pipe or a device");
     in_.open(file, std::ios::binary);
     if (!in_) refuse(file, 0, std::string("cannot be opened (") + std::strerror(errno) + ")");
   }
@@ -54,7 +57,8 @@ class FileLines {
         return false;
       }
       if (in_.bad()) return false;
-      if (in_.fail()) {  // too long
+      // The line is too long.
+      if (in_.fail()) {
         in_.clear();
         in_.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
         continue;
@@ -204,7 +208,8 @@ void read_rows(const char* file, std::size_t most, FileLines* lines, const Parse
 }
 
 constexpr std::size_t kMaxReasons = 64;
-constexpr double kFarthest = 1e7;  // m: beyond, a coordinate is damage and would flatten every plot
+// Distance in m. A larger coordinate is corrupt and would flatten every plot.
+constexpr double kFarthest = 1e7;
 
 /// Index of a word among an enum's words, the first `count` of them.
 template <class Enum>
@@ -317,7 +322,8 @@ void read_poses(const fs::path& folder, Session* session) {
     return;
   }
   const PoseColumns columns(rows);
-  constexpr std::uintmax_t kLine = 200;  // bytes, about
+  // Approximate length of a line in bytes.
+  constexpr std::uintmax_t kLine = 200;
   std::error_code error;
   if (const auto size = fs::file_size(folder / "poses.csv", error); !error)
     session->frames.reserve(std::min(kMaxFrames, static_cast<std::size_t>(size / kLine)));

@@ -95,7 +95,8 @@ std::vector<Line> decimate(std::span<const double> x, std::span<const double> y,
 std::vector<Line> thin(std::span<const double> x, std::span<const double> y,
                        std::span<const std::uint8_t> breaks, double step, std::size_t most) {
   assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && step > 0);
-  constexpr int kDoublings = 40;  // 10¹² times the first step: wider than any map
+  // The limit is 10¹² times the first step, which is wider than any map.
+  constexpr int kDoublings = 40;
   const std::vector<Piece> pieces = pieces_of(x, y, breaks);
   std::vector<Line> lines = thinned(x, y, pieces, step);
   for (int i = 0; i < kDoublings && points_in(lines) > most; ++i)
@@ -117,7 +118,8 @@ void append_escaped(std::string* out, std::string_view character) {
   *out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? " " : character;
 }
 
-constexpr double kLargestCoordinate = 1e6;  // far outside every picture
+// The limit is far outside every drawing.
+constexpr double kLargestCoordinate = 1e6;
 
 /// Least value of `steps` with at most `most` intervals over `span`; the last when none does.
 template <std::size_t N>
@@ -165,9 +167,9 @@ std::string escape(std::string_view text, std::size_t most) {
 
 std::string coordinate(double value) {
   if (!std::isfinite(value)) return "0";
+  // Adding 0.0 turns a negative zero into a positive one.
   const double v =
-      std::round(std::clamp(value, -kLargestCoordinate, kLargestCoordinate) * 10) / 10 +
-      0.0;  // + 0.0: no negative zero
+      std::round(std::clamp(value, -kLargestCoordinate, kLargestCoordinate) * 10) / 10 + 0.0;
   return v == std::floor(v) ? fmt::format("{:.0f}", v) : fmt::format("{:.1f}", v);
 }
 
@@ -194,8 +196,8 @@ std::string tick_label(double value, double step) {
   const int decimals =
       step > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6) : 2;
   const std::string text = fmt::format("{:.{}f}", std::abs(v) < step * 1e-6 ? 0.0 : v, decimals);
-  return v < 0 && text.front() == '-' ? "−" + text.substr(1)
-                                      : text;  // a minus sign of a digit's width
+  // The minus sign is as wide as a digit.
+  return v < 0 && text.front() == '-' ? "−" + text.substr(1) : text;
 }
 
 std::string time_label(double seconds, double step) {
@@ -208,7 +210,8 @@ std::string time_label(double seconds, double step) {
 }
 
 std::string duration_text(double seconds, double step) {
-  constexpr double kHour = 3600, kDay = 86400, kMax = 1e7;  // s
+  // Durations in s.
+  constexpr double kHour = 3600, kDay = 86400, kMax = 1e7;
   if (seconds > kMax) return fmt::format("{:.0f} days", seconds / kDay);
   const char* unit = seconds < 60 ? " s" : std::round(seconds) < kHour ? " min" : " h";
   return time_label(seconds, step) + unit;

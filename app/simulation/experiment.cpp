@@ -15,10 +15,12 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kMeasuredSigma = 1e-3;  // m: of the given length with `--length measured`
-constexpr double kFailedRatio =
-    1.2;  // rms above so many times what the noise explains is a failed run
-constexpr double kFailedExact = 1e-6;  // px: mean reprojection error of a failed run without noise
+// Sigma in m of the supplied length with `--length measured`.
+constexpr double kMeasuredSigma = 1e-3;
+// An RMS above this multiple of what the noise explains is a failed run.
+constexpr double kFailedRatio = 1.2;
+// Mean reprojection error in px of a failed run without noise.
+constexpr double kFailedExact = 1e-6;
 
 /// One figure of a level: of all runs that did not fail.
 class Statistic {
@@ -50,7 +52,8 @@ struct Level {
 /// Solves one problem and books what came out.
 void run_once(BundleAdjuster& adjuster, const Experiment& a, const SimulationOptions& s,
               std::uint64_t run, Level* level) {
-  Random random(a.seed, run + 1);  // a stream a run: the same geometry at every noise level
+  // Each run has its own random stream, so the geometry is equal at every noise level.
+  Random random(a.seed, run + 1);
   SimulatedRig rig = simulate_rig(s, random);
   BundleOptions options;
   options.configuration = BundleConfiguration::stereo_calibration;
@@ -145,9 +148,11 @@ ExitCode run_experiment(const Experiment& given) {
   a.simulation.generator =
       a.generator == "tight" ? SimulationGenerator::tight : SimulationGenerator::ring;
   if (a.simulation.generator == SimulationGenerator::tight)
-    a.simulation.start_points = -1;  // triangulated
+    // A negative value means that the start points are triangulated.
+    a.simulation.start_points = -1;
   std::ofstream json;
-  if (!a.json.empty()) {  // before the work, not after it
+  // The file is opened before the work, so that a bad path fails early.
+  if (!a.json.empty()) {
     json.open(a.json);
     if (!json) throw InputError("--json: " + a.json + " cannot be written; is the folder there?");
   }

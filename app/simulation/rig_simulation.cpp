@@ -8,9 +8,12 @@
 namespace vergence {
 namespace {
 
-constexpr int kWidth = 1024, kHeight = 768;  // px
-constexpr double kHalfField = M_PI / 6;      // rad: 60° across
-constexpr int kMaxTries = 1000;              // views drawn before the options count as impossible
+// Image size in px.
+constexpr int kWidth = 1024, kHeight = 768;
+// Half field of view in rad, 60° across.
+constexpr double kHalfField = M_PI / 6;
+// Maximum number of views drawn before the options count as impossible.
+constexpr int kMaxTries = 1000;
 
 Camera pinhole() {
   Intrinsics k;
@@ -23,7 +26,8 @@ Camera pinhole() {
 }
 
 Vec3 direction(Random& random) {
-  for (;;) {  // ends: each draw succeeds with probability 1 but for the null vector
+  // The loop ends, because each draw succeeds with probability 1 except for the null vector.
+  for (;;) {
     const Vec3 v(random.normal(), random.normal(), random.normal());
     if (v.norm() > 1e-6) return v.normalized();
   }
@@ -210,7 +214,8 @@ BundleCapacities capacities_for(const SimulationOptions& o) {
   const auto n = [](int v) { return static_cast<std::size_t>(v); };
   BundleCapacities c;
   c.cameras = n(o.cameras);
-  c.poses = n(o.poses) * n(o.cameras);  // as many as parallel_monocular has
+  // The count equals that of parallel_monocular.
+  c.poses = n(o.poses) * n(o.cameras);
   c.points = n(o.points);
   c.observations = n(o.poses) * n(o.cameras) * n(o.points);
   return c;
