@@ -76,7 +76,7 @@ void DisparityJumpDetector::skip(const Transform& T_now_previous) noexcept {
 }
 
 std::size_t DisparityJumpDetector::sort_into(std::span<const StereoObservation> stereo,
-                                        std::span<StereoObservation> into) noexcept {
+                                             std::span<StereoObservation> into) noexcept {
   const std::size_t n = std::min(stereo.size(), into.size());
   std::copy_n(stereo.begin(), n, into.begin());
   std::sort(into.begin(), into.begin() + static_cast<std::ptrdiff_t>(n),

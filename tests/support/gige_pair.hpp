@@ -29,7 +29,7 @@ class GigePair {
                           .serial = fmt::format("{}-{}", serial, k),
                           .sensor_width = width,
                           .sensor_height = height,
-                          .clock_drift_ppm = 25 - 60 * number,
+                          .clock_drift_ppm = 25.0 - 60.0 * number,
                           .discoverable = false,
                           .number_images = false};
       o.images = [images, k](std::uint64_t n) { return images(k, n); };

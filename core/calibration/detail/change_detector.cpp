@@ -213,7 +213,7 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   for (std::size_t b = whole; b < history_.blocks(); ++b) {
     const std::size_t oldest = open + (b + 1) * block - 1;
     visit(history_.block(b), static_cast<double>(oldest) - 0.5 * (block - 1),
-         static_cast<int>(oldest) + 1);
+          static_cast<int>(oldest) + 1);
   }
 }
 

@@ -29,9 +29,7 @@ struct Scene {
   // The true transforms, which may differ from the rig's.
   std::array<Transform, kMaxCameras> T_camera_left{};
 
-  explicit Scene(int cameras = 2)
-      : rig(vergence::test::make_rig(cameras)),
-        map(10, arena) {
+  explicit Scene(int cameras = 2) : rig(vergence::test::make_rig(cameras)), map(10, arena) {
     T_camera_left = rig.T_camera_left;
     for (int i = 0; i < kPoints; ++i) {
       MapPoint* p = map.make_point();
