@@ -1,11 +1,16 @@
 #include "core/calibration/detail/monitor_scatter.hpp"
 
-#include <cmath>
-
-#include "core/calibration/detail/evidence_history.hpp"
 #include "core/math/linear_solve.hpp"
 
 namespace vergence::calibration::detail {
+namespace {
+
+// Ratio to the expected scatter above which a block's offset is a change of the rig.
+constexpr double kMaxOfExpected = 20;
+// Length of the running mean, in blocks: half a minute at 30 Hz.
+constexpr double kMaxBlocks = 60;
+
+}  // namespace
 
 void BlockScatter::add(const Evidence& block, const Evidence& past, double lambda) noexcept {
   if (!(block.n > 0) || !(past.n > 0)) return;
@@ -14,11 +19,11 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const Vec5 d = of_block.solve(block.g) - of_past.solve(past.g);
   const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
   const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
-  if (!std::isfinite(scatter)) return;
-  // The mean is over as many blocks as the history holds.
-  constexpr auto most = static_cast<double>(EvidenceHistory::kBlocks);
-  if (blocks_ >= EvidenceHistory::kBlocks) {
-    sum_ *= (most - 1) / most;
+  const double most = kMaxOfExpected * std::max(variance(), lambda / block.n);
+  // The comparison also rejects NaN.
+  if (!(scatter < most)) return;
+  if (static_cast<double>(blocks_) >= kMaxBlocks) {
+    sum_ *= (kMaxBlocks - 1) / kMaxBlocks;
     --blocks_;
   }
   sum_ += scatter;

@@ -91,9 +91,9 @@ TEST(Calibrating, adoptionWaitsForSixConfirmingFrames) {
     EXPECT_TRUE(d.decisions[0].accepted) << d.story;
     return (d.decisions[0].stamp.ns() - 1'000'000'000) / 50'000'000;
   };
-  const std::int64_t four = decided_at(4);
-  EXPECT_EQ(decided_at(6), four + 2) << "asked for fewer than it takes: then";
-  EXPECT_EQ(decided_at(30), four + 2) << "confirmed: no waiting";
+  const std::int64_t six = decided_at(6);
+  EXPECT_EQ(decided_at(4), six) << "fewer frames confirm nothing";
+  EXPECT_EQ(decided_at(30), six) << "a confirmed solution does not wait";
 }
 
 // The frames before hold the first rig's calibration, the frames after hold another's, and no
