@@ -240,12 +240,13 @@ void print(const std::vector<Measured>& all, const Arguments& arguments, double 
       "{} "
       "threads.\nMedian of {} replays' means; images decoded beforehand, the clock runs from the "
       "decoded pair to the pose.\n"
-      "Accuracy and times are the odometry's by itself, `calibration.online: off`; the last column "
-      "has what the\nwatched rig and its calibration, on by default, make of the mean.\n"
+      "Accuracy and times are of odometry alone (`calibration.online: off`); the last column is "
+      "the "
+      "mean with monitoring and online calibration, the default.\n"
       "Reference: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the same "
       "run; only the ratio compares between machines.\n\n"
       "| data | frames posed | ATE SE(3) mm | ATE Sim(3) mm | scale | segments % | after one scale "
-      "% | and one mounting % | °/m |\n|---|---|---|---|---|---|---|---|---|\n",
+      "% | after one scale and mounting % | °/m |\n|---|---|---|---|---|---|---|---|---|\n",
       app::version(), processor(), arguments.threads, arguments.repeats);
   for (const Measured& m : all)
     fmt::print("| {} | {} of {} | {:.2f} | {:.2f} | {:.5f} | {:.3f} | {:.3f} | {:.3f} | {:.4f} |\n",
@@ -256,8 +257,8 @@ void print(const std::vector<Measured>& all, const Arguments& arguments, double 
                m.evaluation.segments[0].rotation * 180.0 / std::numbers::pi);
   fmt::print(
       "\nSegments: 0.2, 0.5, 1 m on EuRoC, 10 to 50 m on KITTI, every frame a start.\n\n| data | "
-      "mean ms | p50 | p99 | max | yardstick ms | mean / yardstick | mean ms with the rig watched "
-      "and calibrated |\n|---|---|---|---|---|---|---|---|\n");
+      "mean ms | p50 | p99 | max | reference ms | mean / reference | mean ms with online "
+      "calibration |\n|---|---|---|---|---|---|---|---|\n");
   for (const Measured& m : all)
     fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.3f} | {:.2f} |\n", m.name,
                m.mean_ms, m.p50_ms, m.p99_ms, m.max_ms, yardstick,
