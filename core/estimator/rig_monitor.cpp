@@ -108,6 +108,11 @@ void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig
 /// The next frame is compared with the points created in this one.
 void RigMonitor::map_renewed(const odometry::Map& map) noexcept {
   for (int k = 1; k < cameras_; ++k) {
+    // The next frame differs from a distorted one without a change of the rig.
+    if (camera(k).distorted) {
+      camera(k).jumps.set_reference(transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k));
+      continue;
+    }
     (void)collect_stereo(map, k, 1);
     camera(k).jumps.rebase(transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k), stereo_.span());
   }
@@ -238,7 +243,8 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
     rig.cameras_in_sync = rig.cameras_in_sync && pairing.cameras_in_sync();
     if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
     // A pose biased by a distorted image changes the disparities of the frames before and after it.
-    const bool distorted =
+    bool& distorted = camera(k).distorted;
+    distorted =
         pairing.distance_px() > kFarFromLines && pairing.distance_px() > kDistortionRatio * before;
     calibration::DisparityJump jump;
     if (both_show(outcome, k) && !distorted)

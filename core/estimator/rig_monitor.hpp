@@ -91,6 +91,8 @@ class RigMonitor {
     calibration::PairingEvidence pairing;
     // Number of frames to come whose result is at most `undecided`.
     int grace = 0;
+    // True if the newest image is distorted, for example by skewed exposures.
+    bool distorted = false;
     // Transform in the previous frame, with unlinked cameras.
     Transform T_camera_left_before;
   };
