@@ -97,7 +97,7 @@ std::size_t split(std::string_view line, char separator,
     ++count;
   };
   if (separator == ' ') {
-    // The same set of blanks separates and ends fields; otherwise a field could be empty and the
+    // One set of blanks separates and ends fields; otherwise a field could be empty and the
     // loop endless.
     for (std::size_t at = line.find_first_not_of(kBlanks); at != std::string_view::npos;
          at = line.find_first_not_of(kBlanks)) {

@@ -15,13 +15,17 @@ struct HeldOut {
   double median_px = 0;
 };
 
-/// Minimum number of held-out frames of a test.
+/// Minimum number of held-out frames of a test, and of new frames between two solves. The standard
+/// error of a mean is known to a third with six values.
 inline constexpr int kMinHeldOut = 6;
+/// Maximum numbers of held-out frames of a test and of matches of each, which bound its time.
+inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
+/// Number of standard errors by which one calibration must fit better in a single comparison.
+inline constexpr double kChance = 2.0;
 
 /// Measures the fit on frames newer than frame number `after`: at most the newest kHeldOutFrames,
 /// and at most kHeldOutMatches of each. With several additional cameras the worst one counts, in
 /// its own pixels. Pure.
-inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 [[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& rig) noexcept;
 
@@ -29,7 +33,6 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 /// over frames of the difference of medians exceeds `chance` of its standard errors. Also true if
 /// too few frames can be compared. The gains of several cameras are added, so that a knocked one
 /// outweighs one that is determined slightly less well. Pure.
-inline constexpr double kChance = 2.0;
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;

@@ -34,7 +34,8 @@ struct RigAssessment {
 /// calibration is estimated the cameras are not linked, and update_unlinked() only detects jumps.
 ///
 ///     monitor.watch(rig, solved_and_verified);  // when the map was built with it
-///     const auto verdict = monitor.update(odometry, outcome, frame);  // each posed frame
+///     // With each posed frame:
+///     const RigAssessment rig = monitor.update(odometry, outcome, frame, verified);
 ///
 /// Not thread-safe. Memory from the arena at construction. The constructor throws as Monitor's
 /// does.

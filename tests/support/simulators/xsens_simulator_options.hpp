@@ -33,7 +33,7 @@ struct XsensSimulatorOptions {
   int fix_age = 5;
   /// Share of the inertial messages that come without latitude and longitude (MTi-G-700/710).
   double missing_position = 0;
-  /// The sensor stops sending until it is told to measure again.
+  /// The sensor stops sending until it is commanded to measure again.
   std::vector<HostStamp> silences{};
   // Settings stored in the device; the simulator's own defaults when empty or zero.
   xbus::OutputConfiguration outputs{};

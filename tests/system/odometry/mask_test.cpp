@@ -42,7 +42,7 @@ class DirtyDrive {
  public:
   DirtyDrive() : drive_(brief_drive()) {
     const Intrinsics& c = drive_.rig.intrinsics[0];
-    // The same paint in both images matches at infinity.
+    // Identical paint in both images matches at infinity.
     const OwnedImage dirt = paint(c.width, c.height);
     for (std::size_t k = 0; k < 2; ++k) {
       masks_[k] = OwnedImage(c.width, c.height);

@@ -25,8 +25,8 @@ namespace {
 constexpr std::int64_t kKiB = 1024;
 
 /// Resident bytes. The estimator's arena is zero pages that a drive comes to use one after the
-/// other up to its capacity: it is told apart, with what lies beside it in one mapping. Of the
-/// large mappings the other is the mock's way, which is laid out at the start.
+/// other up to its capacity: it is measured separately, with what lies beside it in one mapping. Of
+/// the large mappings the other is the mock's way, which is laid out at the start.
 struct Resident {
   /// Resident part of large mappings without a file.
   std::int64_t arena = 0;
