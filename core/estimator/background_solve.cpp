@@ -28,7 +28,7 @@ void BackgroundSolve::start(const calibration::TrackLog& log, const Start& start
   running_ = true;
   discarded_ = false;
   frames_since_start_ = 0;
-  next_turn_ = std::min(calibration::kMinHeldOut, options_.calibration.adopt_after);
+  next_turn_ = std::min(kMinForMean, options_.calibration.adopt_after);
   runner_.start(TaskRef(task_));
 }
 
@@ -60,7 +60,7 @@ bool BackgroundSolve::last_turn() const noexcept {
 }
 
 void BackgroundSolve::postpone() noexcept {
-  next_turn_ = std::min(next_turn_ + calibration::kMinHeldOut, options_.calibration.adopt_after);
+  next_turn_ = std::min(next_turn_ + kMinForMean, options_.calibration.adopt_after);
 }
 
 void BackgroundSolve::finish() noexcept {

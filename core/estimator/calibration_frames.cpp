@@ -86,11 +86,11 @@ bool CalibrationFrames::enough() const noexcept { return logged_ >= wanted_ && e
 bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= min_to_solve(); }
 
 bool CalibrationFrames::new_since_solve() const noexcept {
-  return log_.size() >= solved_frames_ + calibration::kMinHeldOut;
+  return log_.size() >= solved_frames_ + kMinForMean;
 }
 
 void CalibrationFrames::want(std::size_t frames) noexcept {
-  wanted_ = std::max(std::min(most(), frames), logged_ + calibration::kMinHeldOut);
+  wanted_ = std::max(std::min(most(), frames), logged_ + kMinForMean);
 }
 
 std::size_t CalibrationFrames::most() const noexcept {
@@ -99,7 +99,7 @@ std::size_t CalibrationFrames::most() const noexcept {
 
 std::size_t CalibrationFrames::min_to_solve() const noexcept {
   // With the held-out frames, a supplied calibration is evaluated as soon as a new one is solved.
-  return least() - std::min<std::size_t>(least(), calibration::kMinHeldOut);
+  return least() - std::min<std::size_t>(least(), kMinForMean);
 }
 
 std::size_t CalibrationFrames::least() const noexcept {

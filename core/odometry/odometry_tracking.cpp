@@ -16,8 +16,6 @@ namespace {
 constexpr double kMinSampleShare = 0.2;
 // Maximum rms residual in px, however many points agree; on a motorway wrong poses have such ones.
 constexpr double kSampleResidual = 3.0;
-// Number of rig frames, so four images, before a point constrains poses.
-constexpr std::uint16_t kFoundEnough = 2;
 
 /// True if the pose of the sample is accurate enough to follow all points from it.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
@@ -171,7 +169,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     if (p.now.cameras != 0) {
       p.missed = 0;
       if (p.found < std::numeric_limits<std::uint16_t>::max()) ++p.found;
-      if (p.stage == PointStage::candidate && p.found >= kFoundEnough) p.stage = PointStage::active;
+      if (p.stage == PointStage::candidate && p.found >= kMinFound) p.stage = PointStage::active;
       continue;
     }
     ++p.missed;

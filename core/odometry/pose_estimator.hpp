@@ -6,8 +6,6 @@
 
 namespace vergence::odometry {
 
-/// Share of what is expected above which evidence counts: a majority.
-inline constexpr double kMajority = 0.5;
 /// Minimum number of inliers that do not agree by chance. Three points determine a pose; five more
 /// of thirty, found within 32 px, agree with it to half a pixel once in 10¹⁰ hypotheses.
 inline constexpr int kMinAgreeing = 8;
