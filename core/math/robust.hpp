@@ -32,6 +32,9 @@ inline constexpr double kUnusualRatio = 3.0;
 inline constexpr std::size_t kMinTracksOfFrame = 25;
 /// Share of what is expected above which evidence counts: a majority.
 inline constexpr double kMajority = 0.5;
+/// Minimum number of inliers that do not agree by chance. Three points determine a pose; five more
+/// of thirty, found within 32 px, agree with it to half a pixel once in 10¹⁰ hypotheses.
+inline constexpr int kMinAgreeing = 8;
 /// χ² of two coordinates at 99 %.
 inline constexpr double kChi2OfPixel = 9.21;
 

@@ -26,7 +26,7 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   const StereoEstimate e = initialiser_.estimate(matches, rig_);
   clock.mark(Stage::match);
   out->reason = n < options_.min_inliers ? Reason::needs_texture : Reason::uncalibrated;
-  if (!e.found || e.inliers < options_.min_inliers || e.inliers < kRigidShare * n) return false;
+  if (!e.found || e.inliers < options_.min_inliers || e.inliers < kMajority * n) return false;
   // If all points are far away, the direction of t is not determined and depths would be arbitrary.
   if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
     out->reason = Reason::needs_near_structure;
@@ -51,7 +51,7 @@ bool Odometry::start_map(const Transform& T_left_world, Stamp stamp, FrameOutcom
     out->reason = Reason::cameras_swapped;
   else if (!stereo.evidence.fits() || stereo.matched < options_.min_inliers)
     out->reason = Reason::no_stereo_matches;
-  else if (stereo.near < kNearEnough)
+  else if (stereo.near < kMinAgreeing)
     out->reason = Reason::weak_geometry;
   else {
     map_.clear();

@@ -12,8 +12,6 @@
 namespace vergence::odometry {
 namespace {
 
-// Maximum ratio of matches to inliers; wrong matches agree by chance.
-constexpr int kByChance = 4;
 
 }  // namespace
 
@@ -171,7 +169,7 @@ PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
 }
 
 bool PoseEstimator::supports_camera(const Solved& s) const noexcept {
-  return s.inliers >= kCameraAlone && kByChance * s.inliers >= static_cast<int>(owner_.size());
+  return s.inliers >= kCameraAlone && s.inliers >= kChanceShare * static_cast<double>(owner_.size());
 }
 
 bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start,

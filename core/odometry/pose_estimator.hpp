@@ -6,9 +6,10 @@
 
 namespace vergence::odometry {
 
-/// Minimum number of inliers that do not agree by chance. Three points determine a pose; five more
-/// of thirty, found within 32 px, agree with it to half a pixel once in 10¹⁰ hypotheses.
-inline constexpr int kMinAgreeing = 8;
+/// Share of the found points that may agree with a wrong pose: 0.05 if it follows a moving object,
+/// and a quarter of the far points with a wrong calibration. With the right pose and rig it is 0.5
+/// to 0.9.
+inline constexpr double kChanceShare = 0.25;
 /// Minimum number of inliers of a pose that only one camera's observations, or rough matches,
 /// support; a few more than agree by chance.
 inline constexpr int kCameraAlone = 12;
