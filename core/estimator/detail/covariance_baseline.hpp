@@ -26,12 +26,13 @@ class CovarianceBaseline {
   [[nodiscard]] bool measurable(double step_m, double sigma_m) const noexcept {
     return step_m > kCertainSigmas * (known() ? median() : sigma_m);
   }
-  [[nodiscard]] bool unusual(double sigma_m) noexcept {
+  /// Adds a motion. Returns true if it is unusually uncertain; it does not enter the baseline then.
+  [[nodiscard]] bool update(double sigma_m) noexcept {
     recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
     ratio_ = known() ? sigma_m / median() : 0;
     const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
-    unusual_ =
-        ratio_ > kUnusualRatio || (unusual_ && std::sqrt(squares / kRecent) > kUnusualRatio * median());
+    unusual_ = ratio_ > kUnusualRatio ||
+               (unusual_ && std::sqrt(squares / kRecent) > kUnusualRatio * median());
     if (unusual_) return true;
     sigma_[next_] = sigma_m;
     next_ = (next_ + 1) % kKept;
@@ -39,14 +40,14 @@ class CovarianceBaseline {
     return false;
   }
 
-  /// Sigma of the last motion over the one that is unusual; 0 with too few motions to have one.
+  /// Sigma of the last motion over the limit of a usual one; 0 while there are too few motions.
   [[nodiscard]] double margin() const noexcept { return ratio_ / kUnusualRatio; }
 
  private:
   // Numbers of motions in the baseline and in the test for the end.
   static constexpr std::size_t kKept = 61, kRecent = 3;
 
-  // The median is known, once a quarter of the motions is, to half a sigma's scatter.
+  // A quarter of the motions determines the median well enough.
   [[nodiscard]] bool known() const noexcept { return kept_ >= kKept / 4; }
 
   [[nodiscard]] double median() const noexcept {
