@@ -14,8 +14,6 @@ namespace {
 
 // Maximum sigma of the direction of t for a start, in rad.
 constexpr double kWorstDirection = 0.1;
-// Maximum sigma of the rotation for a start, in rad.
-constexpr double kWorstRotation = 0.01;
 
 }  // namespace
 
@@ -26,9 +24,9 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   const StereoEstimate e = initialiser_.estimate(matches, rig_);
   clock.mark(Stage::match);
   out->reason = n < options_.min_inliers ? Reason::needs_texture : Reason::uncalibrated;
-  if (!e.found || e.inliers < options_.min_inliers || e.inliers < kMajority * n) return false;
+  if (!e.found || e.inliers < options_.min_inliers || e.inliers < kRigidShare * n) return false;
   // If all points are far away, the direction of t is not determined and depths would be arbitrary.
-  if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
+  if (!(e.direction_sigma < kWorstDirection)) {
     out->reason = Reason::needs_near_structure;
     return false;
   }

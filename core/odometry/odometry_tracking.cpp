@@ -49,7 +49,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     fit = this->fit(*a.start, true);
     clock.mark(Stage::pose);
     if (sample_agrees(fit, kChanceShare) && fit.inliers > best.inliers) best = fit;
-    if (sample_agrees(fit, kMajority)) break;
+    if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
   bool unreliable = frames_lost_ > 0 || out->gap_s > 0;
@@ -64,7 +64,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   front_end_.follow_all(map_, coarse);
   clock.mark(Stage::track);
   fit = this->fit(coarse, false);
-  if (!fit.found || fit.inliers < kMajority * fit.given) fit = this->fit(coarse, true);
+  if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
   // Facades look alike: a place is recognised only if most points in view are found.
   if (unreliable && fit.inliers < kMajority * points_in_view(fit.T_left_world)) fit.found = false;
   // If they stayed active, they would count as missing in the next attempt.
@@ -176,7 +176,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     else if (p.missed > kMissesAllowed)
       p.stage = PointStage::dormant;
   }
-  const bool few_fit = fit.inliers < kMajority * fit.given, few_kept = kept < kMajority * tried;
+  const bool few_fit = fit.inliers < kRigidShare * fit.given, few_kept = kept < kMajority * tried;
   const bool others = (few_fit || few_kept) && poses_.others_move(map_, fit.T_left_world);
   others_move_ = few_fit && others;
   new_points_.add(tried, others ? kept : tried);

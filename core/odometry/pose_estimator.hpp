@@ -10,6 +10,9 @@ namespace vergence::odometry {
 /// and a quarter of the far points with a wrong calibration. With the right pose and rig it is 0.5
 /// to 0.9.
 inline constexpr double kChanceShare = 0.25;
+/// Minimum share of found points that agree with the pose; below it something else moves. A half
+/// loses three frames of `sand_rover` in a mirror.
+inline constexpr double kRigidShare = 0.4;
 /// Minimum number of inliers of a pose that only one camera's observations, or rough matches,
 /// support; a few more than agree by chance.
 inline constexpr int kCameraAlone = 12;

@@ -1,4 +1,5 @@
 #include "core/calibration/gates.hpp"
+#include "core/math/robust.hpp"
 
 #include <gtest/gtest.h>
 
