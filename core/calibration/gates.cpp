@@ -22,7 +22,7 @@ namespace {
 constexpr double kSuppliedYaw = 1e-3, kOtherYaw = 15e-3;
 // Prior probability that a supplied calibration is not the rig's, and rate of wrong decisions about
 // it; both are chosen.
-constexpr double kErrorRate = 0.01;
+constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
 // Minimum path length of a solve, in baselines.
 constexpr double kMinBaselinesTravelled = 3.0;
 
@@ -174,7 +174,7 @@ double current_percent(const RigCalibration& current, int k, double depth,
 Assessment assess(const RigCalibration& measured, const RigCalibration& current,
                   CalibrationOrigin source, const TrackLog& log, std::uint64_t after,
                   const CalibrationOptions& o, double pixel_sigma) noexcept {
-  const double before = std::log(kErrorRate / (1 - kErrorRate)),
+  const double before = std::log(kOtherBefore / (1 - kOtherBefore)),
                certain = std::log((1 - kErrorRate) / kErrorRate);
   Assessment a;
   a.verified = true;
