@@ -104,10 +104,9 @@ TEST(StateFile, stateOfOtherRigIsRefusedWithReason) {
     void (*of)(CalibrationFile*);
   };
   for (const Change& c : {
-           Change{"serial \"102\", the one that is there \"103\"",
+           Change{"serial \"102\", the connected one \"103\"",
                   [](CalibrationFile* f) { f->serials[1] = "103"; }},
-           Change{"2 cameras, the configuration has 3",
-                  [](CalibrationFile* f) { f->rig.cameras = 3; }},
+           Change{"2 cameras, the configuration 3", [](CalibrationFile* f) { f->rig.cameras = 3; }},
            Change{"640 x 480", [](CalibrationFile* f) { f->rig.intrinsics[0].width = 1280; }},
            Change{
                "rig.nominal.baseline_m was 0.75, it is 0.7512 now",

@@ -71,7 +71,7 @@ TEST(Configuration, impossibleValuesAreRefusedWithPlace) {
            {"threads: []", "takes one value"},
            {"odometry: 3", "is a group of keys"},
            {"[1, 2]", "is not a configuration"},
-           {long_name, "longer than 64 bytes"},
+           {long_name, "longer than the limit of 64 bytes"},
            {"odometry: {min_inliers: 60, ok_inliers: 50}",
             "odometry.ok_inliers (50) is below odometry.min_inliers (60)"},
            {"cameras: [{serail: a}]", "drive.yaml:1: unknown key \"cameras.0.serail\""},

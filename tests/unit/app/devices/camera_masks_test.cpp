@@ -69,18 +69,12 @@ TEST(CameraMasks, unusableMasksAreRefused) {
   ASSERT_TRUE(cv::imwrite((folder / "photo.jpg").string(),
                           cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255))));
   const std::string at = "cameras.1.mask: " + folder.path().string() + "/";
-  EXPECT_EQ(
-      refusal(folder.path(), "small.pgm"),
-      at + "small.pgm is 40 × 30 px, the camera's images are 80 × 60; draw it on one of them");
-  EXPECT_EQ(refusal(folder.path(), "torn.pgm"),
-            at + "torn.pgm is torn: it ends before the image is complete, or its check sums fail");
-  EXPECT_EQ(refusal(folder.path(), "black.pgm"),
-            at + "black.pgm is 0 everywhere: nothing of the image is left; 0 hides, any other "
-                 "value shows");
+  EXPECT_EQ(refusal(folder.path(), "small.pgm"),
+            at + "small.pgm is 40 × 30 px, but the camera's images are 80 × 60 px");
+  EXPECT_EQ(refusal(folder.path(), "torn.pgm"), at + "torn.pgm is truncated or damaged");
+  EXPECT_EQ(refusal(folder.path(), "black.pgm"), at + "black.pgm is 0 everywhere");
   for (const std::string name : {"text.pgm", "huge.pgm", "headless.pgm", "photo.jpg"})
-    EXPECT_EQ(
-        refusal(folder.path(), name),
-        at + name + " is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
+    EXPECT_EQ(refusal(folder.path(), name), at + name + " is not a mask; use a PNG or binary PGM");
   EXPECT_EQ(refusal(folder.path(), "nowhere.png"), "cameras.1.mask: nowhere.png is missing");
 }
 

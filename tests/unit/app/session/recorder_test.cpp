@@ -83,7 +83,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   EventRecord event;
   event.stamp = Stamp(kStamp);
   event.kind = "image_truncated";
-  event.set_message("left/\"a\"\n\xff.png is torn");
+  event.set_message("left/\"a\"\n\xff.png is truncated");
   event.fields[0] = {"frame", std::int64_t{7}};
   event.fields[1] = {"seconds", 0.5};
   event.fields[2] = {"rating", "late"};
