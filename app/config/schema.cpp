@@ -267,7 +267,8 @@ std::vector<std::pair<std::string, SyncMode>> sync_modes() {
 Group rig() {
   using R = RigSettings;
   return Rows("rig", "The rig as a whole.", &Configuration::rig)
-      .text("name", &R::name, 64, "Name of the rig in the calibration.yaml that a session writes.")
+      .text("name", &R::name, 64,
+            "Name of the rig in `calibration.yaml` and in the path of the state file.")
       .number("nominal.baseline_m", &R::baseline_m, 0.02, 10, "m",
               "Distance of the right camera from the left one, to its right.")
       .number("nominal.focal_px", &R::focal_px, 0, 20000, "px",
@@ -318,9 +319,8 @@ Group cameras() {
                 {{"hardware", CameraTrigger::hardware},
                  {"software", CameraTrigger::software},
                  {"free", CameraTrigger::free}},
-                "Trigger source: `hardware`, a pulse at its input; `software`, a command "
-                "at `trigger.rate`; `free`, its own "
-                "clock. All cameras alike.")
+                "Trigger source: `hardware`, a pulse at its input; `software`, a command at "
+                "`trigger.rate`; `free`, its own clock. Equal for all cameras.")
             .options("options", &C::options, 400,
                      "Options of this driver (drivers/*/README.md): `NAME=VALUE …`, or "
                      "a group: "
@@ -512,8 +512,8 @@ Group odometry() {
               "Standard deviation of a tracked corner per coordinate at full resolution; scales "
               "all residuals.")
       .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
-              "Added to it (in quadrature) for a patch seen from one depth further to the side "
-              "than where it was cut: its slope is unknown.")
+              "Added in quadrature to `pixel_sigma`, times the sideways motion since the patch was "
+              "extracted divided by its depth, because the slope of the surface is unknown.")
       .number("huber", &O::huber, 1, 10, "sigmas", "Huber threshold of the residuals.")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
                "Keyframes in the sliding window.")
