@@ -117,8 +117,7 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
   };
   constexpr std::string_view kIndentation =
       "the indentation does not match the lines above; indent the keys of a group, and the items "
-      "of "
-      "a list, by the same number of spaces";
+      "of a list, by the same number of spaces";
   constexpr std::string_view kOpen =
       "a `{` or `[` is not closed, or a comma is missing; close it, and separate its items by "
       "commas";
@@ -136,9 +135,10 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
       Explanation{"illegal flow end", "a `}` or `]` that nothing opens; remove it"},
       Explanation{"the referenced anchor is not defined",
                   "a value that begins with `*` is a reference; put the value in quotes"},
-      Explanation{"unknown token",
-                  "a value begins with a character that YAML reserves (`@`, `%`, `` ` ``); put the "
-                  "value in quotes"}};
+      Explanation{
+          "unknown token",
+          "a value begins with a character that YAML reserves, such as @ or %; put the value "
+          "in quotes"}};
   if (!error.mark.is_null()) {
     const std::string line = line_of(text, error.mark.line);
     if (line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos)
