@@ -242,7 +242,7 @@ TEST(RigSynchronizer, freeRunningImagesArePairedByTime) {
   Random random(5);
   std::uint64_t complete = 0;
   std::vector<HostStamp> stamps;
-  const auto offer = [&](const SyncFrame& f) {
+  const auto offer_and_collect = [&](const SyncFrame& f) {
     for (const SyncedSet& set : offer(&sync, f)) {
       complete += set.complete ? 1 : 0;
       stamps.push_back(set.stamp);
@@ -255,8 +255,8 @@ TEST(RigSynchronizer, freeRunningImagesArePairedByTime) {
   for (std::uint64_t n = 0; n < 200; ++n) {
     // The cameras rest for five seconds.
     const double at = n < 15 ? 50.0 * static_cast<double>(n) : 50.0 * static_cast<double>(n) + 5013;
-    offer(timed(0, n, at));
-    if (n != 7) offer(timed(1, n + 1000, at + random.uniform(-2.5, 2.5)));
+    offer_and_collect(timed(0, n, at));
+    if (n != 7) offer_and_collect(timed(1, n + 1000, at + random.uniform(-2.5, 2.5)));
   }
   EXPECT_EQ(complete, 199U);
   EXPECT_EQ(sync.counters().lost[1], 1U);
