@@ -53,7 +53,7 @@ class FileLines {
     for (;;) {
       in_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
       if (in_.eof()) {
-        torn_ = in_.gcount() > 0;
+        truncated_ = in_.gcount() > 0;
         return false;
       }
       if (in_.bad()) return false;
@@ -71,14 +71,14 @@ class FileLines {
     }
   }
   /// At the end: the file does not end with a line's end.
-  [[nodiscard]] bool torn() const noexcept { return torn_; }
+  [[nodiscard]] bool truncated() const noexcept { return truncated_; }
   /// At the end: the rest could not be read.
   [[nodiscard]] bool failed() const noexcept { return in_.bad(); }
 
  private:
   std::ifstream in_;
   std::string line_{};
-  bool begun_ = false, torn_ = false;
+  bool begun_ = false, truncated_ = false;
 };
 
 using Column = std::optional<std::size_t>;
@@ -174,7 +174,7 @@ void report_damage(const char* file, const FileLines& lines, std::size_t rows,
   if (lines.failed())
     session->missing.push_back(
         fmt::format("{}: it could not be read to its end; the rest is missing", file));
-  else if (lines.torn())
+  else if (lines.truncated())
     session->missing.push_back(fmt::format(
         "{}: the last line is incomplete and is skipped; the session was not closed", file));
   if (disordered > 0)

@@ -110,7 +110,7 @@ TEST(InsFile, refusalNamesPlaceOfMalformedLine) {
   EXPECT_TRUE(test::contains(refusal(""), "is not the first line"));
   EXPECT_TRUE(test::contains(refusal(kHead), "has no sample"));
   EXPECT_TRUE(test::contains(refusal(kHead + good.substr(0, good.size() - 1)), "has no sample"))
-      << "torn";
+      << "truncated";
 }
 
 TEST(InsFile, isFoundInFolderOrByHeader) {
