@@ -679,7 +679,7 @@ std::vector<Case> bags() {
                        return packed("bayer_rggb8; jpeg compressed ", ".jpg", i, k, ns);
                      },
                      "sensor_msgs/CompressedImage", compressed},
-                    "JPEG mixes"));
+                    "as JPEG, which mixes"));
   all.push_back(bag("stamps of zero", {[](int i, int k, std::int64_t) { return mono(i, k, 0); }},
                     "6 images have no stamp|later by 3 ms"));
   const auto later = [](std::int64_t ms) {

@@ -198,7 +198,7 @@ TEST(Run, fullDiskLeavesNoTruncatedFileAndExitsFour) {
     EXPECT_FALSE(std::filesystem::exists(session / name)) << name;
   EXPECT_TRUE(
       test::mentions(o.err,
-                     "summary.json: cannot be written (File too large): check the directory's "
+                     "summary.json: cannot be written (File too large); check the directory's "
                      "permissions and the free space"));
   EXPECT_TRUE(test::mentions(o.err, "poses.csv"));
   const std::string poses = text_of(session / "poses.csv");

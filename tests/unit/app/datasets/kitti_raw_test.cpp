@@ -201,10 +201,10 @@ TEST(KittiRaw, missingFilesSkipTheirFrames) {
       {"a list of words", text(times_name(0), stamp_line(0) + "soon\n"), 0, "timestamps.txt:2: "},
       {"another day", text(times_name(1), "2012-01-01 00:00:00.0\n"), 0, "no stamp close"},
       {"numbers missing", calibration("D_01: -0.3 0.1 0.001", "D_01: -0.3"), 0,
-       "calib_cam_to_cam.txt:12: D_01: has 3 numbers where 5"},
+       "calib_cam_to_cam.txt:12: D_01: has 3 numbers instead of 5"},
       {"a key missing", calibration("R_01:", "Q_01:"), 0, "has no line `R_01:`, 9 numbers"},
       {"no number", calibration("R_01: 1 0", "R_01: 1 x"), 0, "calib_cam_to_cam.txt:13: R_01: `x`"},
-      {"no rotation", calibration("R_01: 1 0", "R_01: 1 2"), 0, "R_01: is no rotation"},
+      {"not a rotation", calibration("R_01: 1 0", "R_01: 1 2"), 0, "R_01: is not a rotation"},
       {"no calibration", [](const Folder& f) { fs::remove(f / kCameras); }, 0,
        "calib_cam_to_cam.txt: is missing"},
       {"no list", [](const Folder& f) { fs::remove(f / times_name(1)); }, 0,
@@ -343,7 +343,7 @@ TEST(KittiRawIns, reportsBadPackets) {
 
   const auto refused = [&] { return refusal_of([&] { (void)ins(f); }); };
   replace(f, kImu, "R: 1 0 0", "R: 1 0.1 0");
-  EXPECT_TRUE(test::mentions(refused(), "calib_imu_to_velo.txt:2: R: is no rotation"));
+  EXPECT_TRUE(test::mentions(refused(), "calib_imu_to_velo.txt:2: R: is not a rotation"));
   fs::remove(f / kImu);
   EXPECT_TRUE(test::mentions(refused(), "calib_imu_to_velo.txt: is missing"));
   for (int i = 0; i < kPackets; ++i) f.write(oxts_name(i), "1 2 3\n");

@@ -270,7 +270,7 @@ TEST(StLuciaIns, repairsOrRefusesLogs) {
                },
                0, "Ins0.log:1: and 2 more lines"},
            Log{"no place", [](Lines* l) { *l = {"1292391531 0 -27.5 153 1e9 0 0 0 0 0 0 0"}; }, 0,
-               "a place that is none"},
+               "an invalid position"},
        }) {
     Lines lines = ins_lines({}, c.speed);
     c.spoil(&lines);

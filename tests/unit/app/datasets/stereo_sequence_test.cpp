@@ -57,7 +57,7 @@ TEST_F(Sequence, refusalNamesFileAndProblem) {
            Bad{"times.txt", "0\n0.1\nnoon\n", "times.txt:3", "noon"},
            Bad{"calib.txt", p0, "calib.txt", "P1"},
            Bad{"calib.txt", p0 + "P1: 60 0 35 -30 0 60 24 0 0 0 1\n", "calib.txt:2",
-               "12 are expected"},
+               "instead of 12"},
            Bad{"calib.txt", p0 + "P1: 60 0 35 30 0 60 24 0 0 0 1 0\n", "calib.txt", "swapped"},
            Bad{"calib.txt", p0 + "P1: 60 0 35 nan 0 60 24 0 0 0 1 0\n", "calib.txt:2", "nan"},
            Bad{list, "#timestamp [ns],filename\n15,x.png\nnoon,y.png\n", "cam0/data.csv:3", "noon"},
@@ -168,10 +168,10 @@ TEST_F(Sequence, refusesImplausibleTimes) {
   };
   for (const Times& c : {
            // Another unit; a gap is none.
-           Times{times_of("{:.0f}", 104.0, 5), "other units"},
-           Times{times_of("{:.0f}", 999'999.0, 5), "other units"},
-           Times{times_of("{:.1f}", 10.5, 5), "other units"},
-           Times{times_of("{:.1f}", 5e7, 5), "other units"},
+           Times{times_of("{:.0f}", 104.0, 5), "check the unit of its times"},
+           Times{times_of("{:.0f}", 999'999.0, 5), "check the unit of its times"},
+           Times{times_of("{:.1f}", 10.5, 5), "check the unit of its times"},
+           Times{times_of("{:.1f}", 5e7, 5), "check the unit of its times"},
            Times{times_of("{:.0f}", 5e6, 5)},
            Times{times_of("{:.0f}", 5e7, 5)},
            Times{times_of("{:.0f}", 1e9, 5)},
