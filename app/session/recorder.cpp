@@ -56,7 +56,7 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     file->append(files_->head(file));
   }
   thread_.start(
-      "vergence-record", [this] { begin(); }, [this](const Record* record) { take(record); });
+      "vergence-record", [this] { begin(); }, [this](const Record* record) { process(record); });
 }
 
 Recorder::~Recorder() { thread_.stop(); }
@@ -77,7 +77,7 @@ void Recorder::begin() {
 }
 
 /// Null: nothing waits, so that lines go to the files at once; else once a second.
-void Recorder::take(const Record* record) {
+void Recorder::process(const Record* record) {
   constexpr std::chrono::seconds kFlushInterval{1}, kWriteBack{2};
   if (record != nullptr) std::visit([this](const auto& r) { write(r); }, *record);
   const auto now = std::chrono::steady_clock::now();
@@ -103,7 +103,7 @@ void Recorder::write(const EventRecord& e) {
 void Recorder::write(const FrameReport& r) {
   const Stamp stamp = newest_ = r.pose.stamp;
   if (options_.disk_full) pretend(stamp);
-  format_frame(r, &line_);
+  format_pose_row(r, &line_);
   files_->poses.append(line_);
   totals_.add(r);
   if (r.pose.status == PoseStatus::lost) return;
@@ -159,13 +159,13 @@ void Recorder::record_disk(const LineFile* failed, int fault) {
     const char* words = ::strerrordesc_np(fault);
     if (words == nullptr) words = "unknown error";
     report_error(
-        "{}: cannot be written ({}); the session goes on and writing is tried again every "
-        "{} s: check that disk",
+        "{}: cannot be written ({}); the session continues and writing is retried every {} s; "
+        "check the disk",
         failed->path().native(), words, kRetry.count());
     (void)fmt::format_to_n(out, text.size() - 1, "the session's files cannot be written ({})",
                            words);
   } else {
-    (void)fmt::format_to_n(out, text.size() - 1, "the disk takes lines again; {} were lost",
+    (void)fmt::format_to_n(out, text.size() - 1, "lines are written again; {} were lost",
                            lost_lines());
   }
   event.set_message(text.data());
@@ -201,11 +201,11 @@ void Recorder::read_back() {
     try {
       *out = read_tum(file.path());
     } catch (const InputError& e) {
-      errors_.push_back(std::string(e.what()) + "; the summary lacks what is made from it");
+      errors_.push_back(std::string(e.what()) + "; summary.json lacks the metrics of this file");
     } catch (const std::bad_alloc&) {
-      errors_.push_back(file.path().string() +
-                        ": is too long for this machine's memory; the summary lacks what is made "
-                        "from it");
+      errors_.push_back(
+          file.path().string() +
+          ": is too long for this machine's memory; summary.json lacks the metrics of this file");
     }
   };
   if (totals.ok + totals.degraded > 0) read(files_->trajectory, &totals.trajectory);
@@ -222,7 +222,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
     const std::string why = good ? std::to_string(file->lost_lines()) + " lines are lost"
                                  : std::strerror(file->fault());
     totals.faults.push_back(file->path().string() + ": is not complete (" + why +
-                            "); check that disk and make room on it");
+                            "); check the disk and free space on it");
   }
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;

@@ -133,10 +133,10 @@ TimingMonitor::Message TimingMonitor::of_utc(const InsRecord& reading) noexcept 
   if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
-  return message("utc_offset", false,
-                 "the session's stamps are %.4f s %s the INS's UTC; they follow the host clock as "
-                 "set at the start",
-                 std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
+  return message(
+      "utc_offset", false,
+      "the session's stamps are %.4f s %s the INS's UTC; they follow the host clock at the start",
+      std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
 }
 
 void TimingMonitor::record_pose(const AcquiredFrame& frame, float estimate_ms,
@@ -167,7 +167,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                          {"late", c.sync.late[k]},
                          {"duplicate", c.sync.duplicate[k]},
                          {"absent", c.sync.absent[k]},
-                         {"incomplete", s.torn},
+                         {"incomplete", s.incomplete},
                          {"underruns", s.underruns}}}});
   }
   if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
@@ -201,7 +201,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                           {"pulses_missed", c.sync.missed},
                           {"pushed_out", c.sync.pushed_out},
                           {"overtaken", c.dropped_sets},
-                          {"frames_incomplete", c.torn}}},
+                          {"frames_incomplete", c.incomplete}}},
                         {"cameras", cameras}};
   return {{"clocks", clocks},
           {"clock_resets", c.clock_resets},

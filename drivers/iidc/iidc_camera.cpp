@@ -35,7 +35,8 @@ DeviceStatus IidcCamera::configure(const CameraConfiguration& requested,
 DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& requested,
                                             CameraConfiguration* actual) {
   if (queue_.started()) return refused(DeviceStatus::busy, "it is streaming; stop it first");
-  if (queue_.held() != 0) return refused(DeviceStatus::busy, "images of it are still in use");
+  if (queue_.held() != 0)
+    return refused(DeviceStatus::busy, "its images are still in use; release them first");
   drain();
   CameraPlan plan;
   std::string why;
@@ -213,39 +214,39 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
   const auto nearest = [](const AbsoluteRange& r, double value) {
     return std::clamp(value, r.least, std::max(r.least, r.most));
   };
-  ExposureSetting taken{plan_.exposure, plan_.gain_db};
+  ExposureSetting applied{plan_.exposure, plan_.gain_db};
   if (const AbsoluteRange r = registers_.absolute_range(Feature::shutter); r.present)
-    taken.exposure = Duration::seconds(
+    applied.exposure = Duration::seconds(
         registers_.set_absolute(Feature::shutter, nearest(r, requested.exposure.to_seconds())));
   if (const AbsoluteRange r = registers_.absolute_range(Feature::gain); r.present)
-    taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, requested.gain_db));
+    applied.gain_db = registers_.set_absolute(Feature::gain, nearest(r, requested.gain_db));
   const DeviceStatus status = registers_.pop_status();
   if (status != DeviceStatus::ok)
     return status == DeviceStatus::disconnected ? status : DeviceStatus::failed;
   // The setting also applies after a stop or a reconnect.
-  plan_.exposure = taken.exposure;
-  plan_.gain_db = taken.gain_db;
-  (void)exposures_.change(taken, monotonic_now());
-  if (actual != nullptr) *actual = taken;
+  plan_.exposure = applied.exposure;
+  plan_.gain_db = applied.gain_db;
+  (void)exposures_.change(applied, monotonic_now());
+  if (actual != nullptr) *actual = applied;
   return DeviceStatus::ok;
 }
 
 std::string IidcCamera::remark() const {
   if (!configured_ || plan_.info.has(FrameInfoItem::counter)) return {};
-  return "it embeds no counter and no stamp: lost images are noticed by their times only";
+  return "it embeds no counter and no stamp, so lost images are detected by their times only";
 }
 
 // ---- the stream's thread
 
 bool IidcCamera::frame(const Arrival& arrival) noexcept {
-  // No frame follows a `gone`.
+  // No frame follows a disconnect.
   if (lost_.load(std::memory_order_acquire)) return false;
   const ExposureSetting& had = exposures_.at(arrival.at - transfer_ - exposure_now_);
   exposure_now_ = had.exposure;
   reader_.set_exposure(had.exposure);
   const ReadFrame read = reader_.read(arrival);
-  if (!read.taken) {
-    if (read.stray && ++strays_ == kStrays) gone(arrival.at);
+  if (!read.accepted) {
+    if (read.stray && ++strays_ == kStrays) disconnected(arrival.at);
     return false;
   }
   strays_ = 0;
@@ -273,7 +274,7 @@ bool IidcCamera::frame(const Arrival& arrival) noexcept {
   return offered && !convert;
 }
 
-void IidcCamera::gone(HostStamp at) noexcept {
+void IidcCamera::disconnected(HostStamp at) noexcept {
   if (lost_.exchange(true, std::memory_order_acq_rel)) return;
   queue_.lose(at);
 }

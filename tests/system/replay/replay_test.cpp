@@ -61,7 +61,7 @@ TEST_F(ReplayedFolder, fromScratchNeedsOnlyIntrinsicsAndLength) {
   fs::remove_all(session());
   text.insert(at, "    T_left_camera: [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0]\n");
   write("calibration.yaml", text);
-  expect_refused("give T_camera_left");
+  expect_refused("is the inverse of T_camera_left");
 }
 
 /// → whether a terminal shows it before it closes.

@@ -198,7 +198,7 @@ TEST(Run, fullDiskLeavesNoTruncatedFileAndExitsFour) {
     EXPECT_FALSE(std::filesystem::exists(session / name)) << name;
   EXPECT_TRUE(
       test::mentions(o.err,
-                     "summary.json: cannot be written (File too large): check the directory's "
+                     "summary.json: cannot be written (File too large); check the directory's "
                      "permissions and the free space"));
   EXPECT_TRUE(test::mentions(o.err, "poses.csv"));
   const std::string poses = text_of(session / "poses.csv");
@@ -233,7 +233,7 @@ TEST(Run, impossibleSettingIsNamedAndExitsTwo) {
   for (const auto& [arguments, named] :
        {std::pair{"--set trigger.rate=0", "trigger.rate is 0"},
         std::pair{"--set ins.rate=0", "ins.rate is 0"},
-        std::pair{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
+        std::pair{"--set cameras.1.size=[800,600]", "set the same size for all cameras"},
         std::pair{"--set cameras.0.exposure_us=60000",
                   "longer than the 50000 µs between two pulses"},
         std::pair{"--set cameras.0.driver=gige", "--fast needs simulated cameras"},
@@ -244,7 +244,7 @@ TEST(Run, impossibleSettingIsNamedAndExitsTwo) {
         std::pair{"--fault knok@3", "unknown fault \"knok\""},
         std::pair{"--fault 'cover@1 camera=3'", "there is no camera 3"},
         std::pair{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
-        std::pair{"--duration=-1", "--duration needs seconds"}}) {
+        std::pair{"--duration=-1", "--duration must be above 0"}}) {
     const TemporaryFolder folder;
     const Outcome o = drive(folder / "s", arguments);
     EXPECT_EQ(o.code, 2) << o.err;

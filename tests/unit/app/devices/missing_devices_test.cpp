@@ -69,7 +69,8 @@ TEST(MissingDevices, absentTriggerBoardIsADeviceError) {
   EXPECT_EQ(refusal_of([&] { (void)open_trigger_board(settings, pulses, &remarks); }, &message),
             Refusal::device)
       << message;
-  EXPECT_NE(message.find("trigger: the board on /dev/ttyNotThere"), std::string::npos) << message;
+  EXPECT_NE(message.find("trigger: the trigger board on /dev/ttyNotThere"), std::string::npos)
+      << message;
   settings.port = "a serial number that no board has";
   EXPECT_EQ(refusal_of([&] { (void)open_trigger_board(settings, pulses, &remarks); }, &message),
             Refusal::device)

@@ -44,7 +44,7 @@ TEST(Recorder, brieflyFullDiskLosesNothing) {
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
   EXPECT_EQ(reported(folder.path(), "disk_full").size(), 1U);
   EXPECT_EQ(reported(folder.path(), "disk_recovered"),
-            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
+            std::vector<std::string>{"lines are written again; 0 were lost"});
   const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
   EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
   const auto errors = recorder.pop_errors();
@@ -68,7 +68,7 @@ TEST(Recorder, longFullDiskLosesWholeCountedLines) {
       lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
   EXPECT_EQ(written + totals->lost_lines, 2 * kFrames);
   EXPECT_EQ(reported(folder.path(), "disk_recovered"),
-            std::vector<std::string>{"the disk takes lines again; " +
+            std::vector<std::string>{"lines are written again; " +
                                      std::to_string(totals->lost_lines) + " were lost"});
 }
 

@@ -147,7 +147,8 @@ TEST(PulsePairing, tenHoursGiveNoWrongPairAndCountLosses) { testing::expect_ten_
 TEST(PulsePairing, isVerifiedWithinASecondAfterReconnect) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed)
     for (const double rate : {20.0, 30.0}) {
-      PulseRigOptions o{.rate_hz = rate, .gone = {{1, 5, 7}, {0, 15.02, 16}}, .reboots = {10.01}};
+      PulseRigOptions o{
+          .rate_hz = rate, .outages = {{1, 5, 7}, {0, 15.02, 16}}, .reboots = {10.01}};
       expect_proven_within_a_second(o, seed, 20, 3);
     }
 }
@@ -157,7 +158,7 @@ TEST(PulsePairing, isVerifiedWithinASecondAfterBriefLoss) {
     for (const double seconds : {0.05, 0.1, 0.2, 0.3}) {
       PulseRigOptions o{.rate_hz = 20};
       const double at = 3 + 0.0137 * static_cast<double>(seed);
-      o.gone = {{0, at, at + seconds}, {1, at, at + seconds}};
+      o.outages = {{0, at, at + seconds}, {1, at, at + seconds}};
       expect_proven_within_a_second(o, seed, 8, 2);
     }
 }

@@ -106,7 +106,7 @@ TEST(BoardClock, oneAnswerGivesTimeWithinHalfTheRoundTrip) {
   clock.restart(Duration::milliseconds(4), false);
   EXPECT_FALSE(clock.known());
   const std::uint32_t token = clock.ask(host(1000));
-  ASSERT_EQ(clock.answer(pong(token, 1300, 1350), host(1650)), PongStatus::taken);
+  ASSERT_EQ(clock.answer(pong(token, 1300, 1350), host(1650)), PongStatus::accepted);
   ASSERT_TRUE(clock.known());
   const MappedStamp m = clock.map(stamp_of_tick(1320), host(2000));
   EXPECT_LE(std::abs((m.host - host(1320)).ns()), m.error.ns());
@@ -118,7 +118,7 @@ TEST(BoardClock, wireTimeIsNotCountedAsRoundTrip) {
   clock.reopen(Duration::microseconds(10));
   // A PING of 13 bytes with nothing else between.
   const std::uint32_t token = clock.ask(host(1000));
-  ASSERT_EQ(clock.answer(pong(token, 1130, 1130), host(1130)), PongStatus::taken);
+  ASSERT_EQ(clock.answer(pong(token, 1130, 1130), host(1130)), PongStatus::accepted);
   EXPECT_LE(std::abs((clock.map(stamp_of_tick(1130), host(2000)).host - host(1130)).ns()), 1000);
 }
 

@@ -348,7 +348,7 @@ TEST(AnotherMake, isNamed) {
   for (const auto& [mentions, word] :
        {std::pair{"$GPGGA,130305.0,4717.115,N,00833.912,E,1,08,0.9*5B\r\n", "NMEA"},
         {"\xB5\x62\x01\x07 some more bytes", "u-blox"},
-        {"hello hello hello", "no Xbus"},
+        {"hello hello hello", "not Xbus"},
         {"", "silent"}}) {
     Device device(std::make_unique<test::SimulatedLinkFactory>(
                       std::make_shared<test::Talker>(mentions, 9600), test::SimulatedLineOptions{}),
