@@ -16,12 +16,6 @@ constexpr Duration kSlack = Duration::milliseconds(500);
 // Maximum time from start() to the first frame: links are probed and sensors settle.
 constexpr Duration kFirst = Duration::milliseconds(4000);
 
-HostStamp now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
-
 /// FNV-1a over the pixels, without the padding.
 std::uint64_t sum_of(const ImageView& view) noexcept {
   std::uint64_t h = 0xcbf29ce484222325U;
@@ -148,7 +142,7 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
     case DeviceStatus::disconnected:
       EXPECT_TRUE(unplugged_) << "gone with the cable in: " << camera_.last_error();
       if (state_ == State::streaming) {
-        EXPECT_LE(frame.arrival, now());
+        EXPECT_LE(frame.arrival, monotonic_now());
         EXPECT_GT(frame.arrival.ns(), 0) << "when it went is not said";
       }
       state_ = State::gone;
@@ -172,7 +166,7 @@ void ShadowCamera::take(const Frame& frame) {
     EXPECT_NE(h.frame.slot, frame.slot) << "handed out twice";
     EXPECT_FALSE(overlap(h.view, view)) << "two slots share pixels";
   }
-  EXPECT_LE(frame.arrival, now());
+  EXPECT_LE(frame.arrival, monotonic_now());
   EXPECT_GT(frame.exposure, Duration{});
   if (any_) {
     EXPECT_GT(frame.counter, newest_.counter) << "counters go up";
