@@ -149,11 +149,11 @@ json LiveState::frame_json(HostStamp now) const {
                   {"heading_deg", rounded(e[3], 2)}};
   }
   if (newest_report_ && newest_report_->placed) {
-    const EnuPose& ours = newest_report_->ours;
-    out["enu"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
-                  {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
-                  {"height_m", rounded(ours.position.height_m, 2)},
-                  {"heading_deg", rounded(compass_heading_deg(ours.yaw), 1)}};
+    const EnuPose& estimate = newest_report_->estimate;
+    out["enu"] = {{"latitude_deg", rounded(estimate.position.latitude_deg, 7)},
+                  {"longitude_deg", rounded(estimate.position.longitude_deg, 7)},
+                  {"height_m", rounded(estimate.position.height_m, 2)},
+                  {"heading_deg", rounded(compass_heading_deg(estimate.yaw), 1)}};
   }
   return out;
 }

@@ -215,7 +215,7 @@ void format_frame(const FrameReport& r, std::string* line) {
     append_transform(line, p.T_world_left, ',');
   else
     *line += ",,,,,,,";
-  append_enu(line, r.placed, r.ours);
+  append_enu(line, r.placed, r.estimate);
   append_enu(line, r.ins_valid, r.reference);
   for (const double v : r.error())
     if (r.compared)

@@ -36,7 +36,8 @@ Mat23 derivative(const Pinhole& k, const Vec3& p) noexcept {
 
 /// Depth of the left ray where it is nearest to the other camera's ray; not positive if there is
 /// none.
-double depth_of(const Vec3& left, const Vec3& other, const Transform& T_other_left) noexcept {
+double triangulated_depth(const Vec3& left, const Vec3& other,
+                          const Transform& T_other_left) noexcept {
   // other ∥ z R left + t, so other × (R left) z = − other × t.
   const Vec3 a = other.cross(T_other_left.R * left), b = -other.cross(T_other_left.t);
   const double aa = a.squaredNorm();
@@ -89,7 +90,7 @@ std::size_t DisparityJumpDetector::sort_into(std::span<const StereoObservation> 
 bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObservation& now,
                                 const Transform& T_now_previous, Row* out) const noexcept {
   const Vec3 a = ray(left_, before.left);
-  const double depth = depth_of(a, ray(camera_, before.right), T_camera_left_);
+  const double depth = triangulated_depth(a, ray(camera_, before.right), T_camera_left_);
   if (!(depth > 0)) return false;
   const Vec3 moved = T_now_previous * Vec3(depth * a);
   if (!(moved.z() > 0)) return false;
@@ -112,13 +113,13 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
   jump.tracks = static_cast<int>(rows.size());
   if (rows.size() < kMinCommonTracks) return jump;
   double s = 0, along = 0, scale = 0, variance = 0;
-  const auto median_of = [&](auto value) noexcept {
+  const auto median_by = [&](auto value) noexcept {
     for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
     return median(scratch_.first(rows.size()));
   };
-  s = median_of([](const Row& r) noexcept { return r.e; });
+  s = median_by([](const Row& r) noexcept { return r.e; });
   for (int k = 0; k < kReweightings; ++k) {
-    scale = std::max(kMinScale, median_of([&](const Row& r) noexcept {
+    scale = std::max(kMinScale, median_by([&](const Row& r) noexcept {
                                   return std::abs(r.e - s - along * r.along);
                                 }) / kMedianOfNormal);
     double w = 0, wa = 0, waa = 0, we = 0, wae = 0;

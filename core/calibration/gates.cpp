@@ -160,7 +160,7 @@ namespace {
 
 /// Log odds that the rig is the one of the calibration in use. `difference` of the depths and the
 /// sigmas of the measurement, of the calibration in use and of another rig, all in percent.
-double log_odds_of(double difference, double measured, double current, double other) noexcept {
+double log_odds(double difference, double measured, double current, double other) noexcept {
   const double same = current * current + measured * measured,
                wrong = other * other + measured * measured;
   return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
@@ -195,7 +195,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     const double by_turn =
         100 * depth / measured.T_camera_left[static_cast<std::size_t>(k)].t.norm();
     const double m = current_percent(current, k, depth, o);
-    const double odds = log_odds_of(difference, s, m, kOtherYaw * by_turn);
+    const double odds = log_odds(difference, s, m, kOtherYaw * by_turn);
     const double certainty = (odds - before) / certain;
     // If the rig is that of the calibration in use, the best estimate of its depth error is the
     // weighted mean of both.
@@ -203,9 +203,9 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
     a.verified = a.verified && s > 0 && certainty > 1 && off <= o.max_depth_error_percent;
     const bool contradicted = difference > o.max_depth_error_percent && certainty < -1;
-    const double least = source == CalibrationOrigin::this_drive ? m : kShareOfCurrent * m;
-    sharper = sharper && s < least;
-    a.nearer = a.nearer || (s < least && difference > kChance * s);
+    const double limit = source == CalibrationOrigin::this_drive ? m : kShareOfCurrent * m;
+    sharper = sharper && s < limit;
+    a.nearer = a.nearer || (s < limit && difference > kChance * s);
     // Evidence against one camera takes precedence over missing evidence about another.
     if (k > 1 && (contradicted == a.contradicted ? off <= worst : a.contradicted)) continue;
     worst = off;

@@ -18,7 +18,7 @@ double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noe
   double sum = 0;
   int seen = 0;
   detail::for_places(rig, k, depth_m, [&](const detail::CovisiblePoint& p) noexcept {
-    sum += detail::variance_of(rig, k, detail::depth_gradient(p, T, k, joint), joint);
+    sum += detail::depth_variance(rig, k, detail::depth_gradient(p, T, k, joint), joint);
     ++seen;
   });
   return seen == 0 ? 0.0 : 100.0 * std::sqrt(std::max(0.0, sum / seen));

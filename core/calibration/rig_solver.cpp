@@ -204,7 +204,7 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   if (points_.size() < static_cast<std::size_t>(kMinTracks)) return s;
   hold_pieces();
   s.status = RigSolveStatus::not_converged;
-  const BundleResult r = adjust_robustly(options_of(request), &s);
+  const BundleResult r = adjust_robustly(bundle_options(request), &s);
   if (!r.converged()) {
     // Report the focal length reached so far.
     if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();

@@ -96,7 +96,7 @@ class RigSolver {
     std::uint16_t frame;
     std::uint16_t observation;
   };
-  [[nodiscard]] static Vec2 pixel_of(const LoggedObservation& s, int k) noexcept {
+  [[nodiscard]] static Vec2 observed_pixel(const LoggedObservation& s, int k) noexcept {
     return s.raw[static_cast<std::size_t>(k)].cast<double>();
   }
   [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras,
@@ -108,7 +108,7 @@ class RigSolver {
   void make_points() noexcept;
   void hold_pieces() noexcept;
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
-  [[nodiscard]] BundleOptions options_of(const RigSolveRequest& request) const noexcept;
+  [[nodiscard]] BundleOptions bundle_options(const RigSolveRequest& request) const noexcept;
   [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] double residual_scale() noexcept;

@@ -55,7 +55,7 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
     for (int k = 0; k < count_; ++k) {
       const auto c = static_cast<std::size_t>(k);
       Vec3 ray;
-      if (!s.by(k) || !cameras_[c].unproject(pixel_of(s, k), &ray)) continue;
+      if (!s.by(k) || !cameras_[c].unproject(observed_pixel(s, k), &ray)) continue;
       views[n++] = {T_camera_left_[c] * poses_[track[i].frame], ray.head<2>() / ray.z(),
                     static_cast<double>(s.sigma) / cameras_[c].intrinsics().fx};
     }
@@ -69,7 +69,7 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
     for (int k = 0; k < count_; ++k) {
       if (!s.by(k)) continue;
       const auto c = static_cast<std::size_t>(k);
-      const Vec2 seen = pixel_of(s, k);
+      const Vec2 seen = observed_pixel(s, k);
       Vec2 at;
       if (cameras_[c].project(T_camera_left_[c] * (poses_[r.frame] * p.p_world), &at, nullptr) !=
               ProjectStatus::ok ||
@@ -131,7 +131,7 @@ void RigSolver::hold_pieces() noexcept {
   }
 }
 
-BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexcept {
+BundleOptions RigSolver::bundle_options(const RigSolveRequest& request) const noexcept {
   // Bits of fx fy; of fx fy cx cy; and of k1 k2 p1 p2 or k1 … k4.
   constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111, kFourCoefficients = 0b1111'0000;
   const RigCalibration& rig = request.rig;

@@ -105,8 +105,8 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
     for (const LoggedObservation& observation : f.observations) {
       Vec3 l, r;
       if (!observation.by(0) || !observation.by(k) ||
-          !cameras_[0].unproject(pixel_of(observation, 0), &l) ||
-          !cameras_[other].unproject(pixel_of(observation, k), &r))
+          !cameras_[0].unproject(observed_pixel(observation, 0), &l) ||
+          !cameras_[other].unproject(observed_pixel(observation, k), &r))
         continue;
       (void)stereo_.push(
           {Vec2(left.fx * l.x() / l.z() + left.cx, left.fy * l.y() / l.z() + left.cy),

@@ -112,12 +112,12 @@ bool Comparison::next(ComparedPose* out) noexcept {
 
   const EnuAlignment& alignment = builder_.alignment();
   c.placed = posed && alignment.revision > 0;
-  if (c.placed) c.ours = in_enu(alignment.T_enu_world * pose.T_world_left);
+  if (c.placed) c.estimate = in_enu(alignment.T_enu_world * pose.T_world_left);
   c.compared = c.placed && c.ins_valid;
   if (c.compared) {
-    c.error_enu = c.ours.T_enu_left.t - c.reference.T_enu_left.t;
+    c.error_enu = c.estimate.T_enu_left.t - c.reference.T_enu_left.t;
     if (!c.height_known) c.error_enu.z() = 0;
-    c.error_yaw = wrapped(c.ours.yaw - c.reference.yaw);
+    c.error_yaw = wrapped(c.estimate.yaw - c.reference.yaw);
     ++counters_.compared;
   }
   ++pending_begin_;

@@ -87,7 +87,7 @@ struct ComparedPose {
   /// True if both are available, so that the errors are valid.
   bool compared = false;
 
-  EnuPose ours{};
+  EnuPose estimate{};
   /// The INS pose converted to the left camera at the frame's stamp.
   EnuPose reference{};
   /// Horizontal standard deviation per axis in m, the larger of the two samples around the frame.

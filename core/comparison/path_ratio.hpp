@@ -14,7 +14,7 @@ struct ComparisonOptions;
 class PathRatio {
  public:
   /// Adds a pose's position, that by the INS, and the INS's standard deviation (m).
-  void add(const Vec3& ours, const Vec3& ins, double position_sigma,
+  void add(const Vec3& estimate, const Vec3& ins, double position_sigma,
            const ComparisonOptions& options) noexcept;
   /// Call if poses or fixes are missing: no step is added across the gap.
   void interrupt() noexcept { last_.reset(); }
@@ -28,10 +28,10 @@ class PathRatio {
   static constexpr std::size_t kSteps = 40;
   // Lengths along both paths, in m.
   struct Step {
-    double ours = 0, ins = 0;
+    double estimate = 0, ins = 0;
   };
   struct Place {
-    Vec3 ours, ins;
+    Vec3 estimate, ins;
   };
   void measure(double position_sigma, const ComparisonOptions& options) noexcept;
 

@@ -16,37 +16,37 @@ BackgroundSolve::BackgroundSolve(const EstimatorOptions& options, const RigCalib
       runner_(runner),
       task_{this} {}
 
-void BackgroundSolve::start(const calibration::TrackLog& log, const Start& start) noexcept {
+void BackgroundSolve::start(const calibration::TrackLog& log, const Request& request) noexcept {
   solver_.log().copy(log, log.size());
-  start_ = start;
-  if (start.prior != nullptr) {
-    prior_ = *start.prior;
-    start_.prior = &prior_;
+  request_ = request;
+  if (request.prior != nullptr) {
+    prior_ = *request.prior;
+    request_.prior = &prior_;
   }
   focal_check_.begin_solve(log.size(),
                            log.size() >= static_cast<std::size_t>(options_.calibration.max_frames));
   running_ = true;
   discarded_ = false;
   frames_since_start_ = 0;
-  next_turn_ = std::min(calibration::kMinHeldOut, options_.calibration.adopt_after);
+  next_decision_ = std::min(calibration::kMinHeldOut, options_.calibration.adopt_after);
   runner_.start(TaskRef(task_));
 }
 
 void BackgroundSolve::run() noexcept {
   calibration::RigSolveRequest request;
-  request.rig = start_.rig;
-  request.from_rig = !start_.for_new_rig;
+  request.rig = request_.rig;
+  request.from_rig = !request_.for_new_rig;
   // The prior of the intrinsics is the initial calibration, not earlier results of these frames, so
   // that no measurement counts twice.
   request.given = &given_;
-  request.known = start_.prior;
+  request.known = request_.prior;
   solved_ = solver_.solve(request);
   focal_check_.measure(solver_, request, solved_);
 }
 
 bool BackgroundSolve::next_frame() noexcept {
   ++frames_since_start_;
-  if (frames_since_start_ < next_turn_) return false;
+  if (frames_since_start_ < next_decision_) return false;
   if (options_.adoption == Adoption::when_ready) return !runner_.busy();
   const auto begin = std::chrono::steady_clock::now();
   runner_.wait();
@@ -55,12 +55,13 @@ bool BackgroundSolve::next_frame() noexcept {
   return true;
 }
 
-bool BackgroundSolve::last_turn() const noexcept {
+bool BackgroundSolve::must_decide() const noexcept {
   return frames_since_start_ >= options_.calibration.adopt_after;
 }
 
 void BackgroundSolve::postpone() noexcept {
-  next_turn_ = std::min(next_turn_ + calibration::kMinHeldOut, options_.calibration.adopt_after);
+  next_decision_ =
+      std::min(next_decision_ + calibration::kMinHeldOut, options_.calibration.adopt_after);
 }
 
 void BackgroundSolve::finish() noexcept {

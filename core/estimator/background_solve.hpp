@@ -9,10 +9,10 @@ namespace vergence {
 /// Runs one rig calibration at a time in the background: copies the tracks, hands them to the
 /// background runner and provides the solution once the runner has finished.
 ///
-///     solve.start(log, start);
+///     solve.start(log, request);
 ///     if (solve.running() && solve.next_frame()) {  // each frame
 ///       solve.close();
-///       use(solve.solved());
+///       evaluate(solve.solved());
 ///     }
 ///
 /// Threads  One caller. The task runs on the BackgroundRunner's thread and writes into this object
@@ -20,7 +20,7 @@ namespace vergence {
 class BackgroundSolve {
  public:
   /// Initial values, mode and prior of a solve.
-  struct Start {
+  struct Request {
     RigCalibration rig{};
     /// True: estimate a new calibration. False: refine the one in use, from its transforms.
     bool for_new_rig = false;
@@ -35,14 +35,14 @@ class BackgroundSolve {
   BackgroundSolve& operator=(const BackgroundSolve&) = delete;
 
   /// Precondition: !running().
-  void start(const calibration::TrackLog& log, const Start& start) noexcept;
+  void start(const calibration::TrackLog& log, const Request& request) noexcept;
   [[nodiscard]] bool running() const noexcept { return running_; }
-  [[nodiscard]] bool for_new_rig() const noexcept { return start_.for_new_rig; }
+  [[nodiscard]] bool for_new_rig() const noexcept { return request_.for_new_rig; }
   /// Call once per frame while running(). Returns true if the solver has finished and a decision is
   /// due. Waits for the solver with Adoption::after_fixed_frames only.
   [[nodiscard]] bool next_frame() noexcept;
-  /// Returns true at the last frame for a decision: the solution must be adopted or rejected.
-  [[nodiscard]] bool last_turn() const noexcept;
+  /// Returns true if the decision cannot be postponed: the solution must be adopted or rejected.
+  [[nodiscard]] bool must_decide() const noexcept;
   /// Postpones the decision, so that more frames are held out of the solve.
   void postpone() noexcept;
   /// Time that the last next_frame() waited for the solver, in ms; 0 with Adoption::when_ready.
@@ -52,11 +52,11 @@ class BackgroundSolve {
   /// Marks a running solve as outdated, because its frames no longer describe the rig.
   void discard() noexcept { discarded_ = running_; }
   /// Returns true if the solve was discarded or does not match the present mode. `estimating`: a
-  /// new calibration is wanted, not a refinement.
+  /// new calibration is estimated, not a refinement.
   [[nodiscard]] bool outdated(bool estimating) const noexcept {
-    return discarded_ || start_.for_new_rig != estimating;
+    return discarded_ || request_.for_new_rig != estimating;
   }
-  /// Ends the solve after its solutions have been used; another one may start.
+  /// Ends the solve after its solution was evaluated; another one may start.
   void close() noexcept { running_ = false; }
   [[nodiscard]] const calibration::RigSolution& solved() const noexcept { return solved_; }
   /// Focal lengths measured from the same snapshots. Access it only while no solve is running.
@@ -76,13 +76,13 @@ class BackgroundSolve {
   calibration::FocalCheck focal_check_;
   BackgroundRunner& runner_;
   Task task_;
-  Start start_;
+  Request request_;
   RigCalibration prior_{};
   calibration::RigSolution solved_;
   bool running_ = false, discarded_ = false;
   int frames_since_start_ = 0;
   // Number of frames after start() at which the next decision is due.
-  int next_turn_ = 0;
+  int next_decision_ = 0;
   float waited_ms_ = 0;
 };
 

@@ -73,7 +73,7 @@ void CalibrationFrames::begin_segment(std::uint64_t number) noexcept {
 void CalibrationFrames::begin_segment() noexcept {
   solved_frames_ = 0;
   logged_ = log_.size();
-  wanted_ = least();
+  required_ = min_frames();
 }
 
 void CalibrationFrames::clear() noexcept {
@@ -81,7 +81,7 @@ void CalibrationFrames::clear() noexcept {
   begin_segment();
 }
 
-bool CalibrationFrames::enough() const noexcept { return logged_ >= wanted_ && enough_for_any(); }
+bool CalibrationFrames::enough() const noexcept { return logged_ >= required_ && enough_for_any(); }
 
 bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= min_to_solve(); }
 
@@ -89,20 +89,20 @@ bool CalibrationFrames::new_since_solve() const noexcept {
   return log_.size() >= solved_frames_ + calibration::kMinHeldOut;
 }
 
-void CalibrationFrames::want(std::size_t frames) noexcept {
-  wanted_ = std::max(std::min(most(), frames), logged_ + calibration::kMinHeldOut);
+void CalibrationFrames::require(std::size_t frames) noexcept {
+  required_ = std::max(std::min(max_frames(), frames), logged_ + calibration::kMinHeldOut);
 }
 
-std::size_t CalibrationFrames::most() const noexcept {
+std::size_t CalibrationFrames::max_frames() const noexcept {
   return static_cast<std::size_t>(options_.max_frames);
 }
 
 std::size_t CalibrationFrames::min_to_solve() const noexcept {
   // With the held-out frames, a supplied calibration is evaluated as soon as a new one is solved.
-  return least() - std::min<std::size_t>(least(), calibration::kMinHeldOut);
+  return min_frames() - std::min<std::size_t>(min_frames(), calibration::kMinHeldOut);
 }
 
-std::size_t CalibrationFrames::least() const noexcept {
+std::size_t CalibrationFrames::min_frames() const noexcept {
   return static_cast<std::size_t>(options_.min_frames);
 }
 

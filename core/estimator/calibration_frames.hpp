@@ -9,7 +9,7 @@ namespace vergence {
 /// when there are enough for a solve.
 ///
 /// A segment is the growing set of frames that successive solves use; begin_segment() starts
-/// another one. Frames carried over from the previous segment count towards the number wanted.
+/// another one. Frames carried over from the previous segment count towards the number required.
 ///
 /// Not thread-safe. Memory from the arena at construction.
 class CalibrationFrames {
@@ -45,13 +45,15 @@ class CalibrationFrames {
 
   /// Makes the next solve wait for this many frames of the segment, and for at least kMinHeldOut
   /// new ones.
-  void want(std::size_t frames) noexcept;
+  void require(std::size_t frames) noexcept;
   /// Makes the next solve wait until the log holds `frames` frames.
-  void want_new(std::size_t frames) noexcept { wanted_ = logged_ - log_.size() + frames; }
-  void want_full() noexcept { wanted_ = most(); }
-  [[nodiscard]] std::size_t most() const noexcept;
+  void require_logged(std::size_t frames) noexcept { required_ = logged_ - log_.size() + frames; }
+  /// Makes the next solve wait for a full segment.
+  void require_full() noexcept { required_ = max_frames(); }
+  /// Capacity of the log, and number of frames of a full segment.
+  [[nodiscard]] std::size_t max_frames() const noexcept;
   /// Minimum number of frames of the first solve of an estimation.
-  [[nodiscard]] std::size_t least() const noexcept;
+  [[nodiscard]] std::size_t min_frames() const noexcept;
   /// Minimum number of frames of any solve; enough to verify a supplied calibration.
   [[nodiscard]] std::size_t min_to_solve() const noexcept;
 
@@ -60,7 +62,7 @@ class CalibrationFrames {
  private:
   const calibration::CalibrationOptions& options_;
   calibration::TrackLog log_;
-  std::size_t logged_ = 0, wanted_ = 0;
+  std::size_t logged_ = 0, required_ = 0;
   std::size_t solved_frames_ = 0;
   // Number of frames since one was logged.
   int frames_still_ = 0;

@@ -101,7 +101,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.posed) {
       const bool linked = p.odometry.linked() == odometry::Link::linked;
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
-      if (!linked && (p.calibrator.estimating() || p.calibrator.monitor().map_reset_pending()))
+      if (!linked && (p.calibrator.estimating() || p.calibrator.monitor().map_rebuild_pending()))
         p.watch_estimate(out, frame);
       // Images that are out of sync cannot be used for calibration, even if no lag is visible for a
       // while.
@@ -117,7 +117,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
         p.record(EstimatorEvent::Kind::calibration_applied, frame.stamp,
                  "the map uses the accepted calibration", 100 * out.points_kept);
     }
-    if (out.renewed) p.calibrator.monitor().map_renewed(p.odometry.map());
+    if (out.map_rebuilt) p.calibrator.monitor().map_rebuilt(p.odometry.map());
     p.calibrate(frame);
   }
   sample.state = p.state;

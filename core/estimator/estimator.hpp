@@ -146,7 +146,7 @@ class Estimator {
   /// Events of the last process() or finish() call, oldest first; valid until the next call.
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept;
   /// Calibrations decided on in the last process() or finish() call, each a line of
-  /// calibrations.csv. An accepted one is used from then on and belongs in the state file.
+  /// calibrations.csv. An accepted one is adopted and belongs in the state file.
   [[nodiscard]] std::span<const CalibrationDecision> calibrations() const noexcept;
 
   [[nodiscard]] State state() const noexcept;

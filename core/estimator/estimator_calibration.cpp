@@ -9,7 +9,7 @@ namespace vergence {
 namespace {
 
 /// Number of the first frame whose tracks describe the present rig. `fewest`: frames of a solve.
-std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now, int fewest) noexcept {
+std::uint64_t first_usable_frame(const RigAssessment& v, std::uint64_t now, int fewest) noexcept {
   using K = calibration::MonitorResult::Kind;
   // Until now there were only wrong matches.
   if (v.kind == K::collapse) return now;
@@ -120,7 +120,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
   } else if (v.kind != K::quiet) {
     suspect_rig(to_cause(v.kind),
-                first_frame_of_use(v, frame.number, options.calibration.min_frames), frame,
+                first_usable_frame(v, frame.number, options.calibration.min_frames), frame,
                 v.evidence);
   }
 }
@@ -182,7 +182,7 @@ void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
 }
 
 /// Acts on the decision of a refinement.
-void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept {
+void Estimator::Parts::apply_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept {
   if (calibrator.last_gate() == calibration::Gate::out_of_sync) return record_out_of_sync(stamp, 0);
   const bool was_suspect = degradations.active(Degradation::calibration),
              contradicted = decision.cause == CalibrationCause::contradicted;
@@ -194,7 +194,7 @@ void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Sta
     record(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
            decision.calibration.frames,
            {0, decision.evidence.shift_px, decision.evidence.rotation_mrad});
-    calibrator.refine(decision.calibration);
+    calibrator.adopt_refinement(decision.calibration);
     adopt(decision);
   }
   if (decision.verified && !contradicted) {
@@ -220,14 +220,14 @@ void Estimator::Parts::apply(const CalibrationDecision& decision, Stamp stamp) n
            "the configured focal length does not fit the images", decision.focal.measured_px);
   focal_contradicted = decision.focal.contradicted;
   if (decision.is_refinement) {
-    adopt_refinement(decision, stamp);
+    apply_refinement(decision, stamp);
     return record_length_sigma(decision);
   }
   record_length_sigma(decision);
   if (decision.accepted) {
     record(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
            decision.calibration.frames);
-    calibrator.use(decision);
+    calibrator.adopt(decision);
     adopt(decision);
     transition(Trigger::calibration_accepted, stamp);
     return;
@@ -239,7 +239,7 @@ void Estimator::Parts::apply(const CalibrationDecision& decision, Stamp stamp) n
       calibrator.keep();
       degradations.clear(Degradation::rig);
       odometry.link(calibrator.in_use());
-      transition(Trigger::calibration_saved, stamp);
+      transition(Trigger::calibration_kept, stamp);
       break;
     case calibration::Gate::out_of_sync:
       degradations.enter(Degradation::out_of_sync, Reason::out_of_sync, last_number, 1);

@@ -51,11 +51,12 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     // A solve must not mix frames from before with frames that may be out of sync.
     if (calibrator.estimating()) restart_estimation(std::nullopt, frame.number, frame);
   }
-  moves = out.posed && !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_of(out));
+  moves = out.posed &&
+          !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_covariance(out));
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
-      lose_track_of_rig(frame.number);
+      mark_calibration_unverified(frame.number);
     }
     return;
   }
@@ -79,7 +80,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   if (out.restarted) {
     record(EstimatorEvent::Kind::map_reset, frame.stamp,
            "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
-    lose_track_of_rig(frame.number);
+    mark_calibration_unverified(frame.number);
   }
   if (out.relocalised)
     record(EstimatorEvent::Kind::relocalised, frame.stamp,
@@ -87,14 +88,14 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
 }
 
 /// Marks the calibration as unverified, because the rig was not monitored during the missed frames.
-void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
+void Estimator::Parts::mark_calibration_unverified(std::uint64_t number) noexcept {
   calibrator.map_lost();
   if (options.online && !degradations.active(Degradation::calibration))
     degradations.enter(Degradation::calibration, Reason::unverified_calibration, number);
 }
 
 /// Covariance of the motion since the last pose.
-Mat6 Estimator::Parts::motion_of(const odometry::FrameOutcome& out) const noexcept {
+Mat6 Estimator::Parts::motion_covariance(const odometry::FrameOutcome& out) const noexcept {
   return odometry::motion_covariance(out.fit_covariance, out.expected, out.unseen_s);
 }
 
@@ -102,7 +103,7 @@ Mat6 Estimator::Parts::motion_of(const odometry::FrameOutcome& out) const noexce
 void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept {
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;
-  const Mat6 motion = motion_of(out);
+  const Mat6 motion = motion_covariance(out);
   check_motion(out, motion, drift.motion_to(out.T_left_world).t.norm());
   const Mat6 reported = motion + odometry::correction_covariance(out.corrected);
   drift.step(out.T_left_world, reported, length_sigma, out.keyframe);
@@ -121,9 +122,9 @@ void Estimator::Parts::check_motion(const odometry::FrameOutcome& out, const Mat
     return;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
   const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
-  const bool measurable = usual.measurable(step_m, sigma_m);
-  const bool unusual = measurable && usual.unusual(sigma_m);
-  if (measurable) margins.uncertainty = usual.margin();
+  const bool measurable = covariance_baseline.measurable(step_m, sigma_m);
+  const bool unusual = measurable && covariance_baseline.update(sigma_m);
+  if (measurable) margins.uncertainty = covariance_baseline.margin();
   degradations.set(Degradation::motion, unusual || correction.motion_unreliable(),
                    Reason::weak_geometry, last_number);
 }
@@ -148,7 +149,7 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
   // a window's length.
   if (out.relinked || out.restarted)
     degradations.clear(Degradation::window);
-  else if (out.gap_s > 0 || out.renewed)
+  else if (out.gap_s > 0 || out.map_rebuilt)
     degradations.enter(Degradation::window, Reason::time_gap, last_number, kWindowFrames + 1);
   else if (degradations.active(Degradation::rig))
     degradations.enter(Degradation::window, Reason::recalibrating, last_number,

@@ -45,16 +45,16 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   monitor_.watch(rig_, false);
   monitor_.set_jump_reference(rig_);
   frames_.begin_segment();
-  frames_.want(frames_.min_to_solve());
+  frames_.require(frames_.min_to_solve());
 }
 
-void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
+void OnlineCalibrator::adopt(const CalibrationDecision& found) noexcept {
   state_ = next_state(
       state_, found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
   rig_ = found.calibration;
   source_ = calibration::CalibrationOrigin::this_drive;
   clear_rig(&refined_);
-  monitor_.expect_rebuilt_scene();
+  monitor_.expect_map_rebuild();
   frames_.begin_segment();
 }
 
@@ -62,7 +62,7 @@ void OnlineCalibrator::keep() noexcept {
   state_ = next_state(state_, CalibrationTrigger::kept);
   // Measurements from before the rig became suspect do not describe the present rig.
   if (search_.cause != CalibrationCause::requested) clear_rig(&refined_);
-  monitor_.expect_rebuilt_scene();
+  monitor_.expect_map_rebuild();
   frames_.begin_segment();
 }
 
@@ -72,10 +72,10 @@ void OnlineCalibrator::restore(const RigCalibration& rig) noexcept {
   keep();
 }
 
-void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
+void OnlineCalibrator::adopt_refinement(const RigCalibration& rig) noexcept {
   rig_ = rig;
   source_ = calibration::CalibrationOrigin::this_drive;
-  monitor_.expect_rebuilt_scene();
+  monitor_.expect_map_rebuild();
 }
 
 void OnlineCalibrator::map_rebuilt(const odometry::Odometry& odometry) noexcept {
@@ -115,13 +115,13 @@ bool OnlineCalibrator::can_solve() const noexcept { return !solve_.running() && 
 
 void OnlineCalibrator::start_solve() noexcept {
   frames_.solve_begun();
-  BackgroundSolve::Start start;
-  start.rig = rig_;
-  start.for_new_rig = estimating();
+  BackgroundSolve::Request request;
+  request.rig = rig_;
+  request.for_new_rig = estimating();
   RigCalibration prior;
   if (refined_) {
     prior = *refined_;
-    start.prior = &prior;
+    request.prior = &prior;
     const calibration::TrackLog& log = frames_.log();
     const double hours = (log.frame(log.size() - 1).stamp - prior.found).to_seconds() / 3600.0;
     if (estimating())
@@ -129,7 +129,7 @@ void OnlineCalibrator::start_solve() noexcept {
     else
       calibration::let_drift(hours, options_.calibration, &prior);
   }
-  solve_.start(frames_.log(), start);
+  solve_.start(frames_.log(), request);
 }
 
 SolutionReview OnlineCalibrator::review() const noexcept {
@@ -151,7 +151,7 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
   if (!solve_.outdated(estimating()) && !review().held_out_enough()) return std::nullopt;
   // An estimate is adopted as soon as the frames after its snapshot confirm it, and rejected only
   // when more of them would not help. A refinement waits only for its held-out frames.
-  if (solve_.for_new_rig() && !solve_.outdated(estimating()) && !solve_.last_turn()) {
+  if (solve_.for_new_rig() && !solve_.outdated(estimating()) && !solve_.must_decide()) {
     if (review().gate() != Gate::open) {
       solve_.postpone();
       return std::nullopt;
@@ -181,7 +181,7 @@ std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::
   // Frames of two rigs or out of sync cannot measure a focal length.
   const Gate gate = review().gate(false);
   if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
-    solve_.focal_check().accept(frames_.solved_frames() >= frames_.most());
+    solve_.focal_check().accept(frames_.solved_frames() >= frames_.max_frames());
   return solve_.for_new_rig() ? evaluate_estimate(stamp, number)
                               : evaluate_refinement(stamp, number, last);
 }
@@ -208,7 +208,7 @@ void OnlineCalibrator::plan_search() noexcept {
     // More frames help: sigmas fall with the root of their number.
     const double excess =
         calibration::depth_excess(found.rig, options_.calibration, options_.odometry.pixel_sigma);
-    frames_.want(static_cast<std::size_t>(std::ceil(excess * excess * found.frames)));
+    frames_.require(static_cast<std::size_t>(std::ceil(excess * excess * found.frames)));
   } else if (gate_ == Gate::rig_changed) {
     search_.onset = found.changed_at;
     search_.frames_before_change_dropped = true;
@@ -217,8 +217,8 @@ void OnlineCalibrator::plan_search() noexcept {
     // Solving the same frames again gives the same result, so drop them. Each rejection doubles the
     // frames until the next solve, up to a full log.
     frames_.drop_before(found.newest + 1);
-    search_.wait = std::min(std::max(frames_.least(), 2 * search_.wait), frames_.most());
-    frames_.want_new(search_.wait);
+    search_.wait = std::min(std::max(frames_.min_frames(), 2 * search_.wait), frames_.max_frames());
+    frames_.require_logged(search_.wait);
   }
 }
 
@@ -285,13 +285,13 @@ void OnlineCalibrator::plan_refinement() noexcept {
     frames_.begin_segment(found.newest + 1);
   } else if (gate_ == Gate::rig_changed) {
     frames_.begin_segment(found.changed_at);
-  } else if (frames_.solved_frames() >= frames_.most()) {
+  } else if (frames_.solved_frames() >= frames_.max_frames()) {
     if (usable) refined_ = found.rig;
     frames_.begin_segment(found.newest + 1);
-    frames_.want_full();
+    frames_.require_full();
   } else {
     // Sigmas fall with the root of the number of frames.
-    frames_.want(2 * frames_.solved_frames());
+    frames_.require(2 * frames_.solved_frames());
   }
 }
 

@@ -24,7 +24,7 @@ class SolutionReview;
 ///     calibrator.frames().add(odometry, out, frame);  // every posed frame
 ///     if (calibrator.can_solve()) calibrator.start_solve();
 ///     if (const auto decision = calibrator.decide(frame.stamp, frame.number))
-///       if (decision->accepted) calibrator.use(*decision);
+///       if (decision->accepted) calibrator.adopt(*decision);
 ///
 /// Not thread-safe, apart from the solver's task. Memory from the arena at construction.
 class OnlineCalibrator {
@@ -65,7 +65,7 @@ class OnlineCalibrator {
   /// nothing is known to be missing.
   [[nodiscard]] Reason missing() const noexcept;
 
-  /// Call when the map was built with the calibration in use; monitoring of the rig starts here.
+  /// Call when the map was rebuilt with the adopted calibration; monitoring of the rig starts here.
   void map_rebuilt(const odometry::Odometry& odometry) noexcept;
   /// Drops all frames and restarts the monitors, because earlier frames no longer describe the rig.
   /// The calibration in use stays.
@@ -73,13 +73,13 @@ class OnlineCalibrator {
   /// Call when the map was lost. Logged tracks end there, and earlier measurements no longer apply,
   /// because the rig may have changed meanwhile.
   void map_lost() noexcept;
-  /// Puts the estimated calibration of this decision into use.
-  void use(const CalibrationDecision& found) noexcept;
-  /// Puts a refined calibration into use; the logged frames stay.
-  void refine(const RigCalibration& rig) noexcept;
-  /// Ends the estimation without a result: the calibration in use is as good and stays.
+  /// Adopts the estimated calibration of this decision.
+  void adopt(const CalibrationDecision& found) noexcept;
+  /// Adopts a refined calibration; the logged frames stay.
+  void adopt_refinement(const RigCalibration& rig) noexcept;
+  /// Ends the estimation without a result: the calibration in use is as good and is kept.
   void keep() noexcept;
-  /// Puts an earlier calibration back into use, because the images fit it.
+  /// Adopts an earlier calibration again, because the images fit it.
   void restore(const RigCalibration& rig) noexcept;
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return state_ != CalibrationState::none; }

@@ -66,7 +66,7 @@ RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
                        std::size_t capacity, Arena& arena)
     : options_(options), cameras_(cameras) {
   for (int k = 1; k < cameras; ++k)
-    watched_[static_cast<std::size_t>(k)].emplace(options, capacity, arena);
+    monitors_[static_cast<std::size_t>(k)].emplace(options, capacity, arena);
   stereo_ = BoundedVector<calibration::StereoObservation>(
       arena.make<calibration::StereoObservation>(capacity, "monitored matches"));
 }
@@ -92,21 +92,21 @@ void RigMonitor::set_jump_reference(const RigCalibration& rig) noexcept {
 
 void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
                                        const Mat6& covariance) noexcept {
-  Watched& w = camera(k);
+  CameraMonitors& w = camera(k);
   (void)w.monitor.set_reference(T_camera_left, pinhole(rig_, 0), pinhole(rig_, k), covariance);
   w.grace = kGraceFrames;
 }
 
 void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
                              bool solved_and_verified) noexcept {
-  map_reset_pending_ = false;
+  map_rebuild_pending_ = false;
   watch(rig, solved_and_verified);
   for (int k = 1; k < cameras_; ++k) camera(k).pairing.reset();
-  map_renewed(map);
+  map_rebuilt(map);
 }
 
 /// The next frame is compared with the points created in this one.
-void RigMonitor::map_renewed(const odometry::Map& map) noexcept {
+void RigMonitor::map_rebuilt(const odometry::Map& map) noexcept {
   for (int k = 1; k < cameras_; ++k) {
     // The next frame differs from a distorted one without a change of the rig.
     if (camera(k).distorted) {
@@ -120,7 +120,7 @@ void RigMonitor::map_renewed(const odometry::Map& map) noexcept {
 
 void RigMonitor::begin_unlinked(const RigCalibration& rig) noexcept {
   T_left_world_before_.reset();
-  map_reset_pending_ = false;
+  map_rebuild_pending_ = false;
   for (int k = 1; k < cameras_; ++k) camera(k).T_camera_left_before = transform(rig, k);
   set_jump_reference(rig);
 }
@@ -185,7 +185,7 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   if (first) T_left_world_before_.reset();
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < cameras_; ++k) {
-    Watched& w = camera(k);
+    CameraMonitors& w = camera(k);
     if (first) w.jumps.reset();
     if (!both_show(outcome, k)) {
       w.jumps.skip(step);
@@ -204,7 +204,7 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
 MonitorResult RigMonitor::update_monitor(int k, const odometry::Odometry& odometry,
                                          const odometry::FrameOutcome& outcome,
                                          const RigFrame& frame, int found, bool moving) noexcept {
-  Watched& w = camera(k);
+  CameraMonitors& w = camera(k);
   calibration::MonitorFrame f;
   f.frame = frame.number;
   f.moving = moving;
@@ -224,10 +224,60 @@ MonitorResult RigMonitor::update_monitor(int k, const odometry::Odometry& odomet
   return v;
 }
 
+void RigMonitor::update_pairing(int k, std::uint64_t number, RigAssessment* rig) noexcept {
+  calibration::PairingEvidence& pairing = camera(k).pairing;
+  const double before = pairing.distance_px();
+  pairing.next(number, stereo_.span(), transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k));
+  // A pose biased by a distorted image changes the disparities of the frames before and after it.
+  camera(k).distorted =
+      pairing.distance_px() > kFarFromLines && pairing.distance_px() > kDistortionRatio * before;
+  rig->cameras_in_sync = rig->cameras_in_sync && pairing.cameras_in_sync();
+  if (pairing.lag_frames() != 0) rig->lag_frames = pairing.lag_frames();
+  rig->margins.lag = std::max(rig->margins.lag, pairing.lag_margin());
+}
+
+calibration::DisparityJump RigMonitor::update_jumps(int k, const odometry::FrameOutcome& outcome,
+                                                    std::uint64_t number,
+                                                    const Transform& step) noexcept {
+  if (both_show(outcome, k) && !camera(k).distorted)
+    return camera(k).jumps.next(number, stereo_.span(), step);
+  camera(k).jumps.skip(step);
+  return {};
+}
+
+void RigMonitor::add_to_assessment(int k, MonitorResult v, const calibration::DisparityJump& jump,
+                                   bool verified, RigAssessment* rig) const noexcept {
+  using Kind = MonitorResult::Kind;
+  // A lag moves matches off the epipolar lines, and changes disparities whenever the speed changes.
+  // So no change of the rig is reported while cameras may be out of sync.
+  const calibration::PairingEvidence& pairing = camera(k).pairing;
+  const bool may_lag = pairing.suspected() || pairing.questioned();
+  // One frame over the threshold decides nothing until the next one confirms it.
+  if (!v.undecided && !may_lag)
+    rig->margins.change = std::max(rig->margins.change, v.statistic / options_.threshold);
+  const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
+  if (may_lag || (!verified && change)) {
+    v.undecided = v.undecided || v.kind != Kind::quiet || pairing.suspected();
+    v.kind = Kind::quiet;
+  }
+  if (jump.confirmed && may_lag) {
+    v.undecided = true;
+  } else if (jump.confirmed && v.kind < Kind::knock) {
+    v.kind = Kind::knock;
+    v.onset_frame = jump.onset_frame;
+    v.evidence = to_evidence(jump, pinhole(rig_, k).fx);
+  }
+  rig->margins.jump = std::max(rig->margins.jump, jump.over_limit);
+  rig->undecided = rig->undecided || v.undecided || jump.suspected;
+  if (v.kind <= rig->kind) return;
+  rig->kind = v.kind;
+  rig->onset_frame = v.onset_frame;
+  rig->evidence = v.evidence;
+}
+
 RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
                                  const odometry::FrameOutcome& outcome, const RigFrame& frame,
                                  bool verified) noexcept {
-  using Kind = MonitorResult::Kind;
   RigAssessment rig;
   rig.cameras_in_sync = true;
   const double seconds = T_left_world_before_ ? (frame.stamp - stamp_before_).to_seconds() : 0;
@@ -236,48 +286,11 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
   const bool moving = seconds > 0 && step.t.norm() > kMovingSpeed * seconds;
   for (int k = 1; k < cameras_; ++k) {
     const int found = collect_stereo(odometry.map(), k, kMinFound);
-    calibration::PairingEvidence& pairing = camera(k).pairing;
-    const double before = pairing.distance_px();
-    pairing.next(frame.number, stereo_.span(), transform(rig_, k), pinhole(rig_, 0),
-                 pinhole(rig_, k));
-    rig.cameras_in_sync = rig.cameras_in_sync && pairing.cameras_in_sync();
-    if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
-    // A pose biased by a distorted image changes the disparities of the frames before and after it.
-    bool& distorted = camera(k).distorted;
-    distorted =
-        pairing.distance_px() > kFarFromLines && pairing.distance_px() > kDistortionRatio * before;
-    calibration::DisparityJump jump;
-    if (both_show(outcome, k) && !distorted)
-      jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
-    else
-      camera(k).jumps.skip(step);
+    update_pairing(k, frame.number, &rig);
+    const calibration::DisparityJump jump = update_jumps(k, outcome, frame.number, step);
     MonitorResult v;
-    if (!map_reset_pending_) v = update_monitor(k, odometry, outcome, frame, found, moving);
-    // A lag moves matches off the epipolar lines, and changes disparities whenever the speed
-    // changes. So no change of the rig is reported while cameras may be out of sync.
-    const bool may_lag = pairing.suspected() || pairing.questioned();
-    // One frame over the threshold decides nothing until the next one confirms it.
-    if (!v.undecided && !may_lag)
-      rig.margins.change = std::max(rig.margins.change, v.statistic / options_.threshold);
-    const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
-    if (may_lag || (!verified && change)) {
-      v.undecided = v.undecided || v.kind != Kind::quiet || pairing.suspected();
-      v.kind = Kind::quiet;
-    }
-    if (jump.confirmed && may_lag) {
-      v.undecided = true;
-    } else if (jump.confirmed && v.kind < Kind::knock) {
-      v.kind = Kind::knock;
-      v.onset_frame = jump.onset_frame;
-      v.evidence = to_evidence(jump, pinhole(rig_, k).fx);
-    }
-    rig.margins.jump = std::max(rig.margins.jump, jump.over_limit);
-    rig.margins.lag = std::max(rig.margins.lag, pairing.lag_margin());
-    rig.undecided = rig.undecided || v.undecided || jump.suspected;
-    if (v.kind <= rig.kind) continue;
-    rig.kind = v.kind;
-    rig.onset_frame = v.onset_frame;
-    rig.evidence = v.evidence;
+    if (!map_rebuild_pending_) v = update_monitor(k, odometry, outcome, frame, found, moving);
+    add_to_assessment(k, v, jump, verified, &rig);
   }
   return rig;
 }

@@ -52,15 +52,15 @@ class RigMonitor {
   void expect_scatter(double bias_px) noexcept;
   /// Sets the calibration that the jump detectors compare with.
   void set_jump_reference(const RigCalibration& rig) noexcept;
-  /// Call when a calibration is adopted; until map_rebuilt() only jumps are evaluated.
-  void expect_rebuilt_scene() noexcept { map_reset_pending_ = true; }
-  [[nodiscard]] bool map_reset_pending() const noexcept { return map_reset_pending_; }
+  /// Call when a calibration is adopted; until the map is rebuilt with it only jumps are evaluated.
+  void expect_map_rebuild() noexcept { map_rebuild_pending_ = true; }
+  [[nodiscard]] bool map_rebuild_pending() const noexcept { return map_rebuild_pending_; }
   /// Call when the map was rebuilt with the adopted calibration, which becomes the reference.
   void map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
                    bool solved_and_verified) noexcept;
   /// Call when the map was rebuilt with the same calibration: jumps are measured from its points
   /// on.
-  void map_renewed(const odometry::Map& map) noexcept;
+  void map_rebuilt(const odometry::Map& map) noexcept;
   /// Call when the cameras are unlinked because a calibration is estimated.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
@@ -84,8 +84,8 @@ class RigMonitor {
 
  private:
   /// Monitors of one additional camera.
-  struct Watched {
-    Watched(const calibration::MonitorOptions& options, std::size_t capacity, Arena& arena)
+  struct CameraMonitors {
+    CameraMonitors(const calibration::MonitorOptions& options, std::size_t capacity, Arena& arena)
         : monitor(options, arena), jumps(capacity, arena), pairing(capacity, arena) {}
     calibration::Monitor monitor;
     calibration::DisparityJumpDetector jumps;
@@ -98,7 +98,12 @@ class RigMonitor {
     Transform T_camera_left_before;
   };
 
-  [[nodiscard]] Watched& camera(int k) noexcept { return *watched_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] CameraMonitors& camera(int k) noexcept {
+    return *monitors_[static_cast<std::size_t>(k)];
+  }
+  [[nodiscard]] const CameraMonitors& camera(int k) const noexcept {
+    return *monitors_[static_cast<std::size_t>(k)];
+  }
   void set_monitor_reference(int k, const Transform& T_camera_left,
                              const Mat6& covariance) noexcept;
   /// Result of camera k's monitor; the caller handles jumps.
@@ -110,6 +115,18 @@ class RigMonitor {
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Fills `stereo_` with camera k's matches. Returns the number of active points among them.
   int collect_stereo(const odometry::Map& map, int k, int min_found) noexcept;
+  /// Adds the matches in `stereo_` to camera k's pairing evidence, and fills in whether the cameras
+  /// are in sync.
+  void update_pairing(int k, std::uint64_t number, RigAssessment* rig) noexcept;
+  /// Compares the disparities in `stereo_` with those of the previous frame.
+  [[nodiscard]] calibration::DisparityJump update_jumps(int k,
+                                                        const odometry::FrameOutcome& outcome,
+                                                        std::uint64_t number,
+                                                        const Transform& step) noexcept;
+  /// Combines camera k's results into the assessment of the rig, which is that of the worst camera.
+  void add_to_assessment(int k, calibration::MonitorResult v,
+                         const calibration::DisparityJump& jump, bool verified,
+                         RigAssessment* rig) const noexcept;
   /// Number of points that camera k should show at this pose.
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
                                     const Transform& T_left_world) const noexcept;
@@ -117,13 +134,13 @@ class RigMonitor {
   const calibration::MonitorOptions& options_;
   const int cameras_;
   // Element k belongs to camera k ≥ 1; element 0 is empty.
-  std::array<std::optional<Watched>, kMaxCameras> watched_;
+  std::array<std::optional<CameraMonitors>, kMaxCameras> monitors_;
   BoundedVector<calibration::StereoObservation> stereo_;
   RigCalibration rig_{};
   bool solved_and_verified_ = false;
   std::optional<Transform> T_left_world_before_;
   Stamp stamp_before_{};
-  bool map_reset_pending_ = false;
+  bool map_rebuild_pending_ = false;
 };
 
 }  // namespace vergence

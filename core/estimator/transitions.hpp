@@ -18,7 +18,7 @@ enum class Trigger : std::uint8_t {
   /// A gate rejected the solution.
   calibration_rejected,
   /// The solution is no better than the calibration in use.
-  calibration_saved,
+  calibration_kept,
   /// The monitor detected a change of the rig.
   rig_changed,
   /// A recalibration was requested.
@@ -62,7 +62,7 @@ inline constexpr std::array kTransitions = {
     Transition{State::stereo_odometry, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::recalibrating, Trigger::calibration_accepted, State::stereo_odometry,
                "the new calibration is accepted"},
-    Transition{State::recalibrating, Trigger::calibration_saved, State::stereo_odometry,
+    Transition{State::recalibrating, Trigger::calibration_kept, State::stereo_odometry,
                "the calibration in use fits as well as a new one"},
     Transition{State::recalibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "relocalised"},

@@ -40,13 +40,13 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
   LevelOutcome out{AlignStatus::diverged, x, y, 0.F, 0.F};
   const float trace = 0.5F * (w.hxx + w.hyy);
   const float det = w.hxx * w.hyy - w.hxy * w.hxy;
-  const float least = trace - std::sqrt(std::max(0.F, trace * trace - det));
+  const float min_eigenvalue = trace - std::sqrt(std::max(0.F, trace * trace - det));
   if (!(w.variance_sum > kMinContrast * kMinContrast * kPixels) ||
-      !(least > kMinHessian * kPixels)) {
+      !(min_eigenvalue > kMinHessian * kPixels)) {
     out.status = AlignStatus::flat;
     return out;
   }
-  out.sigma = 1.F / std::sqrt(least);
+  out.sigma = 1.F / std::sqrt(min_eigenvalue);
   const float ixx = w.hyy / det, ixy = -w.hxy / det, iyy = w.hxx / det;
   const float start_x = x, start_y = y;
   // Vector loads read kWindowStride + 1 pixels of a row, which must not exceed the image's last

@@ -314,7 +314,7 @@ int decompose_essential(const Mat3& E, std::span<const Vec2> left, std::span<con
   W << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   const std::array<Mat3, 2> rotations = {U * W * V.transpose(), U * W.transpose() * V.transpose()};
   const Vec3 t = U.col(2);
-  int most = 0;
+  int most_in_front = 0;
   for (const Mat3& R : rotations) {
     // The opposite t reverses the signs of both depths.
     int ahead = 0, reversed = 0;
@@ -324,10 +324,11 @@ int decompose_essential(const Mat3& E, std::span<const Vec2> left, std::span<con
       ahead += l > 0 && r > 0 ? 1 : 0;
       reversed += l < 0 && r < 0 ? 1 : 0;
     }
-    if (ahead > most) *T_right_left = {normalised(R), baseline * t}, most = ahead;
-    if (reversed > most) *T_right_left = {normalised(R), -baseline * t}, most = reversed;
+    if (ahead > most_in_front) *T_right_left = {normalised(R), baseline * t}, most_in_front = ahead;
+    if (reversed > most_in_front)
+      *T_right_left = {normalised(R), -baseline * t}, most_in_front = reversed;
   }
-  return most;
+  return most_in_front;
 }
 
 }  // namespace vergence

@@ -32,10 +32,10 @@ Vec3 log_so3(const Mat3& R) noexcept {
 double rotation_angle(const Mat3& R) noexcept { return log_so3(R).norm(); }
 
 Mat32 tangent_basis(const Vec3& unit) noexcept {
-  int least = 0;
-  (void)unit.cwiseAbs().minCoeff(&least);
+  int smallest = 0;
+  (void)unit.cwiseAbs().minCoeff(&smallest);
   Mat32 B;
-  B.col(0) = unit.cross(Vec3::Unit(least)).normalized();
+  B.col(0) = unit.cross(Vec3::Unit(smallest)).normalized();
   B.col(1) = unit.cross(B.col(0));
   return B;
 }

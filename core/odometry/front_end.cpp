@@ -93,7 +93,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
   };
   for_each_camera(build);
   ImageCheck check;
-  bool renewed = false;
+  bool any_new = false;
   for (int k = 0; k < cameras_; ++k) {
     const auto i = static_cast<std::size_t>(k);
     if (!frame.images[i].empty()) add_camera(&check.given, k);
@@ -103,14 +103,14 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
       structured[i] = false;
     }
     if (repeated[i]) check.repeated = true;
-    if (structured[i] && !repeated[i]) renewed = true;
+    if (structured[i] && !repeated[i]) any_new = true;
     // A repeated image of an additional camera is from another instant; the left camera's pose is
     // valid.
     if (k > 0 && repeated[i] && !repeated[0]) structured[i] = false;
     if (structured[i]) add_camera(&check.structured, k);
   }
   check.left_repeated = repeated[0];
-  check.uneven = check.repeated && renewed;
+  check.uneven = check.repeated && any_new;
   structured_ = check.structured;
   return check;
 }

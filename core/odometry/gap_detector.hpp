@@ -26,17 +26,17 @@ class GapDetector {
     return since;
   }
   /// Checks a frame `dt` seconds after the last pose, or after the last frame if that had structure
-  /// but no pose. `renew`: the map can be rebuilt. Returns dt if it is a gap, else 0.
-  [[nodiscard]] double check(double dt, bool renew) noexcept {
+  /// but no pose. `can_rebuild`: the map can be rebuilt. Returns dt if it is a gap, else 0.
+  [[nodiscard]] double check(double dt, bool can_rebuild) noexcept {
     const double usual = usual_interval();
     const bool gap = usual > 0 && dt > kLongest * usual;
-    if (gap && !before_ && renew) due_ = true;
+    if (gap && !before_ && can_rebuild) due_ = true;
     before_ = gap;
     return gap ? dt : 0;
   }
-  [[nodiscard]] bool renewal_due() const noexcept { return due_; }
+  [[nodiscard]] bool rebuild_due() const noexcept { return due_; }
   /// Clears the request, because the map was replaced or cannot be rebuilt.
-  void clear_renewal() noexcept { due_ = false; }
+  void clear_rebuild() noexcept { due_ = false; }
 
  private:
   // Number of newest intervals whose median is the usual one.

@@ -39,13 +39,13 @@ void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = rig; }
 void Odometry::unlink() noexcept {
   if (link_ == Link::linked) last_rig_ = rig_;
   link_ = Link::unlinked;
-  gaps_.clear_renewal();
+  gaps_.clear_rebuild();
   next_rig_.reset();
   // The transform is only measured in this frame, with about the error of a calibration.
   front_end_.set_band(2 * options_.band_px);
 }
 
-bool Odometry::wants_keyframe() const noexcept {
+bool Odometry::needs_keyframe() const noexcept {
   const std::size_t last = map_.order()[map_.order().size() - 1];
   std::array<float, kMaxPoints> turn;
   std::size_t n = 0;
@@ -60,7 +60,7 @@ bool Odometry::wants_keyframe() const noexcept {
   return median(std::span(turn).first(n)) > options_.keyframe_parallax * rig_.intrinsics[0].fx;
 }
 
-double Odometry::renew_scale(std::size_t slot) noexcept {
+double Odometry::update_scale(std::size_t slot) noexcept {
   const double length = map_.keyframe(slot).T_camera_left[1].t.norm();
   if (!(length > 0.1 * rig_.baseline && length < 10.0 * rig_.baseline)) return 1.0;
   const double factor = rig_.baseline / length;
@@ -80,7 +80,7 @@ void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
     if (window.usable) rig_.T_camera_left = window_.T_camera_left();
     out->corrected = map_.keyframe(slot).T_left_world * motion_.T_left_world().inverse();
   } else {
-    out->scale = renew_scale(slot);
+    out->scale = update_scale(slot);
     rig_.T_camera_left = map_.keyframe(slot).T_camera_left;
   }
   motion_.correct(map_.keyframe(slot).T_left_world);
@@ -109,7 +109,7 @@ void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
   const Reason of_images = weakness(images, rig_.cameras);
   if (of_images != Reason::none)
     out->reason = of_images;
-  else if (out->gap_s > 0 || gaps_.renewal_due())
+  else if (out->gap_s > 0 || gaps_.rebuild_due())
     out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
     out->reason = Reason::single_camera;
@@ -186,9 +186,9 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kNearEnough;
   if (next_rig_ && out.images_good) {
     out.relink_due = true;
-  } else if (gaps_.renewal_due() && out.images_good && fit.confirmed_stereo() && !all_far) {
-    out.renewal_due = true;
-  } else if (fit.confirmed_stereo() && !images.repeated && wants_keyframe()) {
+  } else if (gaps_.rebuild_due() && out.images_good && fit.confirmed_stereo() && !all_far) {
+    out.map_rebuild_due = true;
+  } else if (fit.confirmed_stereo() && !images.repeated && needs_keyframe()) {
     out.effort = effort;
     make_keyframe(frame.stamp, &out);
     out.T_left_world = motion_.T_left_world();

@@ -53,9 +53,9 @@ struct FrameOutcome {
   double points_kept = 0;
 
   /// True if rebuild() will rebuild the map from this frame after a gap.
-  bool renewal_due = false;
+  bool map_rebuild_due = false;
   /// True if rebuild() has rebuilt the map.
-  bool renewed = false;
+  bool map_rebuilt = false;
   /// True if the rig's transform was estimated from this frame's images alone.
   bool initialised = false;
 
@@ -161,11 +161,11 @@ class Odometry {
   void settle_points(const PoseFit& fit) noexcept;
   /// Updates stereo_fails_.
   void count_across(const PoseFit& fit) noexcept;
-  [[nodiscard]] bool wants_keyframe() const noexcept;
+  [[nodiscard]] bool needs_keyframe() const noexcept;
   void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;
   /// Creates candidate points. Returns the time it took, in ms.
   double new_points(int min_corners, FrameOutcome* out) noexcept;
-  [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
+  [[nodiscard]] double update_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_map(const Transform& T_left_world, Stamp stamp,
                                FrameOutcome* out) noexcept;

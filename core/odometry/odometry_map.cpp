@@ -57,7 +57,7 @@ bool Odometry::start_map(const Transform& T_left_world, Stamp stamp, FrameOutcom
     map_.clear();
     front_end_.add_points(T_left_world, PointStage::active, &map_);
     new_points_.reset();
-    gaps_.clear_renewal();
+    gaps_.clear_rebuild();
     keyframe_points_ = map_.observe(map_.make_keyframe({T_left_world, rig_.T_camera_left, stamp}));
     out->posed = true;
     out->keyframe = true;
@@ -133,14 +133,14 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
       out->status = PoseStatus::degraded;
       out->reason = Reason::no_stereo_matches;
     }
-  } else if (gaps_.renewal_due() && out->renewal_due) {
+  } else if (gaps_.rebuild_due() && out->map_rebuild_due) {
     FrameOutcome built;
     built.stage_ms = out->stage_ms;
-    out->renewed = start_map(motion_.T_left_world(), motion_.stamp(), &built);
-    out->keyframe = out->keyframe || out->renewed;
+    out->map_rebuilt = start_map(motion_.T_left_world(), motion_.stamp(), &built);
+    out->keyframe = out->keyframe || out->map_rebuilt;
     out->stage_ms = built.stage_ms;
     // The old map continues if a new one cannot be built.
-    gaps_.clear_renewal();
+    gaps_.clear_rebuild();
   }
 }
 

@@ -69,9 +69,9 @@ void ChangeDetector::measure_scatter() noexcept {
 
 void ChangeDetector::follow_spread(const StereoResiduals& e) noexcept {
   const auto follow = [](double* mean, double value, double rate) {
-    const double most = kSpreadOutlier * *mean;
+    const double limit = kSpreadOutlier * *mean;
     // The comparison also rejects NaN.
-    if (value > -most) *mean += rate * (std::min(value, most) - *mean);
+    if (value > -limit) *mean += rate * (std::min(value, limit) - *mean);
   };
   if (history_.frames() == 0) {
     now_fast_ = now_slow_ = e.spread_now;
@@ -163,18 +163,18 @@ MonitorResult ChangeDetector::decide() noexcept {
     if (detector_[w] <= EvidenceHistory::kRecent) {
       for (; summed < detector_[w]; ++summed) sum.add(history_.recent(summed).evidence);
     } else {
-      history_.sum_of(detector_[w], &sum);
+      history_.sum_newest(detector_[w], &sum);
     }
     const Evidence inflated = effective(sum);
-    double most = statistic(inflated, Vec5::Zero(), covariance_);
+    double largest = statistic(inflated, Vec5::Zero(), covariance_);
     // Only this comparison shows a change smaller than the reference's own error.
     if (count >= 2 * detector_[w]) {
       Vec5 reference;
       Mat5 covariance;
       estimate_reference(sum, &reference, &covariance);
-      most = std::max(most, statistic(inflated, reference, covariance));
+      largest = std::max(largest, statistic(inflated, reference, covariance));
     }
-    if (most > d.statistic) d.statistic = most, window = detector_[w];
+    if (largest > d.statistic) d.statistic = largest, window = detector_[w];
   }
   newest_statistic_ = d.statistic;
   const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;
@@ -224,7 +224,7 @@ void ChangeDetector::attribute(std::size_t window, MonitorResult* d) const noexc
   if (history_.frames() >= 2 * window) {
     Evidence sum;
     Mat5 covariance;
-    history_.sum_of(window, &sum);
+    history_.sum_newest(window, &sum);
     estimate_reference(sum, &mean, &covariance);
   }
   Search found;

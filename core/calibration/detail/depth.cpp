@@ -40,7 +40,8 @@ DepthGradient depth_gradient(const CovisiblePoint& p, const Transform& T, int k,
   return g;
 }
 
-double variance_of(const RigCalibration& rig, int k, const DepthGradient& g, bool joint) noexcept {
+double depth_variance(const RigCalibration& rig, int k, const DepthGradient& g,
+                      bool joint) noexcept {
   double sum = 0;
   const auto n = static_cast<std::size_t>(g.count), c = static_cast<std::size_t>(k);
   if (joint) {

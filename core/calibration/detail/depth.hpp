@@ -71,8 +71,8 @@ struct DepthGradient {
 
 /// Variance of the relative depth; without `joint` only by the transform's covariance_total or, if
 /// that is zero, sigma_total.
-[[nodiscard]] double variance_of(const RigCalibration& rig, int k, const DepthGradient& g,
-                                 bool joint) noexcept;
+[[nodiscard]] double depth_variance(const RigCalibration& rig, int k, const DepthGradient& g,
+                                    bool joint) noexcept;
 
 /// Computes the depths that a rig assigns to pairs of pixels.
 class DepthReader {

@@ -18,7 +18,7 @@ void EvidenceHistory::close_block() noexcept {
   open_ = Entry{};
 }
 
-void EvidenceHistory::sum_of(std::size_t frames, Evidence* sum) const noexcept {
+void EvidenceHistory::sum_newest(std::size_t frames, Evidence* sum) const noexcept {
   *sum = open_.evidence;
   const std::size_t open = open_frames();
   const std::size_t count =

@@ -46,7 +46,7 @@ class EvidenceHistory {
   }
   /// Sums the evidence of the newest `frames` frames, extended to the edge of the block that holds
   /// the oldest of them.
-  void sum_of(std::size_t frames, Evidence* sum) const noexcept;
+  void sum_newest(std::size_t frames, Evidence* sum) const noexcept;
   /// Sum of the evidence of all frames kept.
   [[nodiscard]] Evidence total() const noexcept;
 

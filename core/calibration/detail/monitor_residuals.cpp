@@ -72,12 +72,12 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
   result.usable =
       std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
                     [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
-  spread_of(result.evidence, fit, follow && result.usable, &result);
+  measure_spread(result.evidence, fit, follow && result.usable, &result);
   return result;
 }
 
-void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, bool follow,
-                                 StereoResiduals* result) noexcept {
+void MonitorResiduals::measure_spread(const Evidence& evidence, const Vec5& fit, bool follow,
+                                      StereoResiduals* result) noexcept {
   // With x a track's contribution to the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹
   // x|². The variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), with s the
   // sum of the track's earlier contributions.

@@ -58,8 +58,8 @@ class MonitorResiduals {
     std::uint32_t track = 0;
     Vec5 sum = Vec5::Zero();
   };
-  void spread_of(const Evidence& evidence, const Vec5& fit, bool follow,
-                 StereoResiduals* result) noexcept;
+  void measure_spread(const Evidence& evidence, const Vec5& fit, bool follow,
+                      StereoResiduals* result) noexcept;
 
   std::size_t rows_ = 0;
   std::array<StereoRow, kMaxObservations> stereo_{};

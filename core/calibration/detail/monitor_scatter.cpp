@@ -19,9 +19,9 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const Vec5 d = of_block.solve(block.g) - of_past.solve(past.g);
   const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
   const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
-  const double most = kMaxOfExpected * std::max(variance(), lambda / block.n);
+  const double limit = kMaxOfExpected * std::max(variance(), lambda / block.n);
   // The comparison also rejects NaN.
-  if (!(scatter < most)) return;
+  if (!(scatter < limit)) return;
   if (static_cast<double>(blocks_) >= kMaxBlocks) {
     sum_ *= (kMaxBlocks - 1) / kMaxBlocks;
     --blocks_;

@@ -28,7 +28,8 @@ class CovarianceBaseline {
     constexpr double kMoves = 2;
     return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
-  [[nodiscard]] bool unusual(double sigma_m) noexcept {
+  /// Adds a motion. Returns true if it is unusually uncertain; it does not enter the baseline then.
+  [[nodiscard]] bool update(double sigma_m) noexcept {
     recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
     ratio_ = kept_ >= kMin ? sigma_m / median() : 0;
     const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
@@ -41,7 +42,7 @@ class CovarianceBaseline {
     return false;
   }
 
-  /// Sigma of the last motion over the one that is unusual; 0 with too few motions to have one.
+  /// Sigma of the last motion over the limit of a usual one; 0 while there are too few motions.
   [[nodiscard]] double margin() const noexcept { return ratio_ / kMaxRatio; }
 
  private:

@@ -55,8 +55,8 @@ struct Estimator::Parts {
     (void)events.push(e);
   }
 
-  void lose_track_of_rig(std::uint64_t number) noexcept;
-  [[nodiscard]] Mat6 motion_of(const odometry::FrameOutcome& out) const noexcept;
+  void mark_calibration_unverified(std::uint64_t number) noexcept;
+  [[nodiscard]] Mat6 motion_covariance(const odometry::FrameOutcome& out) const noexcept;
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void record_length_sigma(const CalibrationDecision& decision) noexcept;
   void suspect_rig(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame,
@@ -72,7 +72,7 @@ struct Estimator::Parts {
   void adopt(const CalibrationDecision& decision) noexcept;
   void start_estimation(CalibrationCause cause, std::uint64_t onset,
                         const RigFrame& frame) noexcept;
-  void adopt_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void apply_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void notify_verified(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void notify_missing(Stamp stamp) noexcept;
@@ -85,7 +85,7 @@ struct Estimator::Parts {
   odometry::Odometry odometry;
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
-  CovarianceBaseline usual{};
+  CovarianceBaseline covariance_baseline{};
   // Margins of the decisions on the last frame.
   DecisionMargins margins{};
   DegradationLedger degradations{};

@@ -133,7 +133,7 @@ TEST(Comparison, idealInsAndTruePosesAgreeToAMillimetre) {
     EXPECT_LT((c.reference.T_enu_left.t - b.T_enu_left(t).t).norm(), 1e-3);
     EXPECT_LT(rotation_angle(c.reference.T_enu_left.R.transpose() * b.T_enu_left(t).R),
               0.001 * kDegree);
-    EXPECT_LT((b.plane.to_enu(c.ours.position) - b.T_enu_left(t).t).norm(), 1e-3);
+    EXPECT_LT((b.plane.to_enu(c.estimate.position) - b.T_enu_left(t).t).norm(), 1e-3);
     EXPECT_FALSE(c.scale_disagrees);
   }
   // All but the first 100 m: about 10 s of 100 s, and the last frame, whose INS never came.

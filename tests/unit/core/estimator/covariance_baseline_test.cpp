@@ -9,39 +9,39 @@ namespace {
 constexpr int kEnough = 15;
 
 CovarianceBaseline driven(int motions) {
-  CovarianceBaseline usual;
-  for (int i = 0; i < motions; ++i) EXPECT_FALSE(usual.unusual(0.010 + 0.002 * (i % 5)));
+  CovarianceBaseline baseline;
+  for (int i = 0; i < motions; ++i) EXPECT_FALSE(baseline.update(0.010 + 0.002 * (i % 5)));
   // The median is 0.014.
-  return usual;
+  return baseline;
 }
 
 TEST(CovarianceBaseline, threeTimesTheUsualSigmaIsUnusual) {
-  EXPECT_TRUE(driven(kEnough).unusual(0.043));
-  EXPECT_FALSE(driven(kEnough).unusual(0.041));
-  EXPECT_FALSE(driven(kEnough - 1).unusual(0.043)) << "too few to tell";
+  EXPECT_TRUE(driven(kEnough).update(0.043));
+  EXPECT_FALSE(driven(kEnough).update(0.041));
+  EXPECT_FALSE(driven(kEnough - 1).update(0.043)) << "too few to tell";
 }
 
 TEST(CovarianceBaseline, oneCertainMotionDoesNotEndIt) {
-  CovarianceBaseline usual = driven(100);
-  for (int i = 0; i < 5; ++i) (void)usual.unusual(0.06);
-  EXPECT_TRUE(usual.unusual(0.014));
-  for (int i = 0; i < 3; ++i) (void)usual.unusual(0.014);
-  EXPECT_FALSE(usual.unusual(0.014));
+  CovarianceBaseline baseline = driven(100);
+  for (int i = 0; i < 5; ++i) (void)baseline.update(0.06);
+  EXPECT_TRUE(baseline.update(0.014));
+  for (int i = 0; i < 3; ++i) (void)baseline.update(0.014);
+  EXPECT_FALSE(baseline.update(0.014));
 }
 
 TEST(CovarianceBaseline, standingIsNotEvaluated) {
   EXPECT_FALSE(CovarianceBaseline{}.measurable(0.027, 0.014));
   EXPECT_TRUE(CovarianceBaseline{}.measurable(0.029, 0.014));
-  const CovarianceBaseline usual = driven(kEnough);
-  EXPECT_FALSE(usual.measurable(0.027, 0.001));
-  EXPECT_TRUE(usual.measurable(0.029, 0.1)) << "seven times the usual";
+  const CovarianceBaseline baseline = driven(kEnough);
+  EXPECT_FALSE(baseline.measurable(0.027, 0.001));
+  EXPECT_TRUE(baseline.measurable(0.029, 0.1)) << "seven times the usual";
 }
 
 TEST(CovarianceBaseline, lastingUncertaintyStaysUnusual) {
-  CovarianceBaseline usual = driven(200);
-  for (int i = 0; i < 100; ++i) EXPECT_TRUE(usual.unusual(0.1)) << i;
-  for (int i = 0; i < 4; ++i) (void)usual.unusual(0.014);
-  EXPECT_FALSE(usual.unusual(0.014));
+  CovarianceBaseline baseline = driven(200);
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(baseline.update(0.1)) << i;
+  for (int i = 0; i < 4; ++i) (void)baseline.update(0.014);
+  EXPECT_FALSE(baseline.update(0.014));
 }
 
 }  // namespace

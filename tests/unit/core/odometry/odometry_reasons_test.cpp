@@ -32,7 +32,7 @@ TEST(OdometryReasons, gapAfterAnUnposedFrameIsReported) {
   ASSERT_TRUE(out.posed);
   EXPECT_NEAR(out.gap_s, kGap, 0.1);
   EXPECT_EQ(out.reason, Reason::time_gap);
-  EXPECT_TRUE(out.renewal_due);
+  EXPECT_TRUE(out.map_rebuild_due);
 }
 
 // The right camera's image confirms little of the left one's at a keyframe, and the rig stands from
