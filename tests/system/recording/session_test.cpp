@@ -22,10 +22,10 @@ namespace {
 
 using test::kSmall;
 using test::Outcome;
+using test::read_file;
 using test::run_vergence;
 using test::summary_of;
 using test::TemporaryFolder;
-using test::text_of;
 
 const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
 const std::string kRecord = " --set record.poses=on --set record.ins=on --set record.images=on";

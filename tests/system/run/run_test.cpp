@@ -22,11 +22,13 @@ namespace {
 
 using test::events;
 using test::kSmall;
+using test::lines_of;
 using test::Outcome;
+using test::read_file;
+using test::read_lines;
 using test::run_vergence;
 using test::summary_of;
 using test::TemporaryFolder;
-using test::text_of;
 
 const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
 Outcome drive(const std::filesystem::path& session, const std::string& more) {

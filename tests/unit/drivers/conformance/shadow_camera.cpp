@@ -1,10 +1,11 @@
 #include "tests/unit/drivers/conformance/shadow_camera.hpp"
 
 #include <gtest/gtest.h>
-#include <time.h>
 
 #include <chrono>
 #include <thread>
+
+#include "drivers/clock.hpp"
 
 namespace vergence::test {
 namespace {
