@@ -87,7 +87,7 @@ struct CameraStatistics {
   /// Frames returned by wait().
   std::uint64_t delivered = 0;
   /// Delivered frames that are incomplete.
-  std::uint64_t torn = 0;
+  std::uint64_t incomplete = 0;
   /// Exposures dropped because no slot was free.
   std::uint64_t underruns = 0;
   /// Exposures that were not received.

@@ -60,7 +60,7 @@ struct DeviceTiming {
   Duration resolution = Duration::microseconds(1);
 };
 
-/// Callback of a driver when new data can be taken. One Notifier may serve several devices.
+/// Callback of a driver when new data can be read. One Notifier may serve several devices.
 ///
 /// notify() runs on the driver's threads, at any time between start() and the return of stop(). It
 /// must not block or call the driver.

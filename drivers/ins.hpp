@@ -98,7 +98,7 @@ class InsDevice {
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
   /// Same contract as CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Returns the oldest sample not yet taken, in order of measurement, and waits at most `limit`
+  /// Returns the oldest sample not yet read, in order of measurement, and waits at most `limit`
   /// for it (0: does not wait). With `disconnected`, reading->arrival is the time when the
   /// disconnect was detected. → ok, timeout, stopped, ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;

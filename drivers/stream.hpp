@@ -13,7 +13,7 @@ namespace vergence {
 /// Element of the stream to a device's consumer, in order of arrival.
 template <class T>
 struct Delivery {
-  enum class What : std::uint8_t { item, gone, back, end } what = What::item;
+  enum class What : std::uint8_t { item, disconnected, reconnected, end } what = What::item;
   HostStamp arrival{};
   T value{};
 };
@@ -21,7 +21,7 @@ struct Delivery {
 /// Queue from the thread of a driver to the consumer of its device.
 ///
 /// Threads  The producer calls push(), full(), empty() and wait_for_room(); the owner start() and
-///          stop(); one consumer take(), which takes no lock if the limit is 0.
+///          stop(); one consumer pop(), which takes no lock if the limit is 0.
 /// Full     push() returns false. The driver then drops and counts, or, in virtual time, waits for
 ///          room.
 template <class T, std::size_t N>
@@ -36,14 +36,14 @@ class Stream {
     return true;
   }
   [[nodiscard]] bool full() const noexcept { return ring_.full(); }
-  /// True if everything pushed so far was taken.
+  /// True if everything pushed so far was popped.
   [[nodiscard]] bool empty() const noexcept { return ring_.empty(); }
   /// Returns when there is room or the device is stopped.
   void wait_for_room() const noexcept {
     for (;;) {
-      const std::uint32_t seen = taken_.load(std::memory_order_acquire);
+      const std::uint32_t seen = popped_.load(std::memory_order_acquire);
       if (!full() || !streaming()) return;
-      taken_.wait(seen, std::memory_order_acquire);
+      popped_.wait(seen, std::memory_order_acquire);
     }
   }
   [[nodiscard]] bool streaming() const noexcept {
@@ -65,7 +65,7 @@ class Stream {
         ended_ = true;
         return DeviceStatus::ended;
       }
-      // A `gone` is followed only by `back` or `end`.
+      // A `disconnected` is followed only by `reconnected` or `end`.
       disconnected_ = false;
     }
     streaming_.store(true, std::memory_order_release);
@@ -81,14 +81,14 @@ class Stream {
     }
     filled_.notify_all();
   }
-  /// Drops what was not taken, and the disconnected state. Preconditions: stopped, the producer's
-  /// thread has ended and no thread is in take().
+  /// Drops what was not popped, and the disconnected state. Preconditions: stopped, the producer's
+  /// thread has ended and no thread is in pop().
   void clear() noexcept {
     for (Delivery<T> d; ring_.pop(&d);) ended_ = ended_ || d.what == Delivery<T>::What::end;
     disconnected_ = false;
   }
 
-  [[nodiscard]] DeviceStatus take(Duration limit, Delivery<T>* d) noexcept {
+  [[nodiscard]] DeviceStatus pop(Duration limit, Delivery<T>* d) noexcept {
     if (!streaming()) return DeviceStatus::stopped;
     if (disconnected_) return DeviceStatus::disconnected;
     if (ended_) return DeviceStatus::ended;
@@ -101,7 +101,7 @@ class Stream {
       if (!ring_.pop(d)) return DeviceStatus::timeout;
     }
     notify_release();
-    disconnected_ = d->what == Delivery<T>::What::gone;
+    disconnected_ = d->what == Delivery<T>::What::disconnected;
     ended_ = d->what == Delivery<T>::What::end;
     return disconnected_ ? DeviceStatus::disconnected
            : ended_      ? DeviceStatus::ended
@@ -110,14 +110,14 @@ class Stream {
 
  private:
   void notify_release() noexcept {
-    taken_.fetch_add(1, std::memory_order_release);
-    taken_.notify_one();
+    popped_.fetch_add(1, std::memory_order_release);
+    popped_.notify_one();
   }
 
   Ring<Delivery<T>, N> ring_;
   std::atomic<bool> streaming_{false};
-  // Counts taken elements. Has the width of a futex, so that waiting needs no proxy.
-  std::atomic<std::uint32_t> taken_{0};
+  // Counts popped elements. Has the width of a futex, so that waiting needs no proxy.
+  std::atomic<std::uint32_t> popped_{0};
   // Only the consumer uses these two flags.
   bool disconnected_ = false, ended_ = false;
   std::mutex mutex_;

@@ -96,7 +96,7 @@ class TriggerDevice {
   [[nodiscard]] virtual DeviceTiming timing() const noexcept { return {}; }
   /// Starts the pulses. Same contract as CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Returns the oldest report not yet taken and waits at most `limit` for it (0: does not wait). →
+  /// Returns the oldest report not yet read and waits at most `limit` for it (0: does not wait). →
   /// ok, timeout, stopped, ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Pulse* pulse) noexcept = 0;
   /// Omits this number of pulses as soon as possible and then resumes: a gap that all cameras

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 const char* phrase(OfferResult verdict) {
   switch (verdict) {
-    case OfferResult::taken:
+    case OfferResult::accepted:
       return "taken";
     case OfferResult::not_seen:
       return "board not seen by both";
@@ -95,7 +95,7 @@ class Collection {
       seen.corners[k] =
           find_board(frame.images[k], request_.board, BoardSearch::quick, seen.corners[0]);
     const OfferResult result = collector_.offer(seen);
-    if (result == OfferResult::taken && request_.keep_views) keep(frame, number);
+    if (result == OfferResult::accepted && request_.keep_views) keep(frame, number);
     const auto needs = collector_.coverage().needs();
     state_.state = "calibrate";
     ++state_.frame;

@@ -55,7 +55,7 @@ OfferResult ViewCollector::offer(const BoardView& seen) {
     return OfferResult::nothing_new;
   coverage_.add(seen);
   views_.push_back(seen);
-  return OfferResult::taken;
+  return OfferResult::accepted;
 }
 
 }  // namespace vergence::app

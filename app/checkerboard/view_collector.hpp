@@ -7,7 +7,7 @@
 namespace vergence::app {
 
 enum class OfferResult : std::uint8_t {
-  taken,
+  accepted,
   /// Camera 0, or every other camera, does not see the whole target.
   not_seen,
   /// The target has moved since the last set, or was not seen then; different exposures would
@@ -41,7 +41,7 @@ class ViewCollector {
 
 /// Mean motion of the corners between two sets relative to the image width: 1 px of 640.
 inline constexpr double kStillOfWidth = 0.0015;
-/// Mean distance of the corners to those of every taken view, relative to the image width.
+/// Mean distance of the corners to those of every accepted view, relative to the image width.
 inline constexpr double kElsewhereOfWidth = 0.05;
 
 }  // namespace vergence::app

@@ -236,8 +236,8 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
   if (!fault.empty()) refuse(path, 0, "{}: {}; give a calibration with --calibration", name, fault);
   RosCamera camera = info.camera;
   const ImageSize size = bag.images.at(topic).images.front().image.size;
-  if (const std::string taken = apply_crop(info.crop, size, &camera); !taken.empty())
-    sequence->assumptions.push_back(name + ": " + taken);
+  if (const std::string remark = apply_crop(info.crop, size, &camera); !remark.empty())
+    sequence->assumptions.push_back(name + ": " + remark);
   return is_rectified(topic) ? rectified(camera) : camera;
 }
 

@@ -384,8 +384,8 @@ class RigReader {
                                       {"roi_height", &crop.height}})
       if (const Fact* fact = own(part, k))
         *value = static_cast<std::uint32_t>(fact->file->integer(fact->node, fact->key, 0, 1 << 20));
-    if (std::string taken = apply_crop(crop, size_, camera); !taken.empty())
-      remarks_->push_back(join_names(files_) + ": " + taken);
+    if (std::string remark = apply_crop(crop, size_, camera); !remark.empty())
+      remarks_->push_back(join_names(files_) + ": " + remark);
   }
 
   /// Uses the transforms of both cameras in a body.

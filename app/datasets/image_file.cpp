@@ -73,7 +73,7 @@ const char* to_phrase(ImageFileStatus status) noexcept {
       "cannot be read",
       "cannot be opened: this program or the machine has as many files open as it may (ulimit -n)",
       "is no PNG, JPEG, BMP or PGM image",
-      "is torn: it ends before the image is complete, or its check sums fail",
+      "is truncated: it ends before the image is complete, or its check sums fail",
       "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours, uncompressed BMP "
       "of 8, 24 or 32 bits can",
       "has another size than the calibration"};

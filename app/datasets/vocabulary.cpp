@@ -100,7 +100,7 @@ struct Side {
   bool word = false;
 };
 Side extract_side(std::vector<std::string>* tokens) {
-  const auto take = [&](std::size_t i, int number, bool word) {
+  const auto remove = [&](std::size_t i, int number, bool word) {
     tokens->erase(tokens->begin() + static_cast<std::ptrdiff_t>(i));
     return Side{number, word};
   };
@@ -109,10 +109,10 @@ Side extract_side(std::vector<std::string>* tokens) {
     if (const std::string& token = (*tokens)[i];
         token == "left" || token == "right" ||
         (n > 1 && i + 1 == n && (token == "l" || token == "r")))
-      return take(i, token[0] == 'r' ? 1 : 0, true);
+      return remove(i, token[0] == 'r' ? 1 : 0, true);
   for (std::size_t i = n; i-- > 0;)
     if (const std::string& token = (*tokens)[i]; is_number(token) && token.size() <= 2)
-      return take(i, std::stoi(token), false);
+      return remove(i, std::stoi(token), false);
   return {};
 }
 
@@ -179,7 +179,7 @@ class Walk {
       const std::string key = entry.first.Scalar();
       const std::string path = above.empty() ? key : above + "." + key;
       if (is_value(entry.second)) {
-        take(entry.second, path, groups, key);
+        add(entry.second, path, groups, key);
       } else {
         auto inner = groups;
         inner.push_back(key);
@@ -188,8 +188,8 @@ class Walk {
     }
   }
 
-  void take(const YAML::Node& node, const std::string& path, std::vector<std::string> groups,
-            std::string key) {
+  void add(const YAML::Node& node, const std::string& path, std::vector<std::string> groups,
+           std::string key) {
     if (const std::size_t dot = key.rfind('.'); dot != std::string::npos) {
       groups.push_back(key.substr(0, dot));
       key.erase(0, dot + 1);

@@ -84,7 +84,7 @@ void check_half(const Configuration& c, std::size_t k) {
                     camera_key(k), camera_key(j)));
 }
 
-/// The drivers in use, and who is taken.
+/// The drivers in use and the cameras already opened.
 class Openings {
  public:
   explicit Openings(const Configuration& c) : configuration_(c) {

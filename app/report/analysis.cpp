@@ -172,14 +172,14 @@ void compare_with_reference(const Session& s, const MatchedTrajectories& m, cons
     const Frame& f = s.frames[i];
     if (!f.posed) continue;
     const Transform T = laid.T_reference_world * f.T_world_left;
-    const Point ours = on_map(T.t, up_is_z);
-    a->ours_x[i] = ours.x, a->ours_y[i] = ours.y;
+    const Point estimate = on_map(T.t, up_is_z);
+    a->estimate_x[i] = estimate.x, a->estimate_y[i] = estimate.y;
     while (k < m.estimate.size() && m.estimate[k].stamp < f.stamp) ++k;
     if (k == m.estimate.size() || m.estimate[k].stamp != f.stamp) continue;
     const Transform& R = m.reference[k].T_world_body;
-    const Point theirs = on_map(R.t, up_is_z);
-    a->theirs_x[i] = theirs.x, a->theirs_y[i] = theirs.y;
-    a->horizontal_m[i] = std::hypot(ours.x - theirs.x, ours.y - theirs.y);
+    const Point reference = on_map(R.t, up_is_z);
+    a->reference_x[i] = reference.x, a->reference_y[i] = reference.y;
+    a->horizontal_m[i] = std::hypot(estimate.x - reference.x, estimate.y - reference.y);
     a->vertical_m[i] = up_is_z ? T.t.z() - R.t.z() : R.t.y() - T.t.y();
     a->heading_deg[i] =
         std::remainder(view_angle(T.R, up_is_z) - view_angle(R.R, up_is_z), 2 * std::numbers::pi) *
@@ -188,9 +188,10 @@ void compare_with_reference(const Session& s, const MatchedTrajectories& m, cons
 }
 
 void add_reference(const Session& s, Analysis* a) {
-  const std::vector<StampedPose> ours = posed_frames(s);
-  const MatchedTrajectories m =
-      ours.empty() ? MatchedTrajectories{} : associate(ours, s.reference, EvaluationOptions{});
+  const std::vector<StampedPose> estimate = posed_frames(s);
+  const MatchedTrajectories m = estimate.empty()
+                                    ? MatchedTrajectories{}
+                                    : associate(estimate, s.reference, EvaluationOptions{});
   if (m.estimate.empty()) {
     a->source_message =
         "No errors: the stamps of reference.tum and of the estimate do not overlap.";
@@ -215,7 +216,7 @@ void find_alignments(const Session& s, Analysis* a) {
   for (const Event& e : s.events)
     if (e.kind == "enu_alignment") stamps.push_back(e.stamp);
   std::sort(stamps.begin(), stamps.end());
-  a->placed_anew.assign(s.frames.size(), 0);
+  a->realigned.assign(s.frames.size(), 0);
   std::size_t next = 0;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const std::size_t before = next;
@@ -223,7 +224,7 @@ void find_alignments(const Session& s, Analysis* a) {
     if (a->placed_s.empty()) {
       if (s.frames[i].placed) a->placed_s.push_back(a->time_s[i]);
     } else if (next > before) {
-      a->placed_anew[i] = 1;
+      a->realigned[i] = 1;
       a->placed_s.push_back(a->time_s[i]);
     }
   }
@@ -245,8 +246,8 @@ void add_ins(const Session& s, Analysis* a) {
   bool compared = false;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
-    if (f.placed) a->ours_x[i] = f.enu[0], a->ours_y[i] = f.enu[1];
-    if (f.has_ins) a->theirs_x[i] = f.ins[0], a->theirs_y[i] = f.ins[1];
+    if (f.placed) a->estimate_x[i] = f.enu[0], a->estimate_y[i] = f.enu[1];
+    if (f.has_ins) a->reference_x[i] = f.ins[0], a->reference_y[i] = f.ins[1];
     if (!f.compared) continue;
     compared = true;
     a->horizontal_m[i] = std::hypot(f.error[0], f.error[1]);
@@ -266,13 +267,13 @@ void add_world(const Session& s, Analysis* a) {
   for (std::size_t i = 0; i < s.frames.size(); ++i)
     if (s.frames[i].posed) {
       const Point p = on_map(s.frames[i].T_world_left.t, false);
-      a->ours_x[i] = p.x, a->ours_y[i] = p.y;
+      a->estimate_x[i] = p.x, a->estimate_y[i] = p.y;
     }
 }
 
 void compare(const Session& s, Analysis* a) {
-  for (auto* curve : {&a->horizontal_m, &a->vertical_m, &a->heading_deg, &a->ours_x, &a->ours_y,
-                      &a->theirs_x, &a->theirs_y})
+  for (auto* curve : {&a->horizontal_m, &a->vertical_m, &a->heading_deg, &a->estimate_x,
+                      &a->estimate_y, &a->reference_x, &a->reference_y})
     curve->assign(s.frames.size(), kNone);
   const bool placed =
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.placed; });

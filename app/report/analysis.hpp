@@ -44,11 +44,11 @@ struct Analysis {
   /// Times of the ENU alignments.
   std::vector<double> placed_s;
   /// Not 0 for the first frame with another alignment.
-  std::vector<std::uint8_t> placed_anew;
+  std::vector<std::uint8_t> realigned;
   /// True if the map's axes are east and north.
   bool map_is_enu = false;
   /// In m.
-  std::vector<double> ours_x, ours_y, theirs_x, theirs_y;
+  std::vector<double> estimate_x, estimate_y, reference_x, reference_y;
 
   /// Numbers of frames.
   std::size_t read = 0, ok = 0, degraded = 0, lost = 0;

@@ -334,11 +334,11 @@ std::string assessment_section(const Session& s, const Analysis& a, const Assess
 std::string map_section(const Session& s, const Analysis& a) {
   const std::string map = map_plot(a, s.frames);
   if (map.empty()) return section("", "Map", "<p>No pose to draw.</p>");
-  const bool theirs =
-      std::any_of(a.theirs_x.begin(), a.theirs_x.end(), [](double v) { return std::isfinite(v); });
+  const bool has_reference = std::any_of(a.reference_x.begin(), a.reference_x.end(),
+                                         [](double v) { return std::isfinite(v); });
   std::string legend =
       "<p class=\"soft legend\"><span><i class=\"key k-ours\"></i>estimate (● start, ■ end)</span>";
-  if (theirs)
+  if (has_reference)
     legend += fmt::format("<span><i class=\"key k-theirs\"></i>{}</span>",
                           a.map_is_enu ? "INS" : "reference");
   if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>estimate, degraded</span>";

@@ -407,10 +407,10 @@ void draw_path(const char* css, const std::vector<double>& x, const std::vector<
 }
 
 /// Our way also breaks off where the drive was placed on the earth anew: that step was not driven.
-std::vector<std::uint8_t> breaks_of_ours(const Analysis& a) {
+std::vector<std::uint8_t> breaks_of_estimate(const Analysis& a) {
   std::vector<std::uint8_t> breaks = a.breaks;
-  for (std::size_t i = 0; i < std::min(breaks.size(), a.placed_anew.size()); ++i)
-    if (a.placed_anew[i] != 0) breaks[i] = 1;
+  for (std::size_t i = 0; i < std::min(breaks.size(), a.realigned.size()); ++i)
+    if (a.realigned[i] != 0) breaks[i] = 1;
   return breaks;
 }
 
@@ -419,11 +419,11 @@ void draw_breaks(const Analysis& a, const MapScale& s, Svg* svg) {
   // Distance in the drawing below which two marks are merged.
   constexpr double kApart = 6;
   Point last{-1e9, -1e9};
-  for (std::size_t i = 1; i < a.ours_x.size(); ++i) {
+  for (std::size_t i = 1; i < a.estimate_x.size(); ++i) {
     const bool ends =
-        std::isfinite(a.ours_x[i - 1]) && (!std::isfinite(a.ours_x[i]) || a.breaks[i] != 0);
+        std::isfinite(a.estimate_x[i - 1]) && (!std::isfinite(a.estimate_x[i]) || a.breaks[i] != 0);
     if (!ends) continue;
-    const Point p{s.x(a.ours_x[i - 1]), s.y(a.ours_y[i - 1])};
+    const Point p{s.x(a.estimate_x[i - 1]), s.y(a.estimate_y[i - 1])};
     if (std::hypot(p.x - last.x, p.y - last.y) < kApart) continue;
     svg->lines("curve s-bad", {{{p.x - 4, p.y - 4}, {p.x + 4, p.y + 4}},
                                {{p.x - 4, p.y + 4}, {p.x + 4, p.y - 4}}});
@@ -433,20 +433,20 @@ void draw_breaks(const Analysis& a, const MapScale& s, Svg* svg) {
 
 /// Degraded stretches lie over the path in their own colour.
 void draw_degraded(const Analysis& a, std::span<const Frame> frames, const MapScale& s, Svg* svg) {
-  std::vector<double> x = a.ours_x;
+  std::vector<double> x = a.estimate_x;
   for (std::size_t i = 0; i < x.size(); ++i)
     if (frames[i].status != PoseStatus::degraded) x[i] = kNone;
-  draw_path("curve map-care s-care", x, a.ours_y, breaks_of_ours(a), s, svg);
+  draw_path("curve map-care s-care", x, a.estimate_y, breaks_of_estimate(a), s, svg);
 }
 
 void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
-  const auto there = [&a](std::size_t i) { return std::isfinite(a.ours_x[i]); };
-  std::size_t first = 0, last = a.ours_x.size();
+  const auto there = [&a](std::size_t i) { return std::isfinite(a.estimate_x[i]); };
+  std::size_t first = 0, last = a.estimate_x.size();
   while (first < last && !there(first)) ++first;
   if (first == last) return;
   while (!there(last - 1)) --last;
-  svg->circle("f-ours", s.x(a.ours_x[first]), s.y(a.ours_y[first]), 4.5);
-  const double x = s.x(a.ours_x[last - 1]), y = s.y(a.ours_y[last - 1]);
+  svg->circle("f-ours", s.x(a.estimate_x[first]), s.y(a.estimate_y[first]), 4.5);
+  const double x = s.x(a.estimate_x[last - 1]), y = s.y(a.estimate_y[last - 1]);
   svg->rect("f-ours", x - 4, y - 4, 8, 8);
 }
 
@@ -471,17 +471,17 @@ void draw_north(const MapScale& s, Svg* svg) {
 
 std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
   Bounds bounds;
-  for (std::size_t i = 0; i < analysis.ours_x.size(); ++i) {
-    bounds.include(analysis.ours_x[i], analysis.ours_y[i]);
-    bounds.include(analysis.theirs_x[i], analysis.theirs_y[i]);
+  for (std::size_t i = 0; i < analysis.estimate_x.size(); ++i) {
+    bounds.include(analysis.estimate_x[i], analysis.estimate_y[i]);
+    bounds.include(analysis.reference_x[i], analysis.reference_y[i]);
   }
   if (!bounds.any) return {};
   const MapScale scale = scale_for(bounds);
   Svg svg(kPlotWidth, scale.height, "Trajectory seen from above");
-  draw_path("curve map-theirs s-theirs", analysis.theirs_x, analysis.theirs_y, analysis.breaks,
-            scale, &svg);
-  draw_path("curve map-ours s-ours", analysis.ours_x, analysis.ours_y, breaks_of_ours(analysis),
-            scale, &svg);
+  draw_path("curve map-theirs s-theirs", analysis.reference_x, analysis.reference_y,
+            analysis.breaks, scale, &svg);
+  draw_path("curve map-ours s-ours", analysis.estimate_x, analysis.estimate_y,
+            breaks_of_estimate(analysis), scale, &svg);
   draw_degraded(analysis, frames, scale, &svg);
   draw_breaks(analysis, scale, &svg);
   draw_ends(analysis, scale, &svg);

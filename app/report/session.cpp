@@ -53,7 +53,7 @@ class FileLines {
     for (;;) {
       in_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
       if (in_.eof()) {
-        torn_ = in_.gcount() > 0;
+        truncated_ = in_.gcount() > 0;
         return false;
       }
       if (in_.bad()) return false;
@@ -71,14 +71,14 @@ class FileLines {
     }
   }
   /// At the end: the file does not end with a line's end.
-  [[nodiscard]] bool torn() const noexcept { return torn_; }
+  [[nodiscard]] bool truncated() const noexcept { return truncated_; }
   /// At the end: the rest could not be read.
   [[nodiscard]] bool failed() const noexcept { return in_.bad(); }
 
  private:
   std::ifstream in_;
   std::string line_{};
-  bool begun_ = false, torn_ = false;
+  bool begun_ = false, truncated_ = false;
 };
 
 using Column = std::optional<std::size_t>;
@@ -174,9 +174,9 @@ void report_damage(const char* file, const FileLines& lines, std::size_t rows,
   if (lines.failed())
     session->missing.push_back(
         fmt::format("{}: reading it failed half way; the rest is left out", file));
-  else if (lines.torn())
+  else if (lines.truncated())
     session->missing.push_back(fmt::format(
-        "{}: the last line is torn and was left out; the session was not closed", file));
+        "{}: the last line is truncated and was left out; the session was not closed", file));
   if (disordered > 0)
     session->missing.push_back(
         fmt::format("{}: {} line{} left out whose stamp is not later than the one before", file,
@@ -418,7 +418,7 @@ void read_summary(const fs::path& folder, Session* session) {
   session->summary = nlohmann::json::parse(*text, nullptr, false);
   if (session->summary.is_object()) return;
   session->summary = nullptr;
-  session->missing.emplace_back("summary.json is torn; its figures are not known");
+  session->missing.emplace_back("summary.json is truncated; its figures are not known");
 }
 
 /// A drive that never found a calibration has none to write; its calibrations.csv and its summary

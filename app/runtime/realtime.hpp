@@ -21,7 +21,7 @@ struct ProcessThread {
   std::string name{};
 
   /// True for a thread named by this program; those of libraries have other names.
-  [[nodiscard]] bool ours() const noexcept { return name.starts_with("vergence"); }
+  [[nodiscard]] bool own() const noexcept { return name.starts_with("vergence"); }
 };
 
 /// Lists all threads of this program in `threads` by /proc/self/task. A new thread may still have

@@ -22,8 +22,8 @@ std::size_t columns(std::string_view utf8) noexcept {
 }
 
 std::string padded(std::string_view text, std::size_t width) {
-  const std::size_t taken = columns(text);
-  return std::string(text) + std::string(taken < width ? width - taken : 0, ' ');
+  const std::size_t used = columns(text);
+  return std::string(text) + std::string(used < width ? width - used : 0, ' ');
 }
 
 std::vector<std::string> wrapped(std::string_view text, std::size_t width) {

@@ -24,7 +24,7 @@ CalibrationWriter::CalibrationWriter(Options options)
   thread_.start(
       "vergence-state", [this] { (void)lines_.flush(); },
       [this](const Item* item) {
-        if (item != nullptr) take(*item);
+        if (item != nullptr) process(*item);
       });
 }
 
@@ -40,7 +40,7 @@ void CalibrationWriter::on_calibration(const CalibrationRecord& calibration) noe
   post(calibration);
 }
 
-void CalibrationWriter::take(const Item& item) {
+void CalibrationWriter::process(const Item& item) {
   std::visit([this](const auto& value) { write(value); }, item);
   (void)lines_.flush();
   lines_.write_back();

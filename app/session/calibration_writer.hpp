@@ -84,7 +84,7 @@ class CalibrationWriter final : public SessionObserver {
   using Item = std::variant<CalibrationRecord, Stamp>;
 
   void post(const Item& item) noexcept;
-  void take(const Item& item);
+  void process(const Item& item);
   void write(const CalibrationRecord& calibration);
   void write(Stamp verified);
   void keep(Stamp stamp, const RigCalibration& rig, bool found);

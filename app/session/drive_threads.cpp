@@ -42,28 +42,28 @@ void DriveThreads::poll(Progress* progress) {
   if (count >= kAtFirst && count % kLater != 0) return;
   process_threads(&threads_);
   for (const ProcessThread& thread : threads_)
-    if (thread.ours()) ours_.insert(thread.name);
+    if (thread.own()) own_.insert(thread.name);
   print(realtime_.apply(threads_), progress);
 }
 
 ThreadAllocationCounts DriveThreads::allocations() const {
   const ThreadAllocations::Counts counts = ThreadAllocations::counts();
-  std::map<std::string, std::uint64_t> ours, libraries;
-  for (const std::string& name : ours_) ours[name] = 0;
+  std::map<std::string, std::uint64_t> own, libraries;
+  for (const std::string& name : own_) own[name] = 0;
   for (std::size_t i = 0; i < counts.size; ++i) {
     const std::string name = counts.rows[i].name.data();
-    (ProcessThread{0, name}.ours() ? ours : libraries)[name] += counts.rows[i].count;
+    (ProcessThread{0, name}.own() ? own : libraries)[name] += counts.rows[i].count;
   }
   if (counts.others > 0) libraries["others"] = counts.others;
   ThreadAllocationCounts out;
-  out.ours.assign(ours.begin(), ours.end());
+  out.own.assign(own.begin(), own.end());
   out.libraries.assign(libraries.begin(), libraries.end());
   return out;
 }
 
 std::string allocations_message(const ThreadAllocationCounts& allocations) {
   std::string list;
-  for (const auto* names : {&allocations.ours, &allocations.libraries})
+  for (const auto* names : {&allocations.own, &allocations.libraries})
     for (const auto& [name, count] : *names)
       if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", name, count);
   return list.empty() ? "" : "runtime heap allocations: " + list;

@@ -31,7 +31,7 @@ class DriveThreads {
   RealtimeThreads realtime_;
   int polls_ = 0;
   std::vector<ProcessThread> threads_;
-  std::set<std::string> ours_{};
+  std::set<std::string> own_{};
 };
 
 /// `runtime heap allocations: vergence-sync 3`, with the threads that are not 0; empty:

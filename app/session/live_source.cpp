@@ -191,7 +191,7 @@ void LiveSource::poll() {
 }
 
 /// Real cameras do not end by themselves. A mock's do, after their last pulse, which a loaded
-/// machine brings late; but not where they are gone by then.
+/// machine brings late; but not if they are disconnected by then.
 std::chrono::steady_clock::time_point LiveSource::end() const {
   constexpr std::chrono::seconds kLate{3};
   const std::chrono::duration<double> drive(*request_.duration_s);
@@ -236,7 +236,7 @@ std::vector<std::pair<std::string, std::uint64_t>> LiveSource::counters() const 
       {"pulses_missed", c.sync.missed},
       {"sets_superseded", c.dropped_sets},
       {"readings_dropped", c.dropped_readings},
-      {"frames_incomplete", c.torn},
+      {"frames_incomplete", c.incomplete},
       {"sets_ambiguous", c.sync.ambiguous},
       {"clock_resets", c.clock_resets},
       {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};

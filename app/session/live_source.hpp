@@ -96,7 +96,7 @@ class LiveSource final : public FrameSource {
 ///
 /// Errors   InputError, DeviceError before the session folder is made, for all that can be known by
 ///          then. Afterwards messages on stderr.
-/// → as run_session(); device_failed: a camera was gone at the end
+/// → as run_session(); device_failed: a camera was disconnected at the end
 [[nodiscard]] ExitCode run_drive(const RunRequest& request);
 
 }  // namespace vergence::app

@@ -56,7 +56,7 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     file->append(files_->head(file));
   }
   thread_.start(
-      "vergence-record", [this] { begin(); }, [this](const Record* record) { take(record); });
+      "vergence-record", [this] { begin(); }, [this](const Record* record) { process(record); });
 }
 
 Recorder::~Recorder() { thread_.stop(); }
@@ -77,7 +77,7 @@ void Recorder::begin() {
 }
 
 /// Null: nothing waits, so that lines go to the files at once; else once a second.
-void Recorder::take(const Record* record) {
+void Recorder::process(const Record* record) {
   constexpr std::chrono::seconds kFlushInterval{1}, kWriteBack{2};
   if (record != nullptr) std::visit([this](const auto& r) { write(r); }, *record);
   const auto now = std::chrono::steady_clock::now();
@@ -103,7 +103,7 @@ void Recorder::write(const EventRecord& e) {
 void Recorder::write(const FrameReport& r) {
   const Stamp stamp = newest_ = r.pose.stamp;
   if (options_.disk_full) pretend(stamp);
-  format_frame(r, &line_);
+  format_pose_row(r, &line_);
   files_->poses.append(line_);
   totals_.add(r);
   if (r.pose.status == PoseStatus::lost) return;

@@ -83,7 +83,7 @@ class Recorder final : public SessionObserver {
 
   using Record = std::variant<FrameReport, EventRecord, InsRecord>;
   void begin();
-  void take(const Record* record);
+  void process(const Record* record);
   void post(const Record& record) noexcept;
   void write(const FrameReport& report);
   void write(const EventRecord& event);

@@ -204,7 +204,7 @@ void append_transform(std::string* line, const Transform& T, char between) {
 
 }  // namespace
 
-void format_frame(const FrameReport& r, std::string* line) {
+void format_pose_row(const FrameReport& r, std::string* line) {
   const PoseSample& p = r.pose;
   const bool posed = p.status != PoseStatus::lost;
   line->clear();

@@ -79,7 +79,7 @@ struct FrameCounts {
 };
 
 /// Report of one frame: input without images, pose, also in ENU next to the INS, and times.
-/// format_frame() formats it for poses.csv; unless lost, it is also a line of trajectory.tum.
+/// format_pose_row() formats it for poses.csv; unless lost, it is also a line of trajectory.tum.
 struct FrameReport : ComparedPose {
   FrameCounts counts{};
   /// Same as in RigFrame.
@@ -149,7 +149,7 @@ inline constexpr const char* kPosesHeader =
     "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
 /// Formats the line of poses.csv (kPosesHeader), end of line included; replaces the content of
 /// *line.
-void format_frame(const FrameReport& report, std::string* line);
+void format_pose_row(const FrameReport& report, std::string* line);
 /// Formats a line of a TUM file: the stamp in seconds, position, quaternion.
 void format_tum(Stamp stamp, const Transform& T, std::string* line);
 

@@ -102,12 +102,12 @@ void check_same_rig(const std::string& name, const CalibrationFile& file,
         "{}: has {} cameras, but the configuration has {}; use the calibration of this rig", name,
         file.rig.cameras, configured.rig.cameras));
   for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
-    const Intrinsics &theirs = file.rig.intrinsics[k], &ours = configured.rig.intrinsics[k];
-    if (theirs.width != ours.width || theirs.height != ours.height)
+    const Intrinsics &in_file = file.rig.intrinsics[k], &expected = configured.rig.intrinsics[k];
+    if (in_file.width != expected.width || in_file.height != expected.height)
       throw InputError(
           fmt::format("{}: is for images of {} x {} pixels, but cameras.{}.size is {} x {}; use "
                       "the calibration of this image size",
-                      name, theirs.width, theirs.height, k, ours.width, ours.height));
+                      name, in_file.width, in_file.height, k, expected.width, expected.height));
     if (!file.serials[k].empty() && !configured.serials[k].empty() &&
         file.serials[k] != configured.serials[k])
       remarks->push_back(fmt::format(

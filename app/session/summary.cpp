@@ -231,12 +231,12 @@ EvaluationOptions summary_evaluation_options() {
   return options;
 }
 
-std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours,
+std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& estimate,
                                                       const RigCalibration& truth) {
   std::vector<std::array<double, 6>> errors;
-  for (std::size_t k = 1; k < static_cast<std::size_t>(std::min(ours.cameras, truth.cameras));
+  for (std::size_t k = 1; k < static_cast<std::size_t>(std::min(estimate.cameras, truth.cameras));
        ++k) {
-    const Transform &a = ours.T_camera_left[k], &b = truth.T_camera_left[k];
+    const Transform &a = estimate.T_camera_left[k], &b = truth.T_camera_left[k];
     const Vec3 turn = log_so3(a.R * b.R.transpose()), shift = a.t - b.t;
     errors.push_back({turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()});
   }
@@ -262,7 +262,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
     sum += bytes;
   }
   memory["total_bytes"] = sum;
-  memory["allocations_by_thread"] = counters_json(input.allocations.ours);
+  memory["allocations_by_thread"] = counters_json(input.allocations.own);
   memory["allocations_by_library_thread"] = counters_json(input.allocations.libraries);
   json["memory"] = memory;
   const BudgetStatistics& work = totals.work_dropped;

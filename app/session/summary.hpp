@@ -21,7 +21,7 @@ namespace vergence::app {
 struct TruthMetrics {
   std::optional<TrajectoryEvaluation> evaluation;
   /// Errors of cameras 1 and up in the final calibration: rotation vector, rad;
-  /// translation, m; ours against the true one.
+  /// translation, m; estimate against the true one.
   std::vector<std::array<double, 6>> calibration_error{};
 };
 
@@ -29,7 +29,7 @@ struct TruthMetrics {
 /// delivered until the last (docs/deployment.md).
 struct ThreadAllocationCounts {
   /// Counts of the program's threads, also those with 0.
-  std::vector<std::pair<std::string, std::uint64_t>> ours{};
+  std::vector<std::pair<std::string, std::uint64_t>> own{};
   /// Counts of the libraries' threads.
   std::vector<std::pair<std::string, std::uint64_t>> libraries{};
 };
@@ -85,7 +85,7 @@ struct SummaryInput {
 
 /// Error of a calibration against the true one: rotation vector in rad and translation in m, which
 /// lead from the true transform of each camera k ≥ 1 to the estimated one (left perturbation).
-[[nodiscard]] std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours,
+[[nodiscard]] std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& estimate,
                                                                     const RigCalibration& truth);
 
 /// Content of summary.json with a fixed order of keys; missing values are null.

@@ -167,7 +167,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                          {"late", c.sync.late[k]},
                          {"duplicate", c.sync.duplicate[k]},
                          {"absent", c.sync.absent[k]},
-                         {"incomplete", s.torn},
+                         {"incomplete", s.incomplete},
                          {"underruns", s.underruns}}}});
   }
   if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
@@ -201,7 +201,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                           {"pulses_missed", c.sync.missed},
                           {"pushed_out", c.sync.pushed_out},
                           {"overtaken", c.dropped_sets},
-                          {"frames_incomplete", c.torn}}},
+                          {"frames_incomplete", c.incomplete}}},
                         {"cameras", cameras}};
   return {{"clocks", clocks},
           {"clock_resets", c.clock_resets},

@@ -126,23 +126,22 @@ void Acquisition::work() {
 }
 
 void Acquisition::poll() {
-  const bool always = options_.wait_when_full;
   for (std::size_t k = 0; k < heads_.size(); ++k) {
     auto& head = heads_[k];
     const bool held = head.held;
-    head.poll(this, always);
+    head.poll(this, reconnect());
     if (options_.frame_observer != nullptr && !held && head.held && !head.event &&
         head.value.status == FrameStatus::complete)
       options_.frame_observer->on_frame(k, head.value);
   }
   poll_ins();
-  board_head_.poll(this, always);
+  board_head_.poll(this, reconnect());
 }
 
 void Acquisition::poll_ins() {
-  ins_head_.poll(this, options_.wait_when_full);
-  if (ins_head_.back) {
-    ins_head_.back = false;
+  ins_head_.poll(this, reconnect());
+  if (ins_head_.reconnected) {
+    ins_head_.reconnected = false;
     ins_clock_->restart();
     if (sync_out_) sync_out_->restart();
   }
@@ -179,8 +178,8 @@ void Acquisition::push_frame(std::size_t k) {
     record_disconnect(camera, head.value.arrival);
     return;
   }
-  if (head.back) {
-    head.back = false;
+  if (head.reconnected) {
+    head.reconnected = false;
     clocks_[k].restart();
     counters_.cameras[k].restart();
     pairing_.restarted(k);
@@ -198,14 +197,14 @@ void Acquisition::push_frame(std::size_t k) {
   in.arrival = frame.arrival;
   in.exposure_start = frame.exposure_start;
   in.exposure = frame.exposure;
-  const bool torn = frame.status != FrameStatus::complete;
-  counters_.torn += torn ? 1 : 0;
-  if (torn) sync_.lost(in.camera, in.counter);
-  const bool taken = !torn && sync_.offer(in) == SyncResult::taken;
+  const bool incomplete = frame.status != FrameStatus::complete;
+  counters_.incomplete += incomplete ? 1 : 0;
+  if (incomplete) sync_.lost(in.camera, in.counter);
+  const bool accepted = !incomplete && sync_.offer(in) == SyncResult::accepted;
   pairing_.frame(k);
   record_pairing_changes(frame.arrival);
   if (options_.sync.mode == SyncMode::master_strobe && k == 0) pause_pulses();
-  if (taken) return;
+  if (accepted) return;
   AcquiredQueue::Refused refused;
   refused.set.present[k] = true;
   refused.set.slots[k] = frame.slot;
@@ -218,7 +217,7 @@ void Acquisition::record_disconnect(int camera, HostStamp when) {
   sync_.absent(camera);
   // A device that restarted without data was not reported as reconnected, so it is not disconnected
   // again.
-  if (!head.back) push_event(DeviceEvent::Kind::camera_disconnected, when, camera);
+  if (!head.reconnected) push_event(DeviceEvent::Kind::camera_disconnected, when, camera);
 }
 
 void Acquisition::push_reading() {
@@ -268,11 +267,12 @@ void Acquisition::poll_board() {
   if (head.event) {
     head.disconnected = true;
     // As for cameras, a restart without data is no reconnection.
-    if (!head.back) push_event(DeviceEvent::Kind::trigger_board_disconnected, head.value.arrival);
+    if (!head.reconnected)
+      push_event(DeviceEvent::Kind::trigger_board_disconnected, head.value.arrival);
     return;
   }
-  if (head.back) {
-    head.back = false;
+  if (head.reconnected) {
+    head.reconnected = false;
     push_event(DeviceEvent::Kind::trigger_board_reconnected, head.value.arrival);
   }
   push_pulse(head.value);

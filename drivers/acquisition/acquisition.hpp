@@ -26,7 +26,7 @@ namespace vergence {
 struct AcquisitionCounters {
   SyncCounters sync{};
   /// Incomplete frames, which are not used.
-  std::uint64_t torn = 0;
+  std::uint64_t incomplete = 0;
   /// Live: older sets that a newer one replaced.
   std::uint64_t dropped_sets = 0;
   /// Live: INS readings dropped because the ring was full.
@@ -62,12 +62,12 @@ struct StartFailure {
 /// Merges cameras, INS and trigger board into one stream of rig frames, INS samples and device
 /// events, with stamps on the host's clock mapped to Unix time.
 ///
-/// The drivers' threads notify one thread here, which takes their data in order of arrival, maps
+/// The drivers' threads notify one thread here, which reads their data in order of arrival, maps
 /// stamps, pairs images and fills a ring for the consumer's thread. Since the order is that of
 /// arrival, a mock in virtual time gives the same stream on every run.
 /// Pulses     Reports enter the synchroniser in order of arrival among the frames. Those that the
 ///            driver has not mapped are mapped here, with a new fit for every boot. A pause
-///            required by the synchroniser is requested when a report is taken, in virtual time
+///            required by the synchroniser is requested when a report is read, in virtual time
 ///            always at the same one. With `ins_syncout` the INS's samples report the pulses. A gap
 ///            is then made by stopping its stream, or camera 0's with `master_strobe`.
 ///
@@ -138,6 +138,9 @@ class Acquisition final : private Notifier {
   void notify() noexcept override { wake_.signal(); }
   void work();
   void poll();
+  [[nodiscard]] Reconnect reconnect() const noexcept {
+    return options_.wait_when_full ? Reconnect::at_each_poll : Reconnect::paced;
+  }
   void poll_ins();
   /// Index of the device whose oldest item arrived first: a camera, then the INS and the trigger
   /// board. −1 if there is none.

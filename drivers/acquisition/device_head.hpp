@@ -7,6 +7,14 @@
 
 namespace vergence {
 
+/// When a disconnected device is restarted.
+enum class Reconnect : std::uint8_t {
+  /// At most once per second.
+  paced,
+  /// At each poll: virtual time, in which a pause would depend on the machine's speed.
+  at_each_poll,
+};
+
 /// Oldest unconsumed item of a device and its connection state: a common way to poll cameras, INS
 /// and trigger board.
 ///
@@ -26,7 +34,7 @@ struct DeviceHead {
   bool event = false;
   bool disconnected = false;
   /// True after a restart that is not reported yet.
-  bool back = false;
+  bool reconnected = false;
   bool ended = false;
   /// Pulses reported since the newest frame of a camera.
   std::int64_t pulses_without = 0;
@@ -34,11 +42,10 @@ struct DeviceHead {
   std::int64_t next_attempt_ns = 0;
   Value value{};
 
-  /// Polls the device. A restarted device notifies `ready`. With `retry_always` (virtual time) a
-  /// disconnected device is retried at each poll.
-  void poll(Notifier* ready, bool retry_always) {
+  /// Polls the device. A restarted device notifies `ready`.
+  void poll(Notifier* ready, Reconnect reconnect) {
     if (device == nullptr) ended = true;
-    if (held || ended || (disconnected && !start_again(ready, retry_always))) return;
+    if (held || ended || (disconnected && !start_again(ready, reconnect))) return;
     const DeviceStatus status = device->wait(Duration{}, &value);
     event = status == DeviceStatus::disconnected;
     held = status == DeviceStatus::ok || event;
@@ -46,17 +53,17 @@ struct DeviceHead {
   }
 
  private:
-  [[nodiscard]] bool start_again(Notifier* ready, bool retry_always) {
+  [[nodiscard]] bool start_again(Notifier* ready, Reconnect reconnect) {
     const auto now = [] { return std::chrono::steady_clock::now().time_since_epoch().count(); };
     const std::int64_t begun = now();
-    if (!retry_always && begun < next_attempt_ns) return false;
+    if (reconnect == Reconnect::paced && begun < next_attempt_ns) return false;
     const DeviceStatus status = device->start(ready);
     const std::int64_t done = now();
     next_attempt_ns = done + std::max(kRetryIntervalNs, kMinPauseFactor * (done - begun));
     ended = status == DeviceStatus::ended;
     if (status != DeviceStatus::ok) return false;
     disconnected = false;
-    back = true;
+    reconnected = true;
     return true;
   }
 };

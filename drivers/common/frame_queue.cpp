@@ -40,13 +40,13 @@ void FrameQueue::end() noexcept {
 
 void FrameQueue::fail(HostStamp when) noexcept {
   const std::lock_guard lock(mutex_);
-  state_ = State::gone;
+  state_ = State::disconnected;
   disconnected_at_ = when;
 }
 
 void FrameQueue::fail() noexcept {
   const std::lock_guard lock(mutex_);
-  state_ = State::gone;
+  state_ = State::disconnected;
 }
 
 bool FrameQueue::drain(FrameSlot* slot) noexcept {
@@ -90,7 +90,7 @@ void FrameQueue::count_underrun() noexcept {
 void FrameQueue::lose(HostStamp when) noexcept {
   const std::lock_guard lock(mutex_);
   if (state_ != State::streaming) return;
-  state_ = State::gone;
+  state_ = State::disconnected;
   disconnected_at_ = when;
   changed_.notify_all();
   if (notifier_ != nullptr) notifier_->notify();
@@ -98,8 +98,8 @@ void FrameQueue::lose(HostStamp when) noexcept {
 
 void FrameQueue::ready_again() noexcept {
   const std::lock_guard lock(mutex_);
-  if (state_ == State::gone) state_ = State::back;
-  if (state_ == State::back && notifier_ != nullptr) notifier_->notify();
+  if (state_ == State::disconnected) state_ = State::reconnected;
+  if (state_ == State::reconnected && notifier_ != nullptr) notifier_->notify();
 }
 
 void FrameQueue::hear() noexcept {
@@ -133,11 +133,11 @@ DeviceStatus FrameQueue::wait_locked(std::unique_lock<std::mutex>* lock, Duratio
     offered_slots_ &= ~bit(frame->slot);
     held_slots_ |= bit(frame->slot);
     ++statistics_.delivered;
-    if (frame->status != FrameStatus::complete) ++statistics_.torn;
+    if (frame->status != FrameStatus::complete) ++statistics_.incomplete;
     return DeviceStatus::ok;
   }
   if (const HostStamp now = monotonic_now(); state_ == State::streaming && silent(now)) {
-    state_ = State::gone;
+    state_ = State::disconnected;
     disconnected_at_ = now;
   }
   if (state_ == State::streaming) return DeviceStatus::timeout;

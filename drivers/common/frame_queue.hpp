@@ -19,7 +19,7 @@ namespace vergence {
 ///
 ///     queue.begin(ready);                                    // the owner's start()
 ///     if (!queue.offer(frame)) give_back(frame.slot);        // the transport, each image
-///     if (lost_it) queue.lose(now);                          // `gone`, once all is handed out
+///     if (lost_it) queue.lose(now);                          // `disconnected`, once drained
 ///     if (queue.release(frame.slot)) give_back(frame.slot);  // the consumer's release()
 ///
 /// Ownership  An offered slot belongs to the queue, a handed-out slot to the consumer until
@@ -31,15 +31,15 @@ namespace vergence {
 /// Errors     No call throws.
 class FrameQueue {
  public:
-  /// lose() leads from streaming to gone. `back` means that the device has reconnected and start()
-  /// can resume.
-  enum class State : std::uint8_t { stopped, streaming, gone, back };
+  /// lose() leads from streaming to disconnected. `reconnected` means that the device has
+  /// reconnected and start() can resume.
+  enum class State : std::uint8_t { stopped, streaming, disconnected, reconnected };
 
   // Calls of the owner.
 
-  /// Starts streaming. Frames that were offered and not taken stay and are to be drained first.
-  /// `ready` may be null. `silence` is the time without an image after which the device counts as
-  /// disconnected (longer for the first image); zero disables this check.
+  /// Starts streaming. Frames that were offered and not handed out stay and are to be drained
+  /// first. `ready` may be null. `silence` is the time without an image after which the device
+  /// counts as disconnected (longer for the first image); zero disables this check.
   void begin(Notifier* ready, Duration silence = {}) noexcept;
   /// Stops streaming and wakes the thread in wait().
   void end() noexcept;
@@ -58,11 +58,11 @@ class FrameQueue {
   [[nodiscard]] bool offer(const Frame& frame) noexcept;
   void count_lost(std::uint64_t exposures) noexcept;
   void count_underrun() noexcept;
-  /// Changes from streaming to gone. Frames offered before are still handed out. Does nothing in
-  /// any other state.
+  /// Changes from streaming to disconnected. Frames offered before are still handed out. Does
+  /// nothing in any other state.
   void lose(HostStamp when) noexcept;
-  /// Changes from gone to back, so that start() can resume, and notifies the Notifier at every
-  /// call.
+  /// Changes from disconnected to reconnected, so that start() can resume, and notifies the
+  /// Notifier at every call.
   void ready_again() noexcept;
 
   // Call of the consumer.

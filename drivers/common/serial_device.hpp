@@ -130,9 +130,9 @@ class SerialDevice {
   }
 
   /// Called on the consumer's thread. With `disconnected`, value->arrival is set.
-  [[nodiscard]] DeviceStatus take(Duration limit, Value* value) noexcept {
+  [[nodiscard]] DeviceStatus pop(Duration limit, Value* value) noexcept {
     Item item;
-    const DeviceStatus status = out_.take(limit, &item);
+    const DeviceStatus status = out_.pop(limit, &item);
     if (status == DeviceStatus::disconnected) value->arrival = item.arrival;
     if (status == DeviceStatus::ok) *value = item.value;
     return status;
@@ -149,7 +149,7 @@ class SerialDevice {
   /// begin() calls it first.
   void report_streaming(HostStamp now) noexcept {
     away_.store(false, std::memory_order_release);
-    if (std::exchange(reported_disconnect_, false)) push({Item::What::back, now, {}}, true);
+    if (std::exchange(reported_disconnect_, false)) push({Item::What::reconnected, now, {}}, true);
   }
 
  private:
@@ -172,7 +172,8 @@ class SerialDevice {
         break;
       }
       away_.store(true, std::memory_order_release);
-      if (!std::exchange(reported_disconnect_, true)) push({Item::What::gone, when, {}}, true);
+      if (!std::exchange(reported_disconnect_, true))
+        push({Item::What::disconnected, when, {}}, true);
       close_line();
       // The link opened, but begin() failed: without a pause the device would be retried
       // continuously.

@@ -24,7 +24,7 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
   }
   void stop() noexcept final { this->stop_thread(); }
   [[nodiscard]] DeviceStatus wait(Duration limit, InsReading* reading) noexcept final {
-    const DeviceStatus status = this->take(limit, reading);
+    const DeviceStatus status = this->pop(limit, reading);
     if (status == DeviceStatus::ok) delivered_.fetch_add(1, std::memory_order_relaxed);
     return status;
   }

@@ -67,7 +67,7 @@ class Whole final : public Notifier {
     for (;;) {
       {
         const std::lock_guard lock(mutex_);
-        if (take(half, frame)) return DeviceStatus::ok;
+        if (pop(half, frame)) return DeviceStatus::ok;
         if (disconnected_) return notice(half, frame);
       }
       const auto left = Duration::nanoseconds((end - std::chrono::steady_clock::now()).count());
@@ -118,7 +118,7 @@ class Whole final : public Notifier {
     CameraStatistics s = camera_->statistics();
     const std::lock_guard lock(mutex_);
     s.delivered = waiting_[half].delivered;
-    s.torn = waiting_[half].torn;
+    s.incomplete = waiting_[half].incomplete;
     return s;
   }
 
@@ -131,7 +131,7 @@ class Whole final : public Notifier {
   struct Waiting {
     std::array<Frame, FramePool::kMaxSlots> frames{};
     std::size_t first = 0, count = 0;
-    std::uint64_t delivered = 0, torn = 0;
+    std::uint64_t delivered = 0, incomplete = 0;
   };
   void notify() noexcept override {
     for (std::size_t half = 0; half < ready_.size(); ++half) {
@@ -142,14 +142,14 @@ class Whole final : public Notifier {
     }
   }
 
-  bool take(std::size_t half, Frame* frame) noexcept {
+  bool pop(std::size_t half, Frame* frame) noexcept {
     Waiting& w = waiting_[half];
     if (w.count == 0) return false;
     *frame = w.frames[w.first];
     w.first = (w.first + 1) % w.frames.size();
     --w.count;
     ++w.delivered;
-    if (frame->status == FrameStatus::incomplete) ++w.torn;
+    if (frame->status == FrameStatus::incomplete) ++w.incomplete;
     return true;
   }
 

@@ -62,7 +62,7 @@ class StreamSink {
   /// Returns true to keep the slot until give_back(); not permitted if `spare` is false.
   [[nodiscard]] virtual bool frame(const Arrival& arrival) noexcept = 0;
   /// Reports that the device is disconnected; no call follows.
-  virtual void gone(HostStamp at) noexcept = 0;
+  virtual void disconnected(HostStamp at) noexcept = 0;
 };
 
 /// Capabilities of a bus, for choosing a mode.
@@ -99,8 +99,8 @@ class CameraBus : public RegisterPort {
   [[nodiscard]] virtual DeviceStatus start(StreamSink* sink) noexcept = 0;
   /// Stops the stream. The sink is not called after it returns. May be called twice.
   virtual void stop() noexcept = 0;
-  /// Finds the camera again after gone() and opens it. Precondition: stopped. → ok, disconnected,
-  /// no_permission, busy
+  /// Finds the camera again after disconnected() and opens it. Precondition: stopped. → ok,
+  /// disconnected, no_permission, busy
   [[nodiscard]] virtual DeviceStatus reopen() noexcept = 0;
 
   virtual void give_back(FrameSlot slot) noexcept = 0;

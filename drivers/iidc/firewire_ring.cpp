@@ -44,7 +44,7 @@ DeviceStatus FirewireRing::set_up(dc1394camera_t* camera, const std::string& dev
   queue_first_ = 0;
   queued_ = shape_.buffers;
   for (std::size_t i = 0; i < queued_; ++i) queue_[i] = static_cast<std::uint8_t>(i);
-  (void)returned_.take_all();
+  (void)returned_.pop_all();
   return DeviceStatus::ok;
 }
 
@@ -147,7 +147,7 @@ void FirewireRing::enqueue(std::size_t buffer) noexcept {
 }
 
 void FirewireRing::enqueue_returned() noexcept {
-  const std::uint64_t all = returned_.take_all();
+  const std::uint64_t all = returned_.pop_all();
   // Accepts slots of this ring only: a slot of the previous ring may have been released during the
   // change.
   std::uint64_t bits = all >> generation() * kMaxBuffers & 0xFFFF'FFFFU;
@@ -177,19 +177,19 @@ void FirewireRing::resume() noexcept {
   }
 }
 
-FirewireRing::Take FirewireRing::take(Filled* filled) noexcept {
+FirewireRing::PopResult FirewireRing::pop(Filled* filled) noexcept {
   dc1394video_frame_t* frame = nullptr;
-  if (!dequeue(&frame)) return Take::gone;
+  if (!dequeue(&frame)) return PopResult::disconnected;
   // A bus reset, or no frame.
-  if (frame == nullptr) return Take::nothing;
+  if (frame == nullptr) return PopResult::empty;
   // Cannot happen: the kernel would have filled a buffer that was not queued.
-  if (queued_ == 0) return Take::nothing;
+  if (queued_ == 0) return PopResult::empty;
   filled->slot = static_cast<FrameSlot>(generation() * kMaxBuffers + pop_queued());
   filled->broken = frame->total_bytes != shape_.frame_bytes;
   filled->spare = queued_ >= kReserve;
   filled->at_us = frame->timestamp;
   kept_.put(filled->slot);
-  return Take::filled;
+  return PopResult::filled;
 }
 
 void FirewireRing::refuse(FrameSlot slot) noexcept {

@@ -23,15 +23,15 @@ namespace vergence::iidc {
 ///            descriptor, which are released here. (Some kilobytes of its heap are leaked.)
 /// Ownership  The caller owns the camera and keeps it open from set_up() to end() or abandon().
 /// Threads    The comment above each group of calls names the thread; the owner's calls require
-///            that no thread takes.
+///            that no thread is in pop().
 /// Memory     Allocated by kernel and library in set_up(). No call waits for a frame.
 /// Errors     Only set_up() may throw, std::bad_alloc.
 class FirewireRing {
  public:
   static constexpr std::size_t kReserve = 3;
 
-  /// Result of take().
-  enum class Take : std::uint8_t { filled, nothing, gone };
+  /// Result of pop().
+  enum class PopResult : std::uint8_t { filled, empty, disconnected };
   struct Filled {
     /// Held until give_back() or refuse().
     FrameSlot slot = 0;
@@ -78,8 +78,8 @@ class FirewireRing {
   // Calls of the stream's thread. Precondition: captured().
   /// Descriptor that is readable when a buffer is filled.
   [[nodiscard]] int descriptor() const noexcept { return dc1394_capture_get_fileno(camera_); }
-  [[nodiscard]] Take take(Filled* filled) noexcept;
-  /// Returns a buffer of take() that is not used.
+  [[nodiscard]] PopResult pop(Filled* filled) noexcept;
+  /// Returns a buffer of pop() that is not used.
   void refuse(FrameSlot slot) noexcept;
   void enqueue_returned() noexcept;
 

@@ -13,7 +13,7 @@
 #include "drivers/clock.hpp"
 #include "drivers/iidc/firewire_bus.hpp"
 
-/// Thread that takes images from the ring of an IEEE 1394 camera.
+/// Thread that pops images from the ring of an IEEE 1394 camera.
 namespace vergence::iidc {
 namespace {
 
@@ -75,18 +75,18 @@ void FirewireBus::stream() noexcept {
   }
   if (stopping_.load(std::memory_order_acquire)) return;
   lost_.store(true, std::memory_order_release);
-  sink_->gone(monotonic_now());
+  sink_->disconnected(monotonic_now());
 }
 
 /// Returns false if the device is disconnected.
 bool FirewireBus::read_event() noexcept {
   FirewireRing::Filled filled;
-  switch (ring_.take(&filled)) {
-    case FirewireRing::Take::gone:
+  switch (ring_.pop(&filled)) {
+    case FirewireRing::PopResult::disconnected:
       return false;
-    case FirewireRing::Take::nothing:
+    case FirewireRing::PopResult::empty:
       return true;
-    case FirewireRing::Take::filled:
+    case FirewireRing::PopResult::filled:
       break;
   }
   Arrival a;

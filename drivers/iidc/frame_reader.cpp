@@ -93,10 +93,10 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
     f.counter = counter_.rebase(e.counter);
   } else {
     f.missing = counter_.known() ? static_cast<std::uint64_t>(counter_.step(e.counter) - 1) : 0;
-    f.counter = counter_.take(e.counter);
+    f.counter = counter_.unwrap(e.counter);
   }
   suspect_ = false;
-  f.taken = true;
+  f.accepted = true;
   f.stray = false;
   f.status = arrival.broken || arrival.bytes < shape_.image_bytes || holds_next_frame(arrival, e)
                  ? FrameStatus::incomplete
@@ -114,7 +114,7 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
 
 ReadFrame FrameReader::count_only(const Arrival& arrival) noexcept {
   ReadFrame f;
-  f.taken = true;
+  f.accepted = true;
   f.status = arrival.broken || arrival.bytes < shape_.image_bytes ? FrameStatus::incomplete
                                                                   : FrameStatus::complete;
   const HostStamp stamp = arrival.has_bus_stamp ? arrival.bus_stamp : arrival.at;
@@ -124,7 +124,7 @@ ReadFrame FrameReader::count_only(const Arrival& arrival) noexcept {
       f.missing = static_cast<std::uint64_t>(std::llround(periods)) - 1;
   }
   const auto step = static_cast<std::uint32_t>(f.missing + 1);
-  f.counter = counter_.take(any_ ? counter_.last() + step : 0);
+  f.counter = counter_.unwrap(any_ ? counter_.last() + step : 0);
   f.exposure_start = DeviceStamp(stamp.ns()) - exposure_;
   any_ = true;
   last_at_ = arrival.at;

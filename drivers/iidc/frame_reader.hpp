@@ -11,12 +11,12 @@ namespace vergence::iidc {
 /// Result of reading one arrival.
 struct ReadFrame {
   /// False if no exposure could be identified; its number, if any, appears as a gap.
-  bool taken = false;
-  /// True if not taken although long enough for a frame, which suggests a misaligned stream.
+  bool accepted = false;
+  /// True if not accepted although long enough for a frame, which suggests a misaligned stream.
   bool stray = false;
   FrameStatus status = FrameStatus::complete;
   std::uint64_t counter = 0;
-  /// Exposures missing between the last taken frame and this one.
+  /// Exposures missing between the last accepted frame and this one.
   std::uint64_t missing = 0;
   DeviceStamp exposure_start{};
 };

@@ -213,20 +213,20 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
   const auto nearest = [](const AbsoluteRange& r, double value) {
     return std::clamp(value, r.least, std::max(r.least, r.most));
   };
-  ExposureSetting taken{plan_.exposure, plan_.gain_db};
+  ExposureSetting applied{plan_.exposure, plan_.gain_db};
   if (const AbsoluteRange r = registers_.absolute_range(Feature::shutter); r.present)
-    taken.exposure = Duration::seconds(
+    applied.exposure = Duration::seconds(
         registers_.set_absolute(Feature::shutter, nearest(r, requested.exposure.to_seconds())));
   if (const AbsoluteRange r = registers_.absolute_range(Feature::gain); r.present)
-    taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, requested.gain_db));
+    applied.gain_db = registers_.set_absolute(Feature::gain, nearest(r, requested.gain_db));
   const DeviceStatus status = registers_.pop_status();
   if (status != DeviceStatus::ok)
     return status == DeviceStatus::disconnected ? status : DeviceStatus::failed;
   // The setting also applies after a stop or a reconnect.
-  plan_.exposure = taken.exposure;
-  plan_.gain_db = taken.gain_db;
-  (void)exposures_.change(taken, monotonic_now());
-  if (actual != nullptr) *actual = taken;
+  plan_.exposure = applied.exposure;
+  plan_.gain_db = applied.gain_db;
+  (void)exposures_.change(applied, monotonic_now());
+  if (actual != nullptr) *actual = applied;
   return DeviceStatus::ok;
 }
 
@@ -238,14 +238,14 @@ std::string IidcCamera::remark() const {
 // ---- the stream's thread
 
 bool IidcCamera::frame(const Arrival& arrival) noexcept {
-  // No frame follows a `gone`.
+  // No frame follows a disconnect.
   if (lost_.load(std::memory_order_acquire)) return false;
   const ExposureSetting& had = exposures_.at(arrival.at - transfer_ - exposure_now_);
   exposure_now_ = had.exposure;
   reader_.set_exposure(had.exposure);
   const ReadFrame read = reader_.read(arrival);
-  if (!read.taken) {
-    if (read.stray && ++strays_ == kStrays) gone(arrival.at);
+  if (!read.accepted) {
+    if (read.stray && ++strays_ == kStrays) disconnected(arrival.at);
     return false;
   }
   strays_ = 0;
@@ -273,7 +273,7 @@ bool IidcCamera::frame(const Arrival& arrival) noexcept {
   return offered && !convert;
 }
 
-void IidcCamera::gone(HostStamp at) noexcept {
+void IidcCamera::disconnected(HostStamp at) noexcept {
   if (lost_.exchange(true, std::memory_order_acq_rel)) return;
   queue_.lose(at);
 }

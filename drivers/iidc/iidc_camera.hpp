@@ -22,7 +22,7 @@ namespace vergence::iidc {
 /// Counter   The camera's embedded one, if any: gaps are exposures that were not received. `lost`
 ///           counts them once a later frame has arrived.
 /// Stamps    The camera's embedded clock (common to all cameras of a 1394 bus), else the arrival.
-/// Gone      Reported by the bus, after kStrays misaligned frames, or when a free-running camera is
+/// Unplug    Reported by the bus, after kStrays misaligned frames, or when a free-running camera is
 ///           silent (longest_silence()); start() resumes.
 /// Restart   start() writes all registers again, so the configuration survives a stop or a
 ///           reconnect.
@@ -61,7 +61,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
 
  private:
   [[nodiscard]] bool frame(const Arrival& arrival) noexcept override;
-  void gone(HostStamp at) noexcept override;
+  void disconnected(HostStamp at) noexcept override;
   [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& requested,
                                                 CameraConfiguration* actual);
   [[nodiscard]] DeviceStatus begin(Notifier* ready);

@@ -30,14 +30,14 @@ class SlotSet {
     return (bits_.fetch_and(~one, std::memory_order_acq_rel) & one) != 0;
   }
   /// Removes the lowest slot.
-  [[nodiscard]] std::optional<FrameSlot> take() noexcept {
+  [[nodiscard]] std::optional<FrameSlot> pop() noexcept {
     std::uint64_t bits = bits_.load(std::memory_order_acquire);
     while (bits != 0)
       if (bits_.compare_exchange_weak(bits, bits & (bits - 1), std::memory_order_acq_rel))
         return static_cast<FrameSlot>(std::countr_zero(bits));
     return std::nullopt;
   }
-  [[nodiscard]] std::uint64_t take_all() noexcept {
+  [[nodiscard]] std::uint64_t pop_all() noexcept {
     return bits_.exchange(0, std::memory_order_acq_rel);
   }
   [[nodiscard]] std::uint64_t bits() const noexcept {
@@ -66,7 +66,7 @@ class SlotMemory {
     each_ = each;
     free_.fill(slots);
   }
-  [[nodiscard]] std::optional<FrameSlot> acquire() noexcept { return free_.take(); }
+  [[nodiscard]] std::optional<FrameSlot> acquire() noexcept { return free_.pop(); }
   void release(FrameSlot slot) noexcept { free_.put(slot); }
   [[nodiscard]] std::uint8_t* bytes(FrameSlot slot) const noexcept {
     return reinterpret_cast<std::uint8_t*>(memory_.get()) + slot * each_;

@@ -519,7 +519,7 @@ void UsbBus::let_go() noexcept {
 void UsbBus::lose() noexcept {
   if (lost_.exchange(true, std::memory_order_acq_rel) || stopping_.load(std::memory_order_acquire))
     return;
-  sink_->gone(monotonic_now());
+  sink_->disconnected(monotonic_now());
 }
 
 void UsbBus::handle_events() noexcept {

@@ -52,13 +52,13 @@ constexpr FaultParameter kBreakPairs[] = {{"share", 1, 0, 1, "share of the pulse
                                           kDuration};
 constexpr FaultParameter kMissed[] = {kCamera1,
                                       {"pulses", 1, 1, 1e6, "number of consecutive pulses"}};
-constexpr FaultParameter kBoardGone[] = {
+constexpr FaultParameter kBoardDisconnected[] = {
     kDuration,
     {"powered", 0, 0, 1,
      "1: separate supply, pulses continue; 0: stops and restarts with the link"}};
 constexpr FaultParameter kReboot[] = {
     {"duration_s", 0.5, 0.01, kLongest, "time until it pulses again"}};
-constexpr FaultParameter kInsGone[] = {kDuration};
+constexpr FaultParameter kDurationOnly[] = {kDuration};
 constexpr FaultParameter kPositionJump[] = {
     {"east_m", 100, -1e5, 1e5, "jump towards east"},
     {"north_m", 0, -1e5, 1e5, "jump towards north"},
@@ -94,16 +94,16 @@ constexpr FaultRow kRows[] = {
     {FaultKind::missed_trigger, "missed_trigger",
      "A camera does not see a pulse: it exposes nothing and does not count it.", kMissed},
     {FaultKind::board_disconnected, "board_gone",
-     "The serial link to the trigger board is unplugged.", kBoardGone},
+     "The serial link to the trigger board is unplugged.", kBoardDisconnected},
     {FaultKind::board_reboot, "board_reboot",
      "The trigger board restarts: pulses stop; counter and clock begin at 0.", kReboot},
     {FaultKind::ins_disconnected, "ins_gone", "The INS sends nothing; at 0 s it starts late.",
-     kInsGone},
-    {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},
+     kDurationOnly},
+    {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kDurationOnly},
     {FaultKind::position_jump, "position_jump", "The position of the INS jumps.", kPositionJump},
     {FaultKind::time_jump, "time_jump", "A device's clock is set.", kTimeJump},
     {FaultKind::disk_full, "disk_full",
-     "The session's disk is full: lines wait in memory, up to 1 MB per file.", kInsGone},
+     "The session's disk is full: lines wait in memory, up to 1 MB per file.", kDurationOnly},
 };
 
 double number(std::string_view text, const std::string& what) {

@@ -35,9 +35,9 @@ struct MockRigOptions {
   Duration duration{};
   /// Delay from a pulse's edge to the start of the exposure, by camera.
   std::array<Duration, kMaxCameras> trigger_delay{};
-  /// Virtual time: the consumer takes the trigger board's reports in order of arrival. The
+  /// Virtual time: the consumer reads the trigger board's reports in order of arrival. The
   /// simulation then stays close behind the reports, so that a pause begins at the same pulse on
-  /// every run: the fourth after the newest report taken.
+  /// every run: the fourth after the newest report read.
   bool reports_read = false;
   /// Virtual time: the consumer finishes an image before it waits for camera 0 again, and may set
   /// the exposure in between. No image is then rendered ahead, so set_exposure() takes effect at

@@ -65,7 +65,7 @@ bool ClockMapper::far_off(DeviceStamp device, HostStamp host) const noexcept {
   return absurd(device, origin_) || absurd(host, host_origin_);
 }
 
-bool ClockMapper::take(Points* points, const Point& p, double side) const noexcept {
+bool ClockMapper::add_bound(Points* points, const Point& p, double side) const noexcept {
   const auto bin = static_cast<std::int64_t>(std::floor(p.device / in_ns(kBin)));
   if (points->count > 0 && bin <= points->newest_bin) {
     // Delays are compared along the line, so that drift inside the bin has no influence.
@@ -96,7 +96,7 @@ MappedStamp ClockMapper::at(DeviceStamp device) const noexcept {
 
 MappedStamp ClockMapper::begin_one_way(DeviceStamp device, HostStamp arrival) noexcept {
   begin(device, arrival - options_.min_delay);
-  (void)take(&upper_, {0, 0}, 1);
+  (void)add_bound(&upper_, {0, 0}, 1);
   pairs_ = 1;
   return at(device);
 }
@@ -144,7 +144,7 @@ MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
     return begin_one_way(device, arrival);
   }
   ++pairs_;
-  if (take(&upper_, p, 1)) fit_one_way();
+  if (add_bound(&upper_, p, 1)) fit_one_way();
   return at(device);
 }
 
@@ -187,8 +187,8 @@ void ClockMapper::begin_two_way(HostStamp t1, DeviceStamp t2, DeviceStamp t3,
                                 HostStamp t4) noexcept {
   begin(t2, t1 + ((t4 - t1) - (t3 - t2)) / 2);
   two_way_ = true;
-  (void)take(&lower_, point(t2, t1), -1);
-  (void)take(&upper_, point(t3, t4), 1);
+  (void)add_bound(&lower_, point(t2, t1), -1);
+  (void)add_bound(&upper_, point(t3, t4), 1);
   pairs_ = 1;
   fit_two_way();
 }
@@ -216,7 +216,7 @@ void ClockMapper::ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t
     return begin_two_way(t1, t2, t3, t4);
   }
   ++pairs_;
-  const bool raised = take(&lower_, early, -1), lowered = take(&upper_, late, 1);
+  const bool raised = add_bound(&lower_, early, -1), lowered = add_bound(&upper_, late, 1);
   if (!raised && !lowered) return;
   fit_two_way();
   // In ns; more than a crystal's rate bends the line within the window.

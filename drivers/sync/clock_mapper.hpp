@@ -106,7 +106,7 @@ class ClockMapper {
   [[nodiscard]] bool far_off(DeviceStamp device, HostStamp host) const noexcept;
   /// Returns true if the point is the best of its bin, so that the line may change. With `side` +1
   /// smaller delays are better, with −1 greater ones.
-  bool take(Points* points, const Point& p, double side) const noexcept;
+  bool add_bound(Points* points, const Point& p, double side) const noexcept;
   [[nodiscard]] double line(double device) const noexcept { return intercept_ + slope_ * device; }
   void fit_one_way() noexcept;
   void fit_two_way() noexcept;

@@ -47,8 +47,8 @@ void OpenSets::close(OpenSet* open) noexcept {
 }
 
 bool OpenSets::went_out_with(std::uint64_t number, std::size_t camera) const noexcept {
-  const Gone& gone = history_[number % kHistory];
-  return gone.used && gone.number == number && gone.present[camera];
+  const OutputSet& set = history_[number % kHistory];
+  return set.used && set.number == number && set.present[camera];
 }
 
 std::uint64_t OpenSets::first_free() const noexcept {

@@ -93,7 +93,7 @@ class OpenSets {
   void contradict_suspect(std::size_t camera) noexcept;
 
  private:
-  struct Gone {
+  struct OutputSet {
     std::uint64_t number = 0;
     std::array<bool, kMaxCameras> present{};
     bool used = false;
@@ -101,7 +101,7 @@ class OpenSets {
 
   Slots slots_{};
   std::size_t count_ = 0;
-  std::array<Gone, kHistory> history_{};
+  std::array<OutputSet, kHistory> history_{};
   bool any_out_ = false;
   std::uint64_t last_out_ = 0;
   std::int64_t last_time_ = 0;

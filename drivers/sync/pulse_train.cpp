@@ -35,7 +35,7 @@ PulseTrain::Step PulseTrain::add(const Pulse& pulse, std::uint64_t first_free) n
     entries_[0] = e;
     first_ = 0;
     count_ = 1;
-    return first ? Step::taken : Step::began;
+    return first ? Step::accepted : Step::began;
   }
   e.skipped = newest().skipped + (pulse.resumed ? steps - 1 : 0);
   if (count_ == kHeld) {
@@ -44,7 +44,7 @@ PulseTrain::Step PulseTrain::add(const Pulse& pulse, std::uint64_t first_free) n
   }
   entries_[(first_ + count_) % kHeld] = e;
   ++count_;
-  return Step::taken;
+  return Step::accepted;
 }
 
 const PulseTrain::Entry* PulseTrain::find(std::uint64_t number) const noexcept {

@@ -47,10 +47,10 @@ class PulseTrain {
     bool paused = false;
   };
   enum class Step : std::uint8_t {
-    taken,
+    accepted,
     /// Reported before.
     known,
-    /// Taken as the first pulse of a new train.
+    /// Accepted as the first pulse of a new train.
     began,
   };
 

@@ -49,7 +49,7 @@ SyncResult RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   source.newest = source.any ? std::max(source.newest, number) : number;
   source.any = true;
   by_counter_.record(number, frame.middle.host, k == 0 || !sources_[0].here);
-  return SyncResult::taken;
+  return SyncResult::accepted;
 }
 
 /// Result for a frame whose set was output with its image, without it, or before it was verified.

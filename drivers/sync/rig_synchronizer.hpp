@@ -22,7 +22,7 @@ namespace vergence {
 /// The result depends only on the input and its order; no clock is read.
 ///
 ///     RigSynchronizer synchronizer({.cameras = 2, .interval = Duration::milliseconds(50)});
-///     if (synchronizer.offer(frame) != SyncResult::taken) camera.release(frame.slot);
+///     if (synchronizer.offer(frame) != SyncResult::accepted) camera.release(frame.slot);
 ///     for (SyncedSet set; synchronizer.next(&set);)
 ///       if (set.complete) use(set.slots, set.stamp);  // its slots are the caller's again
 ///
@@ -40,8 +40,8 @@ namespace vergence {
 ///            from the others'.
 /// Limits     A camera that delivers the image of one exposure with the stamp of the next is not
 ///            detected here.
-/// Ownership  A slot that is `taken` is returned by next() in exactly one set and then belongs to
-///            the caller.
+/// Ownership  An `accepted` slot is returned by next() in exactly one set and then belongs to the
+///            caller.
 /// Cost       Not thread-safe. Fixed memory, kOpen pulses. Constant time per call.
 /// Errors     No call throws. Frames that cannot be paired are reported by SyncResult and counted.
 class RigSynchronizer {

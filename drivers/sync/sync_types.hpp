@@ -147,7 +147,7 @@ struct SyncedSet {
 
 enum class SyncResult : std::uint8_t {
   /// The slot is returned with its set.
-  taken,
+  accepted,
   /// The camera already gave this pulse; the slot stays the caller's.
   duplicate,
   /// The set of the frame was output without it, or its stamp fits no set; the slot stays the

@@ -34,7 +34,7 @@ class TimeNumbering {
       : mode_(options.mode), interval_(options.interval), tolerance_(options.tolerance) {}
 
   /// Middle of the exposure on the pairing clock. The bus clock wraps; of the possible values the
-  /// one nearest to the newest set is taken.
+  /// one nearest to the newest set is used.
   [[nodiscard]] std::int64_t time_of(const SyncFrame& frame, const OpenSets& sets) const noexcept;
   /// Number of the open set that fits, or of a new one in order of time. Flushes the sets if the
   /// clock was set.

@@ -101,7 +101,7 @@ PongStatus BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
            std::max(t4, sent + inside));
   known_ = true;
   ++answers_;
-  return PongStatus::taken;
+  return PongStatus::accepted;
 }
 
 MappedStamp BoardClock::map(DeviceStamp stamp, HostStamp arrival) noexcept {
@@ -178,7 +178,7 @@ void BoardReceiver::accept(const TriggerFrame& frame, const BoardLine::Times& ti
 void BoardReceiver::handle_event(const TriggerEvent& event, HostStamp arrival) noexcept {
   if (!streaming_ || !same_boot(event.boot_id)) return;
   Pulse pulse;
-  if (!account_.take(event, &pulse)) {
+  if (!account_.accept(event, &pulse)) {
     if (account_.refused_in_row() >= kMaxRefused) finding_ = Finding::invalid;
     return;
   }

@@ -16,7 +16,7 @@ namespace vergence::trigger_board {
 
 /// Result of a PONG.
 enum class PongStatus : std::uint8_t {
-  taken,
+  accepted,
   /// No such ping is open.
   unasked,
   /// Impossible: sent before received, or longer on the trigger board than the round trip.

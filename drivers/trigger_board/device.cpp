@@ -152,7 +152,7 @@ DeviceStatus Device::start(Notifier* ready) noexcept {
 
 void Device::stop() noexcept { stop_thread(); }
 
-DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept { return take(limit, pulse); }
+DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept { return pop(limit, pulse); }
 
 DeviceStatus Device::pause(std::uint32_t pulses) noexcept {
   if (!streaming()) return DeviceStatus::stopped;

@@ -62,7 +62,7 @@ bool PulseCounter::refuse() noexcept {
   return false;
 }
 
-bool PulseCounter::take(const TriggerEvent& event, Pulse* pulse) noexcept {
+bool PulseCounter::accept(const TriggerEvent& event, Pulse* pulse) noexcept {
   const std::int64_t missing = steps_from(next_, event.pulse);
   if (missing < 0) return refuse();
   if (event.tick > kMaxTicks || (any_ && event.tick <= tick_)) return refuse();

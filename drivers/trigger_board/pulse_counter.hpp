@@ -39,7 +39,7 @@ class PulseCounter {
   void end(std::uint32_t next, std::uint32_t to_come) noexcept;
   /// Sets all of *pulse but the arrival and the host's time. Returns false if the event is refused;
   /// *pulse is then unchanged.
-  [[nodiscard]] bool take(const TriggerEvent& event, Pulse* pulse) noexcept;
+  [[nodiscard]] bool accept(const TriggerEvent& event, Pulse* pulse) noexcept;
 
   [[nodiscard]] std::uint32_t boot() const noexcept { return boot_; }
   [[nodiscard]] const PulseCounters& counters() const noexcept { return counters_; }

@@ -187,7 +187,7 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
     if (status == DeviceStatus::timeout) return Answer::silent;
     // Woken, perhaps to stop.
     if (status == DeviceStatus::stopped) continue;
-    if (status != DeviceStatus::ok) return Answer::gone;
+    if (status != DeviceStatus::ok) return Answer::disconnected;
     const bool mine =
         frame.sequence < trigger_unasked && steps(first, frame.sequence) <= steps(first, last);
     if (mine && frame.type == requested) {
@@ -211,7 +211,8 @@ Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payloa
   // Each round listens for kRetryInterval within the limit.
   for (bool again = false;; again = true) {
     const DeviceStatus sent = frames_.send(type, payload, &last);
-    if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) return Answer::gone;
+    if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed)
+      return Answer::disconnected;
     if (!again) first = last;
     const Answer answer =
         listen(type, first, last, requested, std::min(end, frames_.now() + kRetryInterval));
@@ -232,7 +233,7 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
                  ? DeviceStatus::failed
                  : DeviceStatus::unsupported;
     case Answer::silent:
-    case Answer::gone:
+    case Answer::disconnected:
       break;
   }
   last_error_ =

@@ -52,7 +52,7 @@ class Setup {
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 
  private:
-  enum class Answer : std::uint8_t { ok, refused, silent, gone, stopped };
+  enum class Answer : std::uint8_t { ok, refused, silent, disconnected, stopped };
   [[nodiscard]] Answer ask(std::uint8_t type, std::span<const std::uint8_t> payload,
                            std::uint8_t requested, Duration limit);
   [[nodiscard]] Answer listen(std::uint8_t type, std::uint8_t first, std::uint8_t last,

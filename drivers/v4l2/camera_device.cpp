@@ -375,17 +375,17 @@ DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& requested,
   if (requested.exposure <= Duration{} ||
       requested.exposure.to_seconds() * settings_->actual.rate_hz > 1)
     return DeviceStatus::bad_configuration;
-  ExposureSetting taken;
-  if (const DeviceStatus status = change_exposure(controls_, *settings_, requested, &taken);
+  ExposureSetting applied;
+  if (const DeviceStatus status = change_exposure(controls_, *settings_, requested, &applied);
       status != DeviceStatus::ok)
     return status;
   // The setting also applies after a reconnect.
-  requested_->exposure = taken.exposure;
-  requested_->gain_db = taken.gain_db;
-  settings_->actual.exposure = taken.exposure;
-  settings_->actual.gain_db = taken.gain_db;
-  capture_.change_exposure(taken);
-  if (actual != nullptr) *actual = taken;
+  requested_->exposure = applied.exposure;
+  requested_->gain_db = applied.gain_db;
+  settings_->actual.exposure = applied.exposure;
+  settings_->actual.gain_db = applied.gain_db;
+  capture_.change_exposure(applied);
+  if (actual != nullptr) *actual = applied;
   return DeviceStatus::ok;
 }
 

@@ -160,9 +160,9 @@ bool FrameExchange::release(FrameSlot slot) noexcept {
 
 FrameExchange::Buffers FrameExchange::pop_returned() noexcept {
   const std::lock_guard lock(mutex_);
-  const Buffers taken = returned_;
+  const Buffers returned = returned_;
   returned_.count = 0;
-  return taken;
+  return returned;
 }
 
 /// Precondition: mutex_ held.

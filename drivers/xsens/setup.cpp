@@ -31,7 +31,7 @@ void RequestReply::ask(xbus::MessageId id, std::span<const std::uint8_t> payload
   do {
     const DeviceStatus sent = line_.write(std::span(frame).first(w.size), kWrite);
     if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) {
-      reply->answer = Answer::gone;
+      reply->answer = Answer::disconnected;
       return;
     }
     const HostStamp until = std::min(end, line_.now() + kRetryInterval);
@@ -59,7 +59,7 @@ Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* repl
     const LineRead r = line_.read(bytes, std::min(kListen, until - now));
     if (r.status == DeviceStatus::disconnected || r.status == DeviceStatus::failed ||
         r.status == DeviceStatus::ended)
-      return Answer::gone;
+      return Answer::disconnected;
     if (r.status != DeviceStatus::ok) continue;
     const std::span<const std::uint8_t> got(bytes.data(), r.size);
     remember(got);
@@ -112,7 +112,7 @@ DeviceStatus to_status(Answer answer) noexcept {
     case Answer::refused:
       return DeviceStatus::failed;
     case Answer::silent:
-    case Answer::gone:
+    case Answer::disconnected:
       return DeviceStatus::disconnected;
     case Answer::stopped:
       return DeviceStatus::stopped;
@@ -416,21 +416,21 @@ void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
     if (!read_output_configuration(reply_.bytes(), &has)) has = {};
   }
   // The response contains the applied values.
-  std::uint16_t taken = 0;
+  std::uint16_t applied_hz = 0;
   for (const OutputEntry& e : has.items())
-    if (e.id == wire_id(PacketId::quaternion)) taken = e.rate_hz;
+    if (e.id == wire_id(PacketId::quaternion)) applied_hz = e.rate_hz;
   const bool clocked = std::any_of(
       has.items().begin(), has.items().end(),
       [](const OutputEntry& e) { return packet_id(e.id) == PacketId::sample_time_fine; });
   const bool placed = std::any_of(has.items().begin(), has.items().end(), [](const OutputEntry& e) {
     return packet_id(e.id) == PacketId::latitude_longitude;
   });
-  if (taken == 0 || taken == kEveryMessage || !clocked || !placed)
+  if (applied_hz == 0 || applied_hz == kEveryMessage || !clocked || !placed)
     refuse(DeviceStatus::unsupported,
            "it does not give position and attitude together with its clock: this is no MTi-G");
   stream->outputs = has;
   stream->period_numerator = 1;
-  stream->period_denominator = taken;
+  stream->period_denominator = applied_hz;
   set_mark4_lines(stream);
 }
 

@@ -19,7 +19,7 @@ enum class Answer : std::uint8_t {
   /// No response in time.
   silent,
   /// The link is disconnected.
-  gone,
+  disconnected,
   /// Stopped by `stop`.
   stopped,
 };

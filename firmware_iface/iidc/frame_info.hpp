@@ -55,19 +55,19 @@ class FrameInfoLayout {
 /// Unwraps a 32-bit counter so that the first value is 0.
 class CounterUnwrapper {
  public:
-  /// Signed distance of `counter` from the last one taken; 0 before the first.
+  /// Signed distance of `counter` from the last one unwrapped; 0 before the first.
   [[nodiscard]] std::int64_t step(std::uint32_t counter) const noexcept {
     return known_ ? static_cast<std::int32_t>(counter - last_) : 0;
   }
-  /// Takes a counter. Precondition: step(counter) > 0, or not known.
-  [[nodiscard]] std::uint64_t take(std::uint32_t counter) noexcept {
+  /// Returns the count of a counter. Precondition: step(counter) > 0, or not known.
+  [[nodiscard]] std::uint64_t unwrap(std::uint32_t counter) noexcept {
     if (known_) count_ += static_cast<std::uint64_t>(step(counter));
     known_ = true;
     last_ = counter;
     return count_;
   }
   /// Continues after a restart of the device: `counter` is the next exposure after the last one
-  /// taken.
+  /// unwrapped.
   [[nodiscard]] std::uint64_t rebase(std::uint32_t counter) noexcept {
     if (known_) ++count_;
     known_ = true;

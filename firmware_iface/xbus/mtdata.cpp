@@ -67,32 +67,32 @@ struct Sizes {
   void utc(const std::optional<Utc>& /*field*/) noexcept { total += kUtcSize; }
 };
 
-/// Takes fields from bytes of which there are enough.
+/// Reads fields from bytes of which there are enough.
 struct Reader {
   std::span<const std::uint8_t> rest;
   NumberFormat format;
   bool finite = true;
 
-  std::span<const std::uint8_t> take(std::size_t n) noexcept {
+  std::span<const std::uint8_t> read(std::size_t n) noexcept {
     const auto bytes = rest.first(n);
     rest = rest.subspan(n);
     return bytes;
   }
-  std::uint16_t next_u16() noexcept { return read_u16(take(2)); }
-  std::uint32_t next_u32() noexcept { return read_u32(take(4)); }
+  std::uint16_t next_u16() noexcept { return read_u16(read(2)); }
+  std::uint32_t next_u32() noexcept { return read_u32(read(4)); }
   double next_number() noexcept {
-    const double value = read_number(take(size_of(format)), format);
+    const double value = read_number(read(size_of(format)), format);
     finite = finite && std::isfinite(value);
     return value;
   }
-  void skip(std::size_t bytes) noexcept { (void)take(bytes); }
+  void skip(std::size_t bytes) noexcept { (void)read(bytes); }
   void fix(std::optional<LegacyFix>& field) noexcept {
     skip(kBeforeAccuracies);
     LegacyFix f;
     f.horizontal_accuracy_mm = next_u32();
     f.vertical_accuracy_mm = next_u32();
     f.speed_accuracy_cm_s = next_u32();
-    f.age = take(1)[0];
+    f.age = read(1)[0];
     field = f;
   }
   void number(std::optional<double>& field) noexcept { field = next_number(); }
@@ -102,9 +102,9 @@ struct Reader {
     for (double& value : values) value = next_number();
     field = values;
   }
-  void u8(std::optional<std::uint8_t>& field) noexcept { field = take(1)[0]; }
+  void u8(std::optional<std::uint8_t>& field) noexcept { field = read(1)[0]; }
   void u16(std::optional<std::uint16_t>& field) noexcept { field = next_u16(); }
-  void utc(std::optional<Utc>& field) noexcept { field = read_utc(take(kUtcSize)); }
+  void utc(std::optional<Utc>& field) noexcept { field = read_utc(read(kUtcSize)); }
 };
 
 /// Puts fields into bytes of which there are enough.

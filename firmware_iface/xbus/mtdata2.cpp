@@ -78,7 +78,7 @@ GnssPvt pvt_of(Bytes b) noexcept {
   return p;
 }
 
-void take(const Packet& packet, Mtdata2* out) noexcept {
+void decode(const Packet& packet, Mtdata2* out) noexcept {
   const Bytes data = packet.data;
   switch (packet_id(packet.id)) {
     case PacketId::utc:
@@ -227,9 +227,9 @@ void PacketWriter::put_pvt(const GnssPvt& p) noexcept {
 bool decode_mtdata2(Bytes payload, Mtdata2* out) noexcept {
   Mtdata2 decoded;
   PacketReader reader(payload);
-  for (Packet packet; reader.next(&packet);) take(packet, &decoded);
-  if (!reader.torn()) *out = decoded;
-  return !reader.torn();
+  for (Packet packet; reader.next(&packet);) decode(packet, &decoded);
+  if (!reader.truncated()) *out = decoded;
+  return !reader.truncated();
 }
 
 }  // namespace vergence::xbus

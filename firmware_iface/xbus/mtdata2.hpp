@@ -75,10 +75,11 @@ struct Packet {
 class PacketReader {
  public:
   explicit PacketReader(std::span<const std::uint8_t> payload) noexcept : rest_(payload) {}
-  /// Returns the next packet. If false, the payload is at its end or torn(), and *packet unchanged.
+  /// Returns the next packet. If false, the payload is at its end or truncated(), and *packet
+  /// unchanged.
   [[nodiscard]] bool next(Packet* packet) noexcept;
   /// True if the rest is no complete packet; the message is then invalid despite its checksum.
-  [[nodiscard]] bool torn() const noexcept { return !rest_.empty(); }
+  [[nodiscard]] bool truncated() const noexcept { return !rest_.empty(); }
 
  private:
   std::span<const std::uint8_t> rest_;

@@ -56,7 +56,7 @@ CameraConfiguration usual(CameraTrigger trigger) {
   return {640, 480, 30, Duration::milliseconds(4), 0, trigger};
 }
 
-bool Taker::take_one(std::size_t k, Duration limit) {
+bool FrameCollector::read_one(std::size_t k, Duration limit) {
   Frame frame;
   if (cameras_[k]->wait(limit, &frame) != DeviceStatus::ok) return false;
   Account& a = accounts_[k];
@@ -71,7 +71,7 @@ bool Taker::take_one(std::size_t k, Duration limit) {
     a.middles.push_back(stamp.middle_ns);
     a.starts.push_back(frame.exposure_start.ns());
   } else {
-    ++a.torn;
+    ++a.incomplete;
   }
   if (counters_[k] >= 0) a.gaps += frame.counter - static_cast<std::uint64_t>(counters_[k]) - 1;
   counters_[k] = static_cast<std::int64_t>(frame.counter);
@@ -79,13 +79,13 @@ bool Taker::take_one(std::size_t k, Duration limit) {
   return true;
 }
 
-bool Taker::take(std::uint64_t frames, Duration limit) {
+bool FrameCollector::read(std::uint64_t frames, Duration limit) {
   const auto end = steady_clock::now() + std::chrono::nanoseconds(limit.ns());
   std::vector<std::uint64_t> left(cameras_.size(), frames);
   for (bool more = true; more;) {
     more = false;
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
-      if (left[k] > 0 && take_one(k, Duration::milliseconds(50))) --left[k];
+      if (left[k] > 0 && read_one(k, Duration::milliseconds(50))) --left[k];
       more = more || left[k] > 0;
     }
     if (steady_clock::now() > end) return !more;
@@ -93,9 +93,9 @@ bool Taker::take(std::uint64_t frames, Duration limit) {
   return true;
 }
 
-void Taker::drain(Duration quiet) {
+void FrameCollector::drain(Duration quiet) {
   for (std::size_t k = 0; k < cameras_.size(); ++k)
-    while (take_one(k, quiet)) {
+    while (read_one(k, quiet)) {
     }
 }
 

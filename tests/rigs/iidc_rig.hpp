@@ -29,7 +29,7 @@ struct ImageStamp {
 
 /// One camera's account of what it delivered.
 struct Account {
-  std::uint64_t complete = 0, torn = 0;
+  std::uint64_t complete = 0, incomplete = 0;
   /// Gaps in the counters after the first frame.
   std::uint64_t gaps = 0;
   /// Complete frames with pixels, a number or a GUID of another frame.
@@ -41,13 +41,13 @@ struct Account {
 };
 
 /// Takes frames from several cameras in turn, and holds each against what stands in it.
-class Taker {
+class FrameCollector {
  public:
-  explicit Taker(std::vector<CameraDevice*> cameras)
+  explicit FrameCollector(std::vector<CameraDevice*> cameras)
       : cameras_(std::move(cameras)), accounts_(cameras_.size()), counters_(cameras_.size(), -1) {}
 
   /// Until every camera has given so many more, or `limit` has passed. True: they have.
-  bool take(std::uint64_t frames, Duration limit = Duration::seconds(20));
+  bool read(std::uint64_t frames, Duration limit = Duration::seconds(20));
   /// Until nothing has come for `quiet`.
   void drain(Duration quiet = Duration::milliseconds(700));
   /// Before a restart: the counters begin anew.
@@ -56,7 +56,7 @@ class Taker {
   [[nodiscard]] const Account& account(std::size_t camera) const { return accounts_[camera]; }
 
  private:
-  bool take_one(std::size_t camera, Duration limit);
+  bool read_one(std::size_t camera, Duration limit);
   std::vector<CameraDevice*> cameras_;
   std::vector<Account> accounts_;
   std::vector<std::int64_t> counters_;
@@ -70,7 +70,7 @@ class Taker {
 /// emulator that ended.
 bool await_cameras(CameraDriver* driver, std::size_t count, Duration limit = Duration::seconds(15));
 
-/// start() until it is ok: what a supervisor does after `gone`.
+/// start() until it is ok: what a supervisor does after `disconnected`.
 [[nodiscard]] bool start_again(CameraDevice* camera, Duration limit = Duration::seconds(15));
 
 /// Open descriptors of this process, and mappings of device files.

@@ -89,7 +89,7 @@ void GigeCamera::expose() {
       fate = GvspSender::Fate::unsent;
     } else if (tear_ > 0) {
       --tear_;
-      fate = GvspSender::Fate::torn;
+      fate = GvspSender::Fate::incomplete;
     }
     lock.unlock();
     sender_.send(std::move(frame), fate);

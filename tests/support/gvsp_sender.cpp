@@ -121,8 +121,8 @@ void GvspSender::send(GvspFrame frame, Fate fate) {
                                               record.data_bytes) +
                    2;
   record.account = accounts_.size();
-  accounts_.push_back(
-      {std::vector<bool>(record.packets, false), fate == Fate::torn, 1 + (record.packets - 2) / 2});
+  accounts_.push_back({std::vector<bool>(record.packets, false), fate == Fate::incomplete,
+                       1 + (record.packets - 2) / 2});
   if (fate == Fate::unsent) {
     record.packets = 0;
     dropped_ += accounts_.back().went.size();
@@ -168,7 +168,7 @@ void GvspSender::add_to(GigeCameraReport* r) const {
     const auto went = static_cast<std::size_t>(std::count(a.went.begin(), a.went.end(), true));
     ++(went == a.went.size() ? r->whole
        : went == 0           ? r->nothing
-       : a.went[0]           ? r->torn
+       : a.went[0]           ? r->incomplete
                              : r->headless);
   }
   r->exposed += accounts_.size();

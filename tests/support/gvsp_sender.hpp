@@ -21,7 +21,7 @@ struct GigeCameraReport {
   /// Frames of which every packet was sent, at first or on request.
   std::uint64_t whole = 0;
   /// Frames of which the leader was sent, but not every other packet.
-  std::uint64_t torn = 0;
+  std::uint64_t incomplete = 0;
   /// Frames of which the leader was not sent, but another packet was.
   std::uint64_t headless = 0;
   /// Frames of which no packet was sent.
@@ -74,7 +74,7 @@ class GvspSender {
 
   void aim(const sockaddr_in& target, std::uint32_t packet_size, Duration packet_delay);
   /// Deliberate damage to a frame.
-  enum class Fate : std::uint8_t { normal, unsent, torn };
+  enum class Fate : std::uint8_t { normal, unsent, incomplete };
   void send(GvspFrame frame, Fate fate);
   /// Answers a request; unknown blocks are answered as unavailable.
   void resend(std::uint64_t block, std::uint32_t first, std::uint32_t last);
@@ -95,7 +95,7 @@ class GvspSender {
   struct Account {
     /// By packet.
     std::vector<bool> went;
-    /// Torn on purpose: packet `hole` is not sent again either.
+    /// Incomplete on purpose: packet `hole` is not sent again either.
     bool never = false;
     std::uint32_t hole = 0;
   };

@@ -26,11 +26,11 @@ bool decompress_lz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t
       context, &LZ4F_freeDecompressionContext);
   std::size_t in = 0, written = 0, hint = 1;
   while (in < packed.size() && hint != 0) {
-    std::size_t taken = packed.size() - in, given = out.size() - written;
-    hint =
-        LZ4F_decompress(context, out.data() + written, &given, packed.data() + in, &taken, nullptr);
-    if (LZ4F_isError(hint) != 0 || (taken == 0 && given == 0)) return false;
-    in += taken, written += given;
+    std::size_t consumed = packed.size() - in, given = out.size() - written;
+    hint = LZ4F_decompress(context, out.data() + written, &given, packed.data() + in, &consumed,
+                           nullptr);
+    if (LZ4F_isError(hint) != 0 || (consumed == 0 && given == 0)) return false;
+    in += consumed, written += given;
   }
   return hint == 0 && written == out.size();
 }

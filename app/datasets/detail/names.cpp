@@ -57,7 +57,7 @@ std::optional<std::string> replaced(std::string name, std::string_view from, std
 }
 
 /// Removes and returns a run of digits, or one other character, from the front of *text.
-std::string_view take(std::string_view* text) noexcept {
+std::string_view pop_token(std::string_view* text) noexcept {
   const std::size_t digits = std::min(text->find_first_not_of("0123456789"), text->size());
   const std::string_view part = text->substr(0, std::max<std::size_t>(digits, 1));
   text->remove_prefix(part.size());
@@ -74,7 +74,8 @@ std::string_view value_of(std::string_view part) noexcept {
 bool in_name_order(std::string_view a, std::string_view b) noexcept {
   std::string_view rest_a = a, rest_b = b;
   while (!rest_a.empty() && !rest_b.empty()) {
-    const std::string_view value_a = value_of(take(&rest_a)), value_b = value_of(take(&rest_b));
+    const std::string_view value_a = value_of(pop_token(&rest_a)),
+                           value_b = value_of(pop_token(&rest_b));
     const auto is_number = [](std::string_view v) { return v.empty() || is_digit(v.front()); };
     if (is_number(value_a) && is_number(value_b) && value_a.size() != value_b.size())
       return value_a.size() < value_b.size();
@@ -102,9 +103,9 @@ std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::stri
     for (const auto& [small, name] : there) {
       const auto other = replaced(small, sides.left, sides.right);
       const auto found = other ? there.find(*other) : there.end();
-      const bool taken = std::any_of(pairs.begin(), pairs.end(),
-                                     [&name = name](const auto& pair) { return pair[0] == name; });
-      if (found != there.end() && !taken) pairs.push_back({name, found->second});
+      const bool paired = std::any_of(pairs.begin(), pairs.end(),
+                                      [&name = name](const auto& pair) { return pair[0] == name; });
+      if (found != there.end() && !paired) pairs.push_back({name, found->second});
     }
   }
   return pairs;

@@ -256,7 +256,7 @@ function begin(message) {
 }
 
 // What is new since `have`; all of it from a program that has been started again.
-function take(message) {
+function receive(message) {
   if (message.epoch !== have.epoch) begin(message);
   have = {epoch: message.epoch, after: message.version, image: message.images ? message.images.frame : message.epoch === have.epoch ? have.image : ""};
   showEvents(message.events);
@@ -289,7 +289,7 @@ async function ask() {
     return REFUSED_MS;
   }
   try {
-    if (connected) take(JSON.parse(text));
+    if (connected) receive(JSON.parse(text));
   } catch (error) {
     console.error(error);  // a mistake of the page's is not to look like a lost connection
   }

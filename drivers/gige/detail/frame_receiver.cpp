@@ -48,7 +48,7 @@ void FrameReceiver::callback(void* self, ArvStreamCallbackType type, ArvBuffer*)
     (void)pthread_setname_np(pthread_self(), "vergence-gige");
   if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
   if (ArvBuffer* done = arv_stream_try_pop_buffer(receiver->session_->stream()); done != nullptr)
-    receiver->take(done);
+    receiver->receive(done);
 }
 
 /// Returns released slots to the transport.
@@ -61,7 +61,7 @@ void FrameReceiver::recycle() noexcept {
   }
 }
 
-void FrameReceiver::take(ArvBuffer* buffer) noexcept {
+void FrameReceiver::receive(ArvBuffer* buffer) noexcept {
   const HostStamp arrival = monotonic_now();
   // The reference of the ImageMemory remains.
   g_object_unref(buffer);

@@ -101,7 +101,7 @@ class FrameReceiver {
   }
 
  private:
-  void take(ArvBuffer* buffer) noexcept;
+  void receive(ArvBuffer* buffer) noexcept;
   [[nodiscard]] bool describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept;
   [[nodiscard]] bool right_size(ArvBuffer* buffer) noexcept;
   void recycle() noexcept;

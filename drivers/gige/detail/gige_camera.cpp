@@ -146,7 +146,7 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
     const FrameQueue::State state = queue_.state();
     if (state == FrameQueue::State::streaming) return DeviceStatus::ok;
     // The supervisor is reconnecting.
-    if (state == FrameQueue::State::gone) return DeviceStatus::disconnected;
+    if (state == FrameQueue::State::disconnected) return DeviceStatus::disconnected;
     const std::lock_guard lock(device_);
     DeviceStatus status = state == FrameQueue::State::stopped ? reach() : DeviceStatus::ok;
     if (status == DeviceStatus::ok && stale_) status = apply_again();
@@ -158,7 +158,7 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
     }
     close_stream(false);
     // The camera has disconnected again.
-    if (state == FrameQueue::State::back) {
+    if (state == FrameQueue::State::reconnected) {
       session_.reset();
       queue_.fail(monotonic_now());
       return DeviceStatus::disconnected;
@@ -211,15 +211,16 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
     if (session_ == nullptr || queue_.standing() != DeviceStatus::ok)
       return queue_.standing() == DeviceStatus::stopped ? DeviceStatus::stopped
                                                         : DeviceStatus::disconnected;
-    ExposureSetting taken;
-    if (const DeviceStatus s = session_->change_exposure(requested, &taken); s != DeviceStatus::ok)
+    ExposureSetting applied;
+    if (const DeviceStatus s = session_->change_exposure(requested, &applied);
+        s != DeviceStatus::ok)
       return last_error_.refuse(s, session_->last_error());
     // The setting also applies after a reconnect.
-    requested_.exposure = taken.exposure;
-    requested_.gain_db = taken.gain_db;
-    in_force_ = taken;
-    receiver_.change_exposure(taken);
-    if (actual != nullptr) *actual = taken;
+    requested_.exposure = applied.exposure;
+    requested_.gain_db = applied.gain_db;
+    in_force_ = applied;
+    receiver_.change_exposure(applied);
+    if (actual != nullptr) *actual = applied;
     return DeviceStatus::ok;
   } catch (const std::exception&) {
     return DeviceStatus::failed;
@@ -276,13 +277,13 @@ void GigeCamera::supervise(Watch* watch) {
         if (const Fault fault = check(monotonic_now(), &watch->asked); !fault.reason.empty())
           lose(fault);
         break;
-      case FrameQueue::State::gone:
+      case FrameQueue::State::disconnected:
         if (monotonic_now() < watch->next_try) break;
         if (reopen()) queue_.ready_again();
         watch->pause = std::min(watch->pause * 2, kLongestPause);
         watch->next_try = monotonic_now() + watch->pause;
         break;
-      case FrameQueue::State::back:
+      case FrameQueue::State::reconnected:
         queue_.ready_again();
         break;
       case FrameQueue::State::stopped:

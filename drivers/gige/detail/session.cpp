@@ -558,12 +558,13 @@ DeviceStatus Session::change_exposure(const ExposureSetting& requested, Exposure
   const char* exposure = features_.find(Purpose::exposure);
   if (exposure == nullptr)
     return refuse(DeviceStatus::unsupported, "the camera's exposure cannot be set");
-  const auto set_nearest = [this](const char* name, double value, const char* unit, double* taken) {
+  const auto set_nearest = [this](const char* name, double value, const char* unit,
+                                  double* applied) {
     const auto limits = features_.bounds(name);
     return features_.set(
         name,
         limits ? std::clamp(value, limits->least, std::max(limits->least, limits->most)) : value,
-        unit, taken);
+        unit, applied);
   };
   double us = 0;
   *actual = requested;

@@ -23,8 +23,8 @@ class SlotReturns {
 
   /// Sets the maximum number of slots that are out. Precondition: stopped, no slot is held.
   void set_limit(std::size_t most) noexcept;
-  /// Called before the queue begins: takes back the frames that were offered and not taken, and the
-  /// released slots. Precondition: no thread offers.
+  /// Called before the queue begins: takes back the frames that were offered and not handed out,
+  /// and the released slots. Precondition: no thread offers.
   void withdraw() noexcept;
 
   // Call of the releaser.

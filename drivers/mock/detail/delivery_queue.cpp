@@ -56,7 +56,7 @@ void DeliveryQueue::post(QueuedDelivery parcel) {
   parcel.order = orders_++;
   if (parcel.device >= 0) {
     Sender& sender = senders_[static_cast<std::size_t>(parcel.device)];
-    if (parcel.frame.what == Delivery<Frame>::What::gone) ++sender.unplugged;
+    if (parcel.frame.what == Delivery<Frame>::What::disconnected) ++sender.unplugged;
     parcel.unplugged = sender.unplugged;
   }
   parcels_.push(parcel);
@@ -139,7 +139,7 @@ void DeliveryQueue::deliver_frame(const QueuedDelivery& parcel, HostStamp arriva
   }
   senders_[k].on_the_way.fetch_sub(1);
   // Frames in transit when the camera was unplugged are lost: a stream has nothing but
-  // `back` behind a `gone`.
+  // `reconnected` behind a `disconnected`.
   if (parcel.unplugged != senders_[k].known_disconnected) {
     cameras_[k]->lost.fetch_add(1, std::memory_order_relaxed);
     keep_spare(parcel);

@@ -53,7 +53,7 @@ DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
   if (requested.exposure <= Duration{} ||
       requested.exposure.to_seconds() * configuration_.rate_hz > 1)
     return DeviceStatus::bad_configuration;
-  const ExposureSetting taken{requested.exposure, std::clamp(requested.gain_db, 0.0, kMaxGain)};
+  const ExposureSetting applied{requested.exposure, std::clamp(requested.gain_db, 0.0, kMaxGain)};
   // The next image but one, or later where more are made already.
   constexpr std::uint64_t kLatency = 2;
   const std::uint64_t from = std::max(rig_->looked_at.load() + kLatency, rig_->planned.load());
@@ -61,11 +61,11 @@ DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
   const std::uint64_t planned = rig_->planned.load();
   const std::uint64_t past = planned > MockRig::kSlots ? planned - MockRig::kSlots : 0;
   try {
-    exposures_.change(from, taken, past);
+    exposures_.change(from, applied, past);
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
-  if (actual != nullptr) *actual = taken;
+  if (actual != nullptr) *actual = applied;
   return DeviceStatus::ok;
 }
 
@@ -83,7 +83,7 @@ DeviceStatus MockCamera::start(Notifier* ready) noexcept {
 DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
   if (k_ == 0 && rig_->looking.exchange(false)) rig_->room.signal();
   Delivery<Frame> d;
-  const DeviceStatus status = stream.take(limit, &d);
+  const DeviceStatus status = stream.pop(limit, &d);
   if (status == DeviceStatus::ok) {
     if (k_ == 0) {
       rig_->looked_at.store(pulse_of_[d.value.slot].load(std::memory_order_acquire));
@@ -122,9 +122,9 @@ CameraStatistics MockCamera::statistics() const noexcept {
   return s;
 }
 
-void MockCamera::take(std::span<const Transform> T_camera_enu,
-                      std::span<const Transform> T_camera_bus, const RenderRequest& shot,
-                      std::uint8_t* out) {
+void MockCamera::render(std::span<const Transform> T_camera_enu,
+                        std::span<const Transform> T_camera_bus, const RenderRequest& shot,
+                        std::uint8_t* out) {
   const auto stride = static_cast<std::ptrdiff_t>(FramePool::stride(pool_->width()));
   renderer_->render(T_camera_enu, shot, mosaic_.empty() ? out : mosaic_.data(), stride,
                     T_camera_bus);
@@ -157,7 +157,7 @@ DeviceStatus MockIns::start(Notifier* ready) noexcept {
 
 DeviceStatus MockIns::wait(Duration limit, InsReading* reading) noexcept {
   Delivery<InsReading> d;
-  const DeviceStatus status = stream.take(limit, &d);
+  const DeviceStatus status = stream.pop(limit, &d);
   if (status != DeviceStatus::ok) return status;
   *reading = d.value;
   reading->arrival = d.arrival;
@@ -221,7 +221,7 @@ DeviceStatus MockTrigger::start(Notifier* ready) noexcept {
 
 DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   Delivery<BoardReport> d;
-  const DeviceStatus status = stream.take(limit, &d);
+  const DeviceStatus status = stream.pop(limit, &d);
   if (status == DeviceStatus::disconnected) {
     if (!disconnected_) pulse->arrival = d.arrival;
     disconnected_ = true;
@@ -245,7 +245,7 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
 }
 
 DeviceStatus MockTrigger::pause(std::uint32_t pulses) noexcept {
-  // A report is taken before the third pulse after it at the latest, see Scheduler: the fourth is
+  // A report is popped before the third pulse after it at the latest, see Scheduler: the fourth is
   // not made yet, on any run.
   constexpr std::uint64_t kAhead = 4;
   if (!stream.streaming()) return DeviceStatus::stopped;

@@ -132,8 +132,8 @@ class MockCamera final : public CameraDevice {
   [[nodiscard]] std::size_t bytes() const noexcept { return arena_ ? arena_->used() : 0; }
   /// Renders the image through this camera's lens and sensor into width x height bytes, in rows of
   /// the pool's stride.
-  void take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus,
-            const RenderRequest& shot, std::uint8_t* out);
+  void render(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus,
+              const RenderRequest& shot, std::uint8_t* out);
 
  private:
   void allocate(const Intrinsics& lens);
@@ -217,7 +217,7 @@ class MockTrigger final : public TriggerDevice {
   DeviceTiming timing() const noexcept override { return {kReportLatency}; }
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
-  /// Starts at the fourth slot after that of the newest report taken. A request during a pause has
+  /// Starts at the fourth slot after that of the newest report popped. A request during a pause has
   /// no effect.
   DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
@@ -243,7 +243,7 @@ class MockTrigger final : public TriggerDevice {
   // Guards the members below.
   std::mutex asking_;
   bool any_ = false;
-  // Slot and boot of the report taken last.
+  // Slot and boot of the report popped last.
   std::uint64_t newest_ = 0;
   std::uint32_t boot_ = 0;
   // Slot after the last requested pause.

@@ -70,8 +70,9 @@ PulsePlan::PulsePlan(const TriggerConfiguration& c, Duration length,
   }
   std::sort(edges.begin(), edges.end());
   for (const Duration edge : edges) {
-    const bool gone = down_by(faults, edge), was = !link_.empty() && link_.back().gone;
-    if (gone != was) link_.push_back({edge, gone});
+    const bool disconnected = down_by(faults, edge),
+               was = !link_.empty() && link_.back().disconnected;
+    if (disconnected != was) link_.push_back({edge, disconnected});
   }
 }
 
@@ -92,7 +93,7 @@ std::size_t PulsePlan::first_from(Duration time) const noexcept {
 bool PulsePlan::link_down(Duration time) const noexcept {
   bool down = false;
   for (const LinkEvent& e : link_)
-    if (e.time <= time) down = e.gone;
+    if (e.time <= time) down = e.disconnected;
   return down;
 }
 

@@ -23,7 +23,7 @@ class PulsePlan {
   /// The link between host and trigger board fails or returns.
   struct LinkEvent {
     Duration time{};
-    bool gone = false;
+    bool disconnected = false;
   };
 
   PulsePlan() = default;

@@ -181,8 +181,8 @@ void Scheduler::make_link_events(std::uint64_t pulse) {
     QueuedDelivery p;
     p.device = kTriggerDevice;
     p.arrival = start_ + event.time;
-    p.report.what =
-        event.gone ? Delivery<BoardReport>::What::gone : Delivery<BoardReport>::What::back;
+    p.report.what = event.disconnected ? Delivery<BoardReport>::What::disconnected
+                                       : Delivery<BoardReport>::What::reconnected;
     queue_.post(p);
   }
 }
@@ -314,18 +314,19 @@ void Scheduler::make_frames(std::uint64_t pulse) {
 
 bool Scheduler::present(std::uint64_t pulse, int k) {
   Sender& sender = senders_[static_cast<std::size_t>(k)];
-  const bool gone = unplugged_at(plan_.at(pulse).time, k);
-  if (gone != sender.unplugged) {
+  const bool disconnected = unplugged_at(plan_.at(pulse).time, k);
+  if (disconnected != sender.unplugged) {
     QueuedDelivery p;
     p.device = k;
     // The transfer starts after the one in progress and before the next frame.
     p.arrival = host_of(pulse) + kTransfer;
-    p.frame.what = gone ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
+    p.frame.what =
+        disconnected ? Delivery<Frame>::What::disconnected : Delivery<Frame>::What::reconnected;
     queue_.post(p);
-    sender.unplugged = gone;
+    sender.unplugged = disconnected;
     sender.counter_base = pulse;
   }
-  return !gone && pulsed(k) && cameras_[static_cast<std::size_t>(k)]->stream.streaming();
+  return !disconnected && pulsed(k) && cameras_[static_cast<std::size_t>(k)]->stream.streaming();
 }
 
 std::optional<FrameSlot> Scheduler::get_slot(int k) {
@@ -418,7 +419,7 @@ void Scheduler::render(const Shooting& shooting) {
     shot.noise_seed = static_cast<std::uint32_t>(mixed(rig_.options.seed, image_index)) | 1U;
   }
   // Through the lens of the camera that sees it, into the memory of the one that sends it.
-  cameras_[static_cast<std::size_t>(exposure.camera)]->take(
+  cameras_[static_cast<std::size_t>(exposure.camera)]->render(
       way, bus, shot, sender.pool().writable(shooting.slot).data());
 }
 

@@ -90,8 +90,8 @@ struct Exposure {
 ///          producer waits for room. Real: a pulse that is over before rendering starts has no
 ///          images.
 /// Pauses   Virtual, with reports_read: slot n is made once every report that arrives before it was
-///          taken. So when the consumer requests a pause at the report of slot m, slot m + 4 is not
-///          made yet, because the report of m + 1 arrives within two periods of its pulse.
+///          popped. So when the consumer requests a pause at the report of slot m, slot m + 4 is
+///          not made yet, because the report of m + 1 arrives within two periods of its pulse.
 class Scheduler final : public PulseListener {
  public:
   /// All arguments must outlive the scheduler; attach() sets `trigger`.

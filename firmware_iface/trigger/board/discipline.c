@@ -15,7 +15,7 @@ enum {
   pps_lost_s = 4
 };
 
-/* 1 ms, 2^-8 us. Farther off after PPS was gone: a new phase instead of minutes of steering. */
+/* 1 ms, 2^-8 us. Farther off after PPS was lost: a new phase instead of minutes of steering. */
 static const int64_t kPhaseLimit = 256000;
 static const uint64_t kFractionMask = (UINT64_C(1) << rate_bits) - 1U;
 

@@ -10,7 +10,7 @@
  * continuous, rising, piecewise linear function of counts. Until tick_hold_rate() their rate takes
  * PPS' at once; then it moves by at most 1 ppm a second (or a sixteenth of what is missing, if that
  * is more), so that a host that maps ticks to its own clock can follow. Once the rate is there the
- * ticks of PPS edges are held whole seconds apart. PPS gone: the last rate stays.
+ * ticks of PPS edges are held whole seconds apart. PPS lost: the last rate stays.
  *
  * Memory     The caller's struct, nothing else. Threads: one at a time.
  * Time       Counts are 64-bit and never wrap; counts_hz 1 MHz .. 1 GHz. Every call is bounded by
@@ -61,7 +61,7 @@ uint64_t tick_length(const TickDiscipline* discipline, uint64_t counts);
 /* A PPS edge at `edge`, told at `now`; the rate changes from `now` on. False: the edge did not fit
  * and was not used. */
 bool tick_pps(TickDiscipline* discipline, uint64_t edge, uint64_t now);
-/* To be called at least every second: notices that PPS is gone. */
+/* To be called at least every second: detects that PPS is lost. */
 void tick_advance(TickDiscipline* discipline, uint64_t now);
 /* From now on the host relies on the rate: it moves slowly. */
 void tick_hold_rate(TickDiscipline* discipline);

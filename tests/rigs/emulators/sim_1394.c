@@ -2,7 +2,7 @@
  *
  * Options and commands are those of sim_cameras.h, and the command
  *   plug N        N cameras on the bus from now on (0 to 3): a bus reset
- * A frame that is torn lacks one packet in its middle. At the end it prints for each camera what
+ * An incomplete frame lacks one packet in its middle. At the end it prints for each camera what
  * was exposed and what was put on the bus.
  */
 #include <endian.h>
@@ -157,7 +157,7 @@ static size_t advance(struct node* n, uint64_t ns, uint64_t edge, uint8_t* batch
       n->c.sent = n->c.bytes;
     } else if (n->c.tear) {
       n->c.tear--;
-      n->c.torn++;
+      n->c.incomplete++;
       n->c.tearing = true;
     } else {
       n->c.transmitted++;

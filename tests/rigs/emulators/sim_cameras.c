@@ -84,8 +84,8 @@ bool sim_busy(const struct sim_camera* c) { return c->camera.transmitting || c->
 
 void sim_report(const char* program, unsigned index, const struct sim_camera* c, const char* sent) {
   if (c->exposed)
-    printf("%s: camera %u exposed %llu %s %llu torn %llu dropped %llu overtaken %llu\n", program,
-           index, (unsigned long long)c->exposed, sent, (unsigned long long)c->transmitted,
-           (unsigned long long)c->torn, (unsigned long long)c->dropped,
+    printf("%s: camera %u exposed %llu %s %llu incomplete %llu dropped %llu overtaken %llu\n",
+           program, index, (unsigned long long)c->exposed, sent, (unsigned long long)c->transmitted,
+           (unsigned long long)c->incomplete, (unsigned long long)c->dropped,
            (unsigned long long)c->overtaken);
 }

@@ -12,7 +12,7 @@ struct sim_camera {
   size_t bytes, sent;
   unsigned drop, tear;
   bool muted, tearing;
-  uint64_t exposed, transmitted, overtaken, dropped, torn;
+  uint64_t exposed, transmitted, overtaken, dropped, incomplete;
 };
 
 /* --cameras N, --trigger-hz F, --film DIR, --film-hz F, --ready FILE */

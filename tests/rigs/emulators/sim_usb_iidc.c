@@ -4,7 +4,7 @@
  * Registers: control transfers 0xc0/0x40, request 0x7f for the 0xffff page, value and index = low
  * and high half of the lower 32 bits of the address, quadlets little endian. Image: bulk IN 0x81, a
  * short packet at the end of a frame only where its size asks for one. Options and commands are
- * those of sim_cameras.h, and "unplug C", "replug C". A frame that is torn ends in its middle.
+ * those of sim_cameras.h, and "unplug C", "replug C". An incomplete frame ends in its middle.
  */
 #include <poll.h>
 #include <stdio.h>
@@ -21,7 +21,7 @@ struct unit {
   struct usb_device usb;
   struct sim_camera c;
   char serial[16];
-  bool gone, was_transmitting;
+  bool unplugged, was_transmitting;
 };
 
 static struct unit units[MOST];
@@ -98,7 +98,7 @@ static void deliver(struct unit* u) {
     u->c.sent += usb_in(&u->usb, 1, u->c.image + u->c.sent, u->c.bytes - u->c.sent);
     if (u->c.sent == u->c.bytes) {
       u->c.transmitted += !u->c.tearing;
-      u->c.torn += u->c.tearing;
+      u->c.incomplete += u->c.tearing;
       u->c.bytes = u->c.sent = 0;
       break;
     }
@@ -109,9 +109,9 @@ static bool cable(const char* line) {
   unsigned a = 0;
   if (sscanf(line, "unplug %u", &a) == 1 && a < count) {
     usb_unplug(&units[a].usb);
-    units[a].gone = true;
+    units[a].unplugged = true;
   } else if (sscanf(line, "replug %u", &a) == 1 && a < count && units[a].usb.fd < 0) {
-    units[a].gone = false;
+    units[a].unplugged = false;
     units[a].c.bytes = units[a].c.sent = 0;
     iidc_init(&units[a].c.camera, a);
     usb_plug(&units[a].usb);
@@ -160,7 +160,7 @@ int main(int argc, char** argv) {
     uint64_t ns = now_ns(), pulse = o.trigger_hz > 0 ? sim_pulse(&o, ns) : 0;
     if (pulse) edge = pulse;
     for (unsigned i = 0; i < count; i++) {
-      if (units[i].gone) continue;
+      if (units[i].unplugged) continue;
       usb_service(&units[i].usb);
       expose(&units[i], ns, edge);
       deliver(&units[i]);

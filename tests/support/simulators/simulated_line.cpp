@@ -109,7 +109,7 @@ class SimulatedLinkFactory::World {
     }
   }
 
-  std::size_t take(std::span<std::uint8_t> out) noexcept {
+  std::size_t read(std::span<std::uint8_t> out) noexcept {
     const std::size_t n = std::min(out.size(), ready_.size());
     for (std::size_t i = 0; i < n; ++i) out[i] = ready_[i];
     ready_.erase(ready_.begin(), ready_.begin() + static_cast<std::ptrdiff_t>(n));
@@ -311,24 +311,24 @@ class SimulatedLine final : public SerialLink {
 
   LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
     const std::lock_guard lock(world_->mutex);
-    if (gone()) return {DeviceStatus::disconnected, 0, world_->now()};
+    if (disconnected()) return {DeviceStatus::disconnected, 0, world_->now()};
     const HostStamp deadline = world_->now() + limit;
     world_->run(deadline);
     if (std::exchange(world_->woken, false)) return {DeviceStatus::stopped, 0, {}};
     const HostStamp now = world_->now();
-    if (gone()) return {DeviceStatus::disconnected, 0, now};
-    if (world_->anything_readable()) return {DeviceStatus::ok, world_->take(out), now};
+    if (disconnected()) return {DeviceStatus::disconnected, 0, now};
+    if (world_->anything_readable()) return {DeviceStatus::ok, world_->read(out), now};
     return {world_->ended() ? DeviceStatus::ended : DeviceStatus::timeout, 0, now};
   }
   DeviceStatus write(std::span<const std::uint8_t> bytes, Duration /*limit*/) noexcept override {
     const std::lock_guard lock(world_->mutex);
-    if (gone()) return DeviceStatus::disconnected;
+    if (disconnected()) return DeviceStatus::disconnected;
     world_->send(bytes);
     return DeviceStatus::ok;
   }
   DeviceStatus set_baud(std::uint32_t baud) noexcept override {
     const std::lock_guard lock(world_->mutex);
-    if (gone()) return DeviceStatus::disconnected;
+    if (disconnected()) return DeviceStatus::disconnected;
     world_->set_baud(baud);
     return DeviceStatus::ok;
   }
@@ -350,7 +350,7 @@ class SimulatedLine final : public SerialLink {
   }
 
  private:
-  [[nodiscard]] bool gone() const noexcept { return world_->outages_begun() != outages_; }
+  [[nodiscard]] bool disconnected() const noexcept { return world_->outages_begun() != outages_; }
 
   std::shared_ptr<SimulatedLinkFactory::World> world_;
   /// Outages that had begun when it was opened: one more, and this line is dead.

@@ -49,7 +49,7 @@ TriggerConfiguration thirty_hertz() {
   return c;
 }
 
-std::vector<Pulse> take(TriggerDevice& device, std::size_t most) {
+std::vector<Pulse> read(TriggerDevice& device, std::size_t most) {
   std::vector<Pulse> all;
   for (Pulse p; all.size() < most && device.wait(Duration::seconds(5), &p) == DeviceStatus::ok;)
     all.push_back(p);
@@ -95,7 +95,7 @@ TEST_F(BoardRig, everyPulseIsReportedWithEitherLatencyTimer) {
     // The search for the board received bytes at other baud rates.
     const std::uint64_t before = device->statistics().malformed;
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
-    const auto reported = take(*device, 90);
+    const auto reported = read(*device, 90);
     ASSERT_EQ(reported.size(), 90U) << device->last_error();
     for (std::size_t i = 1; i < reported.size(); ++i)
       ASSERT_EQ(reported[i].number, reported[i - 1].number + 1) << "none is lost";

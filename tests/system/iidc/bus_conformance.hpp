@@ -61,7 +61,7 @@ class BusConformance final : public ConformanceRig {
     return true;
   }
   void replug() override { emulator_->command(replug_); }
-  Duration gone_within() const override { return Duration::seconds(20); }
+  Duration disconnected_within() const override { return Duration::seconds(20); }
   bool lose(int exposures) override {
     emulator_->command("drop 0 " + std::to_string(exposures));
     return true;

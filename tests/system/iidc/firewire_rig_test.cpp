@@ -10,7 +10,7 @@ struct BusUnderTest {
   static constexpr const char* kEmulator = "sim_1394";
   static constexpr const char* kSent = "transmitted";
   /// The truncated frame's buffer swallows the beginning of the next one.
-  static constexpr std::uint64_t kLostWithTorn = 1;
+  static constexpr std::uint64_t kLostWithIncomplete = 1;
   static std::unique_ptr<CameraDriver> driver() { return iidc::make_1394_driver(); }
   // Nodes are numbered along the bus: the last one goes.
   static void unplug(Emulator* e, unsigned camera) { e->command("plug " + std::to_string(camera)); }
@@ -53,9 +53,9 @@ TEST_F(IidcRig, busClockIsSharedAcrossItsWrap) {
         return static_cast<bool>(f >> s) && s != 0;
       }();
   const std::uint64_t frames = wraps ? 30 * 32 : 60;
-  ASSERT_TRUE(taker_->take(frames, Duration::seconds(90)));
+  ASSERT_TRUE(collector_->read(frames, Duration::seconds(90)));
   (void)end();
-  const Account &a = taker_->account(0), &b = taker_->account(1);
+  const Account &a = collector_->account(0), &b = collector_->account(1);
   EXPECT_EQ(a.wrong + b.wrong, 0U);
   std::size_t compared = 0;
   for (std::size_t i = 0, j = 0; i < a.middles.size() && j < b.middles.size();) {

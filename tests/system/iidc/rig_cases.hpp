@@ -34,8 +34,8 @@ class IidcRig : public ::testing::Test {
       cameras_.push_back(open_camera(driver_.get(), k, requested));
       ASSERT_NE(cameras_.back(), nullptr);
     }
-    taker_ =
-        std::make_unique<Taker>(std::vector<CameraDevice*>{cameras_[0].get(), cameras_[1].get()});
+    collector_ = std::make_unique<FrameCollector>(
+        std::vector<CameraDevice*>{cameras_[0].get(), cameras_[1].get()});
   }
   void start() {
     for (const auto& c : cameras_)
@@ -46,7 +46,7 @@ class IidcRig : public ::testing::Test {
     for (int i = 0; i < n; ++i) {
       emulator_->command("trigger");
       std::this_thread::sleep_for(std::chrono::milliseconds(70));
-      taker_->drain(Duration{});
+      collector_->drain(Duration{});
     }
   }
   /// Ends everything; what the emulator says it did.
@@ -60,7 +60,7 @@ class IidcRig : public ::testing::Test {
   std::unique_ptr<CameraDriver> driver_ = BusUnderTest::driver();
   std::unique_ptr<Emulator> emulator_;
   std::vector<std::unique_ptr<CameraDevice>> cameras_;
-  std::unique_ptr<Taker> taker_;
+  std::unique_ptr<FrameCollector> collector_;
 };
 
 TEST_F(IidcRig, camerasAreListedAndOpenedBySerial) {
@@ -87,10 +87,10 @@ TEST_F(IidcRig, everyPulseGivesOneFrameOrIsCountedLost) {
   emulator_->command("drop 1 3");
   pulse(5);
   pulse(10);
-  taker_->drain();
+  collector_->drain();
   const std::string report = end();
   for (int k = 0; k < 2; ++k) {
-    const Account& a = taker_->account(static_cast<std::size_t>(k));
+    const Account& a = collector_->account(static_cast<std::size_t>(k));
     const CameraStatistics s = cameras_[static_cast<std::size_t>(k)]->statistics();
     EXPECT_EQ(count_of(report, k, "exposed"), 20) << report;
     EXPECT_EQ(static_cast<std::int64_t>(a.complete), count_of(report, k, BusUnderTest::kSent))
@@ -101,13 +101,13 @@ TEST_F(IidcRig, everyPulseGivesOneFrameOrIsCountedLost) {
     EXPECT_EQ(count_of(report, k, "dropped"), k == 1 ? 3 : 0);
     EXPECT_EQ(a.complete + s.lost, 20U);
     EXPECT_EQ(a.gaps, s.lost);
-    EXPECT_EQ(a.torn + a.wrong + s.underruns, 0U);
+    EXPECT_EQ(a.incomplete + a.wrong + s.underruns, 0U);
     // A frame stamped by its pulse: the camera's clock and the emulator's run alike.
     for (std::size_t i = 1; i < a.starts.size(); ++i)
       EXPECT_NEAR(static_cast<double>(a.starts[i] - a.starts[i - 1]),
                   static_cast<double>(a.middles[i] - a.middles[i - 1]), 200);
   }
-  EXPECT_EQ(taker_->account(0).middles.back(), taker_->account(1).middles.back())
+  EXPECT_EQ(collector_->account(0).middles.back(), collector_->account(1).middles.back())
       << "one pulse, one instant";
 }
 
@@ -119,22 +119,22 @@ TEST_F(IidcRig, onlyTruncatedFrameIsMarkedIncomplete) {
   pulse(6);
   emulator_->command("tear 0 1");
   pulse(6);
-  taker_->drain();
+  collector_->drain();
   const std::string report = end();
-  const Account& a = taker_->account(0);
+  const Account& a = collector_->account(0);
   const CameraStatistics s = cameras_[0]->statistics();
-  EXPECT_EQ(count_of(report, 0, "torn"), 2) << report;
-  EXPECT_EQ(a.torn, 2U);
-  EXPECT_EQ(a.wrong, 0U) << "a torn frame was called complete";
-  EXPECT_EQ(s.lost, BusUnderTest::kLostWithTorn * 2) << report;
-  EXPECT_EQ(a.complete + a.torn + s.lost, 16U) << report;
-  EXPECT_EQ(taker_->account(1).complete, 16U);
+  EXPECT_EQ(count_of(report, 0, "incomplete"), 2) << report;
+  EXPECT_EQ(a.incomplete, 2U);
+  EXPECT_EQ(a.wrong, 0U) << "an incomplete frame was called complete";
+  EXPECT_EQ(s.lost, BusUnderTest::kLostWithIncomplete * 2) << report;
+  EXPECT_EQ(a.complete + a.incomplete + s.lost, 16U) << report;
+  EXPECT_EQ(collector_->account(1).complete, 16U);
 }
 
 TEST_F(IidcRig, replugWhileStreamingLeaksNothing) {
   ASSERT_NO_FATAL_FAILURE(begin(usual()));
   ASSERT_NO_FATAL_FAILURE(start());
-  ASSERT_TRUE(taker_->take(10));
+  ASSERT_TRUE(collector_->read(10));
   const Holdings before = Holdings::now();
   for (int round = 0; round < 3; ++round) {
     BusUnderTest::unplug(emulator_.get(), 1);
@@ -165,20 +165,20 @@ TEST_F(IidcRig, replugWhileStreamingLeaksNothing) {
           << "an image that is held stays, whatever happens to its camera";
       cameras_[1]->release(held.slot);
     }
-    taker_->restarted(1);
-    ASSERT_TRUE(taker_->take(10)) << "camera 1 after the replug, camera 0 all along: "
-                                  << cameras_[1]->last_error();
+    collector_->restarted(1);
+    ASSERT_TRUE(collector_->read(10))
+        << "camera 1 after the replug, camera 0 all along: " << cameras_[1]->last_error();
     // This frees what waited for the release of the last image.
     cameras_[1]->stop();
-    taker_->restarted(1);
+    collector_->restarted(1);
     ASSERT_EQ(cameras_[1]->start(nullptr), DeviceStatus::ok) << cameras_[1]->last_error();
-    ASSERT_TRUE(taker_->take(3));
+    ASSERT_TRUE(collector_->read(3));
     EXPECT_EQ(Holdings::now(), before)
         << "round " << round << ": " << Holdings::now().descriptors << " descriptors instead of "
         << before.descriptors << ", " << Holdings::now().mappings << " mappings instead of "
         << before.mappings;
   }
-  EXPECT_EQ(taker_->account(0).wrong + taker_->account(1).wrong, 0U);
+  EXPECT_EQ(collector_->account(0).wrong + collector_->account(1).wrong, 0U);
   EXPECT_EQ(cameras_[0]->statistics().starts, 1U) << "the other camera goes on";
   (void)end();
 }

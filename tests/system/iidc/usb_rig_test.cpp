@@ -7,7 +7,7 @@ struct BusUnderTest {
   static constexpr const char* kEmulator = "sim_usb_iidc";
   static constexpr const char* kSent = "delivered";
   /// A short packet ends the frame, and the next one is complete.
-  static constexpr std::uint64_t kLostWithTorn = 0;
+  static constexpr std::uint64_t kLostWithIncomplete = 0;
   static std::unique_ptr<CameraDriver> driver() { return iidc::make_usb_driver(); }
   static void unplug(Emulator* e, unsigned camera) {
     e->command("unplug " + std::to_string(camera));

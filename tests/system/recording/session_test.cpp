@@ -51,8 +51,8 @@ void expect_same_poses(const std::filesystem::path& a, const std::filesystem::pa
   EXPECT_EQ(poses, read_file(b / "trajectory.tum"));
 }
 
-/// One drive with a knock, a camera that is gone for a while and a calibration asked for: recorded
-/// once for all tests that read it.
+/// One drive with a knock, a camera that is disconnected for a while and a calibration asked for:
+/// recorded once for all tests that read it.
 class RecordedDrive : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {

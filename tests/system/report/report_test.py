@@ -64,7 +64,7 @@ def main():
         if code != 1 or not found:
             return code if code == SKIPPED else 1
         sessions = [make(below / "faults", "6000"), make(below / "good", "2000", "no-faults"), make(below / "no_reference", "800", "no-ins"),
-                    tear(make(below / "torn", "3000")), drive(below / "mock_board")]
+                    tear(make(below / "truncated", "3000")), drive(below / "mock_board")]
         pages = []
         for session in sessions:
             written = subprocess.run([os.environ["VERGENCE"], "report", str(session)], check=True, capture_output=True, text=True)

@@ -40,9 +40,9 @@ TEST_F(Ros2Restarts, nextSessionIsFoundGapIsStale) {
   RosReader<RosDiagnostics> diagnostics(participant, "/diagnostics");
   for (int i = 0; i < 2; ++i) {
     StreamSession session(socket_);
-    while (odometry.take() != nullptr) {
+    while (odometry.read() != nullptr) {
     }
-    EXPECT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; })) << i;
+    EXPECT_TRUE(feed_until(&session, [&] { return odometry.read() != nullptr; })) << i;
   }
   const RosDiagnostics* d = nullptr;
   do {
@@ -63,9 +63,9 @@ TEST_F(Ros2Restarts, restartedBridgeServesOldReaders) {
   RosReader<RosCameraInfo> info(participant, "/vergence/left/camera_info", true);
   for (int i = 0; i < 2; ++i) {
     const auto bridge = start_bridge(socket_, domain_);
-    while (odometry.take() != nullptr) {
+    while (odometry.read() != nullptr) {
     }
-    EXPECT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; })) << i;
+    EXPECT_TRUE(feed_until(&session, [&] { return odometry.read() != nullptr; })) << i;
     EXPECT_NE(info.next(), nullptr) << i;
     if (i == 0) bridge->signal(SIGKILL);
   }
@@ -77,7 +77,7 @@ TEST_F(Ros2Restarts, otherDomainReceivesNothing) {
   const RosParticipant here(domain_), elsewhere(domain_ + 1);
   RosReader<RosOdometry> odometry(here, "/vergence/odometry"),
       other(elsewhere, "/vergence/odometry");
-  EXPECT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; }));
+  EXPECT_TRUE(feed_until(&session, [&] { return odometry.read() != nullptr; }));
   EXPECT_EQ(other.next(2s), nullptr);
 }
 
@@ -124,11 +124,11 @@ TEST_F(Ros2Restarts, stoppedReaderCostsNoPosesOrMemory) {
   EXPECT_TRUE(got);
   const RosParticipant participant(domain_);
   RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
-  EXPECT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; }));
+  EXPECT_TRUE(feed_until(&session, [&] { return odometry.read() != nullptr; }));
   const auto feed = [&](int poses) {
     for (int i = 0; i < poses; ++i, std::this_thread::sleep_for(2ms)) {
       session.pose();
-      while (odometry.take() != nullptr) {
+      while (odometry.read() != nullptr) {
       }
     }
   };
@@ -158,9 +158,9 @@ void measure_poses(const std::string& socket, std::uint32_t domain, bool images)
   RosReader<RosImage> left(participant, "/vergence/left/image_raw"),
       right(participant, "/vergence/right/image_raw");
   RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
-  ASSERT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; }));
+  ASSERT_TRUE(feed_until(&session, [&] { return odometry.read() != nullptr; }));
   std::this_thread::sleep_for(500ms);
-  while (odometry.take() != nullptr) {
+  while (odometry.read() != nullptr) {
   }
 
   const dds_entity_t waitset = dds_create_waitset(participant.get()),
@@ -177,9 +177,9 @@ void measure_poses(const std::string& socket, std::uint32_t domain, bool images)
     session.pose();
     if (dds_waitset_wait(waitset, nullptr, 0, DDS_MSECS(1000)) <= 0) continue;
     ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - sent).count());
-    while (odometry.take() != nullptr) {
+    while (odometry.read() != nullptr) {
     }
-    while (left.take() != nullptr || right.take() != nullptr) ++received;
+    while (left.read() != nullptr || right.read() != nullptr) ++received;
   }
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   const double cpu = 100 * (cpu_seconds(bridge->pid()) - cpu_before) / seconds;

@@ -129,7 +129,7 @@ class RosReader {
                                   nullptr)) {}
 
   /// The next message if there is one; valid until the next call.
-  [[nodiscard]] const Message* take() {
+  [[nodiscard]] const Message* read() {
     release();
     dds_sample_info_t info;
     if (dds_take(reader_, &sample_, &info, 1, 1) == 1 && info.valid_data)
@@ -140,7 +140,7 @@ class RosReader {
   [[nodiscard]] const Message* next(std::chrono::milliseconds limit = 10s) {
     for (const auto end = std::chrono::steady_clock::now() + limit;
          std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(500us))
-      if (const Message* message = take()) return message;
+      if (const Message* message = read()) return message;
     return nullptr;
   }
   /// GUIDs of the writers that it is matched with.

@@ -36,7 +36,7 @@ TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
 
   const RosOdometry* o = nullptr;
   ASSERT_TRUE(feed_until(&session, [&] {
-    o = odometry.take();
+    o = odometry.read();
     return o != nullptr && o->twist.twist.linear.x > 0;
   }));
   EXPECT_STREQ(o->header.frame_id, "odom");
@@ -153,8 +153,8 @@ TEST_F(Ros2Topics, imagesEqualTheSessionsAndShareStamps) {
   // Number of images, camera_info and odometry messages by frame.
   std::map<std::int64_t, int> received;
   int images = 0;
-  const auto take = [&](RosReader<RosImage>* reader, std::size_t camera) {
-    for (const RosImage* m; (m = reader->take()) != nullptr; ++images) {
+  const auto read_all = [&](RosReader<RosImage>* reader, std::size_t camera) {
+    for (const RosImage* m; (m = reader->read()) != nullptr; ++images) {
       const std::int64_t frame = frame_of(m->header);
       ++received[frame];
       EXPECT_EQ(m->header.stamp.nanosec % 50'000'000, 1U);
@@ -173,11 +173,11 @@ TEST_F(Ros2Topics, imagesEqualTheSessionsAndShareStamps) {
     }
   };
   const auto count = [&](auto* reader) {
-    while (const auto* m = reader->take()) ++received[frame_of(m->header)];
+    while (const auto* m = reader->read()) ++received[frame_of(m->header)];
   };
   EXPECT_TRUE(feed_until(&session, [&] {
-    take(&left, 0);
-    take(&right, 1);
+    read_all(&left, 0);
+    read_all(&right, 1);
     count(&left_info);
     count(&right_info);
     count(&odometry);
@@ -199,7 +199,7 @@ void expect_node(const std::string& socket, std::uint32_t domain, const char* di
   const Nodes* n = nullptr;
   // The service is the last of the endpoints without a calibration.
   ASSERT_TRUE(feed_until(&session, [&] {
-    n = nodes.take();
+    n = nodes.read();
     return n != nullptr && n->node_entities_info_seq._length == 1 &&
            n->node_entities_info_seq._buffer[0].reader_gid_seq._length == 1 &&
            !odometry.writer_guids().empty();

@@ -224,14 +224,14 @@ TEST_F(V4l2Rig, bufferWithErrorFlagIsIncomplete) {
   ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
   camera->release(frame.slot);
   set_control(node(0), "inject_v4l2_buf_flag_error", 1);
-  int torn = 0;
+  int incomplete = 0;
   for (int i = 0; i < 10; ++i) {
     ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
-    torn += frame.status == FrameStatus::incomplete ? 1 : 0;
+    incomplete += frame.status == FrameStatus::incomplete ? 1 : 0;
     camera->release(frame.slot);
   }
-  EXPECT_EQ(torn, 1);
-  EXPECT_EQ(camera->statistics().torn, 1U);
+  EXPECT_EQ(incomplete, 1);
+  EXPECT_EQ(camera->statistics().incomplete, 1U);
 }
 
 TEST_F(V4l2Rig, queueErrorDisconnectsUntilStart) {

@@ -102,7 +102,7 @@ TEST(ViewCollector, takesStillViewsUntilComplete) {
     ASSERT_FALSE(seen.corners[0].empty() || seen.corners[1].empty()) << "pose " << poses;
     EXPECT_EQ(collector.offer(seen), OfferResult::moving) << "it was elsewhere a moment ago";
     const OfferResult held = collector.offer(seen);
-    EXPECT_TRUE(held == OfferResult::taken || held == OfferResult::nothing_new);
+    EXPECT_TRUE(held == OfferResult::accepted || held == OfferResult::nothing_new);
     EXPECT_EQ(collector.offer(seen), OfferResult::nothing_new)
         << "the same view again tells nothing";
     ++verdicts[held];
@@ -123,7 +123,7 @@ TEST(ViewCollector, movingBoardIsNotTaken) {
     EXPECT_EQ(collector.offer(seen), OfferResult::moving);
   }
   for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 0.5;
-  EXPECT_EQ(collector.offer(seen), OfferResult::taken);
+  EXPECT_EQ(collector.offer(seen), OfferResult::accepted);
 }
 
 TEST(ViewCollector, viewOfOneCameraIsNotTaken) {

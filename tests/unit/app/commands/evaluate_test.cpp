@@ -169,7 +169,7 @@ TEST(EvaluateCommand, comparesInsOfSessionAtLeftCamera) {
   EXPECT_FALSE(figures(session, "flu").contains("ins_mount")) << "both are forward, left, up";
 
   // Nobody says how it sits: what is left is the boresight of two degrees.
-  for (const char* summary : {"{}", "{\"earth\": null}", "[1]", "torn",
+  for (const char* summary : {"{}", "{\"earth\": null}", "[1]", "truncated",
                               R"({"enu": {"mount": {"lever_arm_m": [0, 0, 0]}}})"}) {
     folder.write("s/summary.json", summary);
     const auto axes = figures(session);

@@ -214,7 +214,7 @@ TEST(CalibrationPlausibility, impossibleValuesAreRefusedWithPlace) {
 }
 
 /// No cut and no changed byte of a good file may do anything but be read or be refused.
-TEST(CalibrationFile, tornFilesGiveInputErrorsOnly) {
+TEST(CalibrationFile, truncatedFilesGiveInputErrorsOnly) {
   Random random(11);
   for (std::size_t length = 0; length < kGood.size(); ++length)
     static_cast<void>(refusal(kGood.substr(0, length)));

@@ -124,7 +124,7 @@ TEST_F(Decoder, badImagesSkipOnlyTheirFrame) {
   }
   EXPECT_TRUE(test::mentions(std::string(seen[1].pair.issue.data()), "left/001.png is missing"))
       << seen[1].pair.issue.data();
-  EXPECT_TRUE(test::mentions(std::string(seen[2].pair.issue.data()), "right/002.png is torn"))
+  EXPECT_TRUE(test::mentions(std::string(seen[2].pair.issue.data()), "right/002.png is truncated"))
       << seen[2].pair.issue.data();
 }
 

@@ -61,7 +61,7 @@ TEST(CameraMasks, pngAndPgmBesideConfigurationAreRead) {
 TEST(CameraMasks, unusableMasksAreRefused) {
   const TemporaryFolder folder;
   (void)folder.write("small.pgm", "P5 40 30 255\n" + std::string(40 * 30, '\1'));
-  (void)folder.write("torn.pgm", pgm("P5 80 60 255\n").substr(0, 1000));
+  (void)folder.write("truncated.pgm", pgm("P5 80 60 255\n").substr(0, 1000));
   (void)folder.write("black.pgm", pgm("P5 80 60 255\n", '\0'));
   (void)folder.write("text.pgm", "P2 80 60 255\n0 0 0");
   (void)folder.write("huge.pgm", "P5 99999999999999999999 60 255\n");
@@ -72,8 +72,9 @@ TEST(CameraMasks, unusableMasksAreRefused) {
   EXPECT_EQ(
       refusal(folder.path(), "small.pgm"),
       at + "small.pgm is 40 × 30 px, the camera's images are 80 × 60; draw it on one of them");
-  EXPECT_EQ(refusal(folder.path(), "torn.pgm"),
-            at + "torn.pgm is torn: it ends before the image is complete, or its check sums fail");
+  EXPECT_EQ(refusal(folder.path(), "truncated.pgm"),
+            at + "truncated.pgm is truncated: it ends before the image is complete, or its check "
+                 "sums fail");
   EXPECT_EQ(refusal(folder.path(), "black.pgm"),
             at + "black.pgm is 0 everywhere: nothing of the image is left; 0 hides, any other "
                  "value shows");

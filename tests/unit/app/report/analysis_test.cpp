@@ -92,8 +92,8 @@ TEST(Analysis, lostFramesHaveNoPlaceAndMissingOnesABreak) {
     s.frames[i].posed = false, s.frames[i].status = PoseStatus::lost;
   s.frames.erase(s.frames.begin() + 70, s.frames.begin() + 80);
   const Analysis a = analyse(s);
-  EXPECT_TRUE(std::isnan(a.ours_x[42]));
-  EXPECT_FALSE(std::isnan(a.ours_x[45]));
+  EXPECT_TRUE(std::isnan(a.estimate_x[42]));
+  EXPECT_FALSE(std::isnan(a.estimate_x[45]));
   EXPECT_EQ(a.breaks[70], 1);
   EXPECT_EQ(std::count(a.breaks.begin(), a.breaks.end(), 1), 1);
   EXPECT_EQ(a.lost, 5U);
@@ -115,7 +115,7 @@ TEST(Analysis, errorsToTheInsAreThoseOfTheFile) {
   EXPECT_EQ(a.horizontal_m[7], 5);
   EXPECT_EQ(a.vertical_m[7], -0.5);
   EXPECT_EQ(a.heading.max, 1.5);
-  EXPECT_EQ(a.theirs_x[7], 4);
+  EXPECT_EQ(a.reference_x[7], 4);
 }
 
 TEST(Analysis, driftAgainstInsUsesPositionsOnly) {

@@ -66,7 +66,7 @@ struct Case {
   }
   /// Camera 0 is away.
   void outage(double from_s, double to_s) {
-    event(from_s, "camera_disconnected", "camera 0 is gone"),
+    event(from_s, "camera_disconnected", "camera 0 is disconnected"),
         event(to_s, "camera_reconnected", "camera 0 is back");
   }
   void given(bool verified) { attempt(true, "given", 0, 0), calibration()["verified"] = verified; }
@@ -154,7 +154,7 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
        "at the end is not verified"},
       {"not monitored", [](Case& c) { c.given(false), c.calibration()["online"] = false; }, care,
        "calibration.online: off"},
-      {"torn, waited in vain",
+      {"truncated, waited in vain",
        [](Case& c) {
          c.session.summary = nullptr, c.attempt(true, "given", 0, 0);
          c.frames_of(1000, 0), c.analysis.waited = 1000;
@@ -176,7 +176,7 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
        bad, "711 ± 12", "--focal"},
       {"scale of the INS", event(1, "scale_disagrees", "90.0 % longer"), care, "lengths disagree"},
       {"calibration not kept", event(2, "calibration_save_failed", "no room"), good, "", "no room"},
-      {"torn",
+      {"truncated",
        [](Case& c) {
          c.session.summary = nullptr, c.session.missing = {"summary.json is missing"};
        },
@@ -191,13 +191,13 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
       {"lines dropped", [](Case& c) { c.session.summary["drops"]["lines"] = 4; }, care, "4 lines"},
       // Outages
       {"a camera that never came back",
-       event(49.96, "camera_disconnected", "camera 1 is gone; check it"), bad,
+       event(49.96, "camera_disconnected", "camera 1 is disconnected; check it"), bad,
        "no frame after 50.0 s: camera 1 was disconnected",
        "Camera 1 was disconnected from 50.0 s on, to the end"},
       {"a board that never came back", event(49.96, "trigger_board_disconnected", "x"), bad,
        "the trigger board was disconnected"},
       {"a camera that the others drove on without",
-       event(30, "camera_disconnected", "camera 1 is gone"), care,
+       event(30, "camera_disconnected", "camera 1 is disconnected"), care,
        "camera 1 was disconnected from 30.0 s to the end"},
       {"a loose cable",
        [](Case& c) {
@@ -217,7 +217,7 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
       {"an outage after the frames that are read",
        [](Case& c) {
          c.session.left_out = {"poses.csv has more lines"};
-         c.event(70, "camera_disconnected", "camera 0 is gone");
+         c.event(70, "camera_disconnected", "camera 0 is disconnected");
        },
        care, "longer than the report reads"},
   };

@@ -54,23 +54,23 @@ TEST(Page, acceptsEveryTruncatedSession) {
   const test::TemporaryFolder whole;
   writer_of(300).write(whole.path());
   std::vector<std::string> pages;
-  for (const char* gone : {"summary.json", "poses.csv", "reference.tum", "calibrations.csv",
-                           "calibration.yaml", "events.jsonl"})
+  for (const char* missing : {"summary.json", "poses.csv", "reference.tum", "calibrations.csv",
+                              "calibration.yaml", "events.jsonl"})
     // Share of the file that is kept; a negative share removes the file.
     for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {
       const test::TemporaryFolder folder;
       std::filesystem::copy(whole.path(), folder.path(), std::filesystem::copy_options::recursive);
-      const std::string text = test::read_file(folder / gone);
-      std::filesystem::remove(folder / gone);
+      const std::string text = test::read_file(folder / missing);
+      std::filesystem::remove(folder / missing);
       if (kept >= 0)
         folder.write(
-            gone,
+            missing,
             text.substr(0, static_cast<std::size_t>(kept * static_cast<double>(text.size()))));
       const std::string html = page_of(folder.path());
-      EXPECT_TRUE(self_contained(html)) << gone << " " << kept;
+      EXPECT_TRUE(self_contained(html)) << missing << " " << kept;
       pages.push_back(html);
       if (kept < 0 || kept == 0.37) {
-        EXPECT_TRUE(contains(html, "What is missing")) << gone << " " << kept;
+        EXPECT_TRUE(contains(html, "What is missing")) << missing << " " << kept;
       }
     }
   EXPECT_EQ(test::xml_problem(pages), "");

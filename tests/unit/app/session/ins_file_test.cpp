@@ -111,7 +111,7 @@ TEST(InsFile, refusalNamesPlaceOfMalformedLine) {
   EXPECT_TRUE(test::contains(refusal(kHead), "has no reading in it"));
   EXPECT_TRUE(
       test::contains(refusal(kHead + good.substr(0, good.size() - 1)), "has no reading in it"))
-      << "torn";
+      << "truncated";
 }
 
 TEST(InsFile, isFoundInFolderOrByHeader) {

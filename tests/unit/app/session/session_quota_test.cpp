@@ -31,7 +31,8 @@ TEST(SessionQuota, removesOldestEndedSessions) {
   folder.write("photos/summary.json", std::string(5000, 'x'));
   EXPECT_TRUE(keep_session_quota(folder / "now", 3000).empty()) << "three sessions of 1000 bytes";
   EXPECT_EQ(keep_session_quota(folder / "now/", 1500).size(), 2U);
-  for (const char* gone : {"oldest", "older"}) EXPECT_FALSE(fs::exists(folder / gone)) << gone;
+  for (const char* removed : {"oldest", "older"})
+    EXPECT_FALSE(fs::exists(folder / removed)) << removed;
   for (const char* stays : {"new", "cut_off", "now", "photos"})
     EXPECT_TRUE(fs::exists(folder / stays)) << stays;
   EXPECT_TRUE(keep_session_quota(folder / "nowhere" / "now", 0).empty());

@@ -190,9 +190,9 @@ TEST(Comparison, posesDuringInsOutageAreNotCompared) {
     SCOPED_TRACE(away.what);
     Bench b;
     b.drive(0, 50, [&](double t, InsSample* s) {
-      const bool gone = t > away.from && t < away.to;
-      if (gone && away.no_fix) s->fix = FixStatus::none;
-      return away.no_fix || !gone;
+      const bool outage = t > away.from && t < away.to;
+      if (outage && away.no_fix) s->fix = FixStatus::none;
+      return away.no_fix || !outage;
     });
     b.finish();
     EXPECT_EQ(b.out.size(), 1001U);

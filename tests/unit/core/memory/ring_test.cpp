@@ -43,7 +43,7 @@ TEST(Ring, operationsMatchALimitedQueue) {
 TEST(Ring, twoThreadsLoseAndReorderNothing) {
   struct Message {
     std::uint64_t number;
-    // A torn message would not match its complement.
+    // A message written in part would not match its complement.
     std::uint64_t complement;
     std::uint64_t padding[5];
   };

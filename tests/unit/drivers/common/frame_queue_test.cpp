@@ -40,13 +40,13 @@ TEST_F(Queue, holdsEveryPossibleSlot) {
   }
 }
 
-TEST_F(Queue, reconnectedDeviceStaysGoneUntilBegin) {
+TEST_F(Queue, reconnectedDeviceStaysDisconnectedUntilBegin) {
   queue.ready_again();
-  EXPECT_EQ(queue.state(), FrameQueue::State::streaming) << "it was never gone";
+  EXPECT_EQ(queue.state(), FrameQueue::State::streaming) << "it was never disconnected";
   queue.lose(HostStamp(42));
   queue.ready_again();
   queue.ready_again();
-  EXPECT_EQ(queue.state(), FrameQueue::State::back);
+  EXPECT_EQ(queue.state(), FrameQueue::State::reconnected);
   EXPECT_EQ(ready.count, 3) << "told at every call";
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::disconnected);
   queue.fail(HostStamp(50));
@@ -96,14 +96,14 @@ constexpr Duration kSilence = Duration::milliseconds(100);
 // Limit for a busy machine.
 constexpr Duration kAnswer = Duration::seconds(10);
 
-TEST_F(Queue, silentDeviceIsGoneUntilRestarted) {
+TEST_F(Queue, silentDeviceIsDisconnectedUntilRestarted) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence);
   // One image arrives.
   queue.count_underrun();
   EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::disconnected);
   EXPECT_GT(out.arrival - begun, kSilence);
-  EXPECT_EQ(queue.state(), FrameQueue::State::gone);
+  EXPECT_EQ(queue.state(), FrameQueue::State::disconnected);
   EXPECT_FALSE(queue.offer(frame(1)));
   queue.begin(&ready, kSilence);
   EXPECT_EQ(ask(&queue, kSilence * 2, &out), DeviceStatus::timeout) << "again a first image";

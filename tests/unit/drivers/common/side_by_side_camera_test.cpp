@@ -122,7 +122,7 @@ TEST_F(SideBySide, stopReleasesUntakenFrames) {
   EXPECT_TRUE(script_.held.empty());
 }
 
-TEST_F(SideBySide, bothAreGoneBeforeEitherReturns) {
+TEST_F(SideBySide, bothAreDisconnectedBeforeEitherReturns) {
   stream();
   script_.answers = {DeviceStatus::ok, DeviceStatus::disconnected};
   Frame frame;

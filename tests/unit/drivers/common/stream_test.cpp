@@ -26,7 +26,7 @@ struct FullStream : testing::Test {
 };
 
 TEST_F(FullStream, takeWakesTheWaitingProducer) {
-  EXPECT_EQ(numbers.take({}, &d), DeviceStatus::ok);
+  EXPECT_EQ(numbers.pop({}, &d), DeviceStatus::ok);
   waiting.get();
   EXPECT_FALSE(numbers.full());
 }
@@ -37,7 +37,7 @@ TEST_F(FullStream, stopWakesTheWaitingProducer) {
   EXPECT_EQ(waiting.wait_for(std::chrono::seconds(5)), std::future_status::ready);
   // A producer that was not woken is released here, because the test ends.
   (void)numbers.start(nullptr);
-  (void)numbers.take({}, &d);
+  (void)numbers.pop({}, &d);
 }
 
 }  // namespace

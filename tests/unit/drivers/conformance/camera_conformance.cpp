@@ -199,7 +199,7 @@ TEST_F(CameraConformance, exposureSetWhileStreamingPersists) {
   camera.stop();
 }
 
-TEST_F(CameraConformance, unpluggedCameraIsGoneAndReturns) {
+TEST_F(CameraConformance, unpluggedCameraIsDisconnectedAndReturns) {
   if (make(16) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());

@@ -38,9 +38,9 @@ class ConformanceRig {
   /// Cable out. False: this rig cannot.
   [[nodiscard]] virtual bool unplug() { return false; }
   virtual void replug() {}
-  /// After unplug() the camera must be gone within this, after replug() a start() must succeed
-  /// within it.
-  [[nodiscard]] virtual Duration gone_within() const { return Duration::seconds(10); }
+  /// After unplug() the camera must be disconnected within this, after replug() a start() must
+  /// succeed within it.
+  [[nodiscard]] virtual Duration disconnected_within() const { return Duration::seconds(10); }
 
   /// The next exposures never arrive. False: this rig cannot.
   [[nodiscard]] virtual bool lose(int exposures) {

@@ -53,7 +53,7 @@ class GigeConformance final : public ConformanceRig {
   }
   void replug() override { simulator_.replug(); }
   // The limit covers two unanswered calls and the longest pause.
-  Duration gone_within() const override { return Duration::seconds(25); }
+  Duration disconnected_within() const override { return Duration::seconds(25); }
   bool lose(int exposures) override {
     simulator_.lose_frames(exposures);
     return true;

@@ -30,8 +30,8 @@ namespace vergence::test {
 
 [[nodiscard]] inline HostStamp at_s(double s) { return HostStamp{} + Duration::seconds(s); }
 
-/// Collects samples until there are no more, or this many; `gone` is counted and passed over, the
-/// device is asked to come back.
+/// Collects samples until there are no more, or this many; `disconnected` is counted and passed
+/// over, the device is asked to come back.
 template <class Item, class Device>
 [[nodiscard]] std::vector<Item> all_of(Device& device, std::size_t most, int* disconnects) {
   std::vector<Item> all;
@@ -104,7 +104,7 @@ struct SerialConformance : ::testing::Test {
     ASSERT_EQ(rig->device().start(nullptr), DeviceStatus::ok) << rig->device().last_error();
   }
   /// To the end of its time, stamps in order.
-  std::vector<Item> take_to_the_end() {
+  std::vector<Item> read_to_end() {
     const auto all = all_of<Item>(rig->device(), SIZE_MAX, &disconnects);
     EXPECT_FALSE(all.empty());
     for (std::size_t i = 0; i < all.size() && !::testing::Test::HasFailure(); ++i) {
@@ -140,7 +140,7 @@ TYPED_TEST_P(SerialConformance, stopsAndStartsAgain) {
 TYPED_TEST_P(SerialConformance, reconnectsAfterUnplugPoweredOrNot) {
   SimulatedLineOptions line{.outages = {{at_s(10), at_s(13), true}, {at_s(18), at_s(20), false}}};
   this->begin(line);
-  const auto all = this->take_to_the_end();
+  const auto all = this->read_to_end();
   EXPECT_EQ(this->disconnects, 2);
   EXPECT_GT(static_cast<double>(all.size()), 15 * TypeParam::kRate);
 }
@@ -153,21 +153,21 @@ TYPED_TEST_P(SerialConformance, startsAfterAStopDuringAnOutage) {
   EXPECT_GE(last.arrival, at_s(10));
   this->rig->device().stop();
   ASSERT_EQ(this->rig->device().start(nullptr), DeviceStatus::ok);
-  EXPECT_GT(this->take_to_the_end().front().arrival, at_s(13)) << "nothing of the first start";
+  EXPECT_GT(this->read_to_end().front().arrival, at_s(13)) << "nothing of the first start";
 }
 
 TYPED_TEST_P(SerialConformance, noiseOrSilenceIsADisconnect) {
   this->begin({}, [](HostStamp at, std::vector<std::uint8_t>* bytes) {
     if (at > at_s(12) && at < at_s(18)) std::fill(bytes->begin(), bytes->end(), std::uint8_t{0x55});
   });
-  (void)this->take_to_the_end();
+  (void)this->read_to_end();
   EXPECT_EQ(this->disconnects, 1);
 }
 
 TYPED_TEST_P(SerialConformance, flippedBitsLoseOnlyTheirMessages) {
   SimulatedLineOptions line{.corrupt = 2e-4};
   this->begin(line);
-  const auto all = this->take_to_the_end();
+  const auto all = this->read_to_end();
   EXPECT_EQ(this->disconnects, 0);
   EXPECT_GT(static_cast<double>(all.size()), 20 * TypeParam::kRate);
   const auto s = this->rig->device().statistics();

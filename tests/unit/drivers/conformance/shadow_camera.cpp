@@ -48,7 +48,7 @@ ShadowCamera::~ShadowCamera() {
 void ShadowCamera::configure(const CameraConfiguration& requested) {
   CameraConfiguration actual;
   const DeviceStatus status = camera_.configure(requested, &actual);
-  if (state_ == State::streaming || state_ == State::gone) {
+  if (state_ == State::streaming || state_ == State::disconnected) {
     EXPECT_EQ(status, DeviceStatus::busy) << "configured while streaming";
     return;
   }
@@ -69,7 +69,7 @@ void ShadowCamera::configure(const CameraConfiguration& requested) {
 void ShadowCamera::refuse(const CameraConfiguration& nonsense) {
   CameraConfiguration actual = nonsense;
   const DeviceStatus status = camera_.configure(nonsense, &actual);
-  if (state_ == State::streaming || state_ == State::gone) {
+  if (state_ == State::streaming || state_ == State::disconnected) {
     EXPECT_NE(status, DeviceStatus::ok);
     return;
   }
@@ -90,7 +90,7 @@ void ShadowCamera::start() {
     return;
   }
   // Only unplug_and_replug() reconnects the camera.
-  if (state_ == State::gone) return;
+  if (state_ == State::disconnected) return;
   ASSERT_EQ(status, DeviceStatus::ok) << camera_.last_error();
   if (state_ == State::streaming) return;
   state_ = State::streaming;
@@ -130,7 +130,7 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
   switch (status) {
     case DeviceStatus::ok:
       EXPECT_TRUE(state_ == State::streaming) << "a frame while not streaming";
-      take(frame);
+      check(frame);
       break;
     case DeviceStatus::timeout:
       EXPECT_TRUE(state_ == State::streaming);
@@ -141,12 +141,12 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
       EXPECT_TRUE(state_ == State::unconfigured || state_ == State::stopped);
       break;
     case DeviceStatus::disconnected:
-      EXPECT_TRUE(unplugged_) << "gone with the cable in: " << camera_.last_error();
+      EXPECT_TRUE(unplugged_) << "disconnected with the cable in: " << camera_.last_error();
       if (state_ == State::streaming) {
         EXPECT_LE(frame.arrival, monotonic_now());
         EXPECT_GT(frame.arrival.ns(), 0) << "when it went is not said";
       }
-      state_ = State::gone;
+      state_ = State::disconnected;
       break;
     default:
       ADD_FAILURE() << "wait() → " << to_string(status);
@@ -154,10 +154,10 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
   return status;
 }
 
-void ShadowCamera::take(const Frame& frame) {
+void ShadowCamera::check(const Frame& frame) {
   ++delivered_;
-  const bool torn = frame.status != FrameStatus::complete;
-  if (torn) ++torn_;
+  const bool incomplete = frame.status != FrameStatus::complete;
+  if (incomplete) ++incomplete_;
   const ImageView view = camera_.view(frame.slot);
   ASSERT_FALSE(view.empty());
   EXPECT_EQ(view.width, now_.width);
@@ -171,7 +171,7 @@ void ShadowCamera::take(const Frame& frame) {
   EXPECT_GT(frame.exposure, Duration{});
   if (any_) {
     EXPECT_GT(frame.counter, newest_.counter) << "counters go up";
-    if (!torn && newest_.status == FrameStatus::complete) {
+    if (!incomplete && newest_.status == FrameStatus::complete) {
       EXPECT_GT(frame.exposure_start, newest_.exposure_start) << "stamps go up";
     }
     EXPECT_GE(frame.arrival, newest_.arrival);
@@ -184,7 +184,7 @@ void ShadowCamera::take(const Frame& frame) {
   EXPECT_LE(gaps_, missing) << "frame " << frame.counter << ": a gap that no counter tells";
   any_ = true;
   newest_ = frame;
-  if (!torn) {
+  if (!incomplete) {
     EXPECT_TRUE(rig_->content_fits(frame, view))
         << "frame " << frame.counter << " has another one's pixels";
   }
@@ -217,18 +217,19 @@ bool ShadowCamera::unplug_and_replug() {
   if (state_ != State::streaming || !rig_->unplug()) return false;
   unplugged_ = true;
   const auto soon = [this] {
-    return steady_clock::now() + std::chrono::nanoseconds(rig_->gone_within().ns());
+    return steady_clock::now() + std::chrono::nanoseconds(rig_->disconnected_within().ns());
   };
   // Frames in transit still arrive.
-  for (const auto deadline = soon(); state_ != State::gone;) {
+  for (const auto deadline = soon(); state_ != State::disconnected;) {
     if (steady_clock::now() > deadline) {
-      ADD_FAILURE() << "unplugged, and not gone";
+      ADD_FAILURE() << "unplugged, and not disconnected";
       return true;
     }
     release_all();
     (void)wait(Duration::milliseconds(100));
   }
-  EXPECT_EQ(wait(Duration::milliseconds(50)), DeviceStatus::disconnected) << "gone stays gone";
+  EXPECT_EQ(wait(Duration::milliseconds(50)), DeviceStatus::disconnected)
+      << "disconnected stays disconnected";
   EXPECT_EQ(camera_.start(&notifier_), DeviceStatus::disconnected) << "started without a cable";
   rig_->replug();
   for (const auto deadline = soon();;) {
@@ -254,7 +255,7 @@ bool ShadowCamera::unplug_and_replug() {
 void ShadowCamera::check_statistics() {
   const CameraStatistics s = camera_.statistics();
   EXPECT_EQ(s.delivered, delivered_);
-  EXPECT_EQ(s.torn, torn_);
+  EXPECT_EQ(s.incomplete, incomplete_);
   EXPECT_EQ(s.starts, starts_);
   EXPECT_GE(s.underruns, last_.underruns);
   EXPECT_GE(s.lost, last_.lost);

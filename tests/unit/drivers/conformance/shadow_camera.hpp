@@ -26,7 +26,7 @@ class ShadowCamera {
   explicit ShadowCamera(ConformanceRig* rig);
   ~ShadowCamera();
 
-  enum class State : std::uint8_t { unconfigured, stopped, streaming, gone };
+  enum class State : std::uint8_t { unconfigured, stopped, streaming, disconnected };
   [[nodiscard]] State state() const noexcept { return state_; }
   [[nodiscard]] bool holds() const noexcept { return !held_.empty(); }
   [[nodiscard]] std::size_t held() const noexcept { return held_.size(); }
@@ -57,7 +57,7 @@ class ShadowCamera {
     ImageView view;
     std::uint64_t sum = 0;
   };
-  void take(const Frame& frame);
+  void check(const Frame& frame);
   void trigger_if_asked();
 
   ConformanceRig* rig_;
@@ -67,7 +67,7 @@ class ShadowCamera {
   bool unplugged_ = false;
   CameraConfiguration now_{};
   std::vector<Held> held_;
-  std::uint64_t delivered_ = 0, torn_ = 0, starts_ = 0;
+  std::uint64_t delivered_ = 0, incomplete_ = 0, starts_ = 0;
   CameraStatistics last_{}, at_start_{};
   // True after the first frame since start().
   bool any_ = false;

@@ -74,7 +74,7 @@ TEST(GigeCamera, refusalNamesWhatTheCameraOffers) {
   refused([](auto* c) { c->options = gige::Options{.packet_size = 2}; }, "packet_size");
   // The earlier configuration is active again.
   b.start();
-  EXPECT_EQ(b.take(3).size(), 3U);
+  EXPECT_EQ(b.read(3).size(), 3U);
   EXPECT_EQ(b.reg(reg::width), 320U);
 }
 
@@ -110,7 +110,7 @@ TEST(GigeCamera, everyPulseIsOneFrameAndRestIsNoError) {
       << "no pulse, no frame, and still there";
   for (std::uint64_t n = 100; n < 110; ++n) {
     b.simulator->pulse(n);
-    ASSERT_EQ(b.take(1).size(), 1U) << n;
+    ASSERT_EQ(b.read(1).size(), 1U) << n;
     EXPECT_EQ(b.numbers.back(), n);
   }
   EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::unsupported);
@@ -125,7 +125,7 @@ TEST(GigeCamera, stampsAreExposureStartsInNanoseconds) {
     test::give<gige::Options>(&c, "stamp_at", end ? "end" : "start");
     b.configure(c);
     b.start();
-    const auto frames = b.take(10);
+    const auto frames = b.read(10);
     ASSERT_EQ(b.numbers.size(), frames.size());
     for (std::size_t i = 0; i < frames.size(); ++i) {
       // Image n is exposed at n periods of 20 ms.
@@ -153,7 +153,7 @@ TEST(GigeCamera, cameraWithoutClockIsStampedByArrival) {
   b.configure(b.wish());
   EXPECT_TRUE(mentions(b.camera->remark(), "no clock"));
   b.start();
-  for (const Frame& f : b.take(5))
+  for (const Frame& f : b.read(5))
     EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().min_delay);
 }
 

@@ -44,7 +44,7 @@ struct GigeBench {
 
   /// Collects frames until `count` are complete or nothing comes for a second; all slots given
   /// back.
-  std::vector<Frame> take(std::size_t count, Duration limit = Duration::seconds(1)) {
+  std::vector<Frame> read(std::size_t count, Duration limit = Duration::seconds(1)) {
     std::vector<Frame> frames;
     const std::size_t before = numbers.size();
     for (Frame frame;
@@ -58,7 +58,7 @@ struct GigeBench {
   /// No more exposures; then what was on its way.
   std::vector<Frame> drain() {
     simulator->silence(true);
-    return take(SIZE_MAX, Duration::milliseconds(400));
+    return read(SIZE_MAX, Duration::milliseconds(400));
   }
   /// Frame number stored in the image.
   [[nodiscard]] std::uint64_t number(const Frame& frame) const {

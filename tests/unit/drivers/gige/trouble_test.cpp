@@ -12,7 +12,7 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// Waits for `gone`, releasing what comes; false: not within the limit.
+/// Waits for `disconnected`, releasing what comes; false: not within the limit.
 bool goes(GigeBench* b, double limit_s) {
   const auto begin = Clock::now();
   for (Frame frame; seconds_since(begin) < limit_s;) {
@@ -23,7 +23,7 @@ bool goes(GigeBench* b, double limit_s) {
   return false;
 }
 
-/// Asks until it is not `gone`, or until the limit.
+/// Asks until it is not `disconnected`, or until the limit.
 DeviceStatus start_again(GigeBench* b, double limit_s) {
   const auto begin = Clock::now();
   DeviceStatus status = DeviceStatus::disconnected;
@@ -70,13 +70,13 @@ TEST(GigeTrouble, silentCameraIsReportedAndComesBack) {
   GigeBench b;
   b.configure(b.wish());
   b.start();
-  EXPECT_EQ(b.take(3).size(), 3U);
+  EXPECT_EQ(b.read(3).size(), 3U);
   b.simulator->silence(true);
   ASSERT_TRUE(goes(&b, 6));
   EXPECT_TRUE(mentions(b.camera->last_error(), "sends no images"));
   b.simulator->silence(false);
   ASSERT_EQ(start_again(&b, 10), DeviceStatus::ok) << b.camera->last_error();
-  const auto frames = b.take(3);
+  const auto frames = b.read(3);
   ASSERT_EQ(frames.size(), 3U);
   EXPECT_EQ(frames[0].counter, 0U);
   EXPECT_EQ(b.camera->statistics().starts, 2U);
@@ -87,12 +87,12 @@ TEST(GigeTrouble, otherImageSizeIsReportedAndIncomplete) {
     GigeBench b;
     b.configure(b.wish());
     b.start();
-    EXPECT_EQ(b.take(3).size(), 3U);
+    EXPECT_EQ(b.read(3).size(), 3U);
     const std::size_t whole = b.numbers.size();
     b.simulator->lie_about_size(width, height);
     ASSERT_TRUE(goes(&b, 6)) << width;
     const CameraStatistics s = b.camera->statistics();
-    EXPECT_LE(s.delivered - s.torn, whole + 5) << "what was on its way before";
+    EXPECT_LE(s.delivered - s.incomplete, whole + 5) << "what was on its way before";
     EXPECT_TRUE(
         mentions(b.camera->last_error(), std::to_string(width) + " x " + std::to_string(height)));
   }
@@ -124,7 +124,7 @@ TEST(GigeTrouble, cameraIsFoundAtItsNewAddress) {
     GTEST_SKIP() << "needs broadcasts on the loopback interface: run it outside of this container";
   b.configure(b.wish());
   b.start();
-  EXPECT_EQ(b.take(3).size(), 3U);
+  EXPECT_EQ(b.read(3).size(), 3U);
   const GigeCameraOptions other = at_address_of(b, "OTHER");
   GigeCameraOptions moved = b.simulator->options();
   moved.address = GigeCamera::address(203);
@@ -133,7 +133,7 @@ TEST(GigeTrouble, cameraIsFoundAtItsNewAddress) {
   b.simulator = std::make_unique<GigeCamera>(moved);
   ASSERT_TRUE(goes(&b, 12));
   ASSERT_EQ(start_again(&b, 30), DeviceStatus::ok) << b.camera->last_error();
-  EXPECT_EQ(b.take(3).size(), 3U);
+  EXPECT_EQ(b.read(3).size(), 3U);
   EXPECT_EQ(stranger.report().starts, 0U);
 }
 
@@ -141,7 +141,7 @@ TEST(GigeTrouble, lostControlIsADisconnect) {
   GigeBench b;
   b.configure(b.wish());
   b.start();
-  EXPECT_EQ(b.take(3).size(), 3U);
+  EXPECT_EQ(b.read(3).size(), 3U);
   b.simulator->take_control(true);
   EXPECT_TRUE(goes(&b, 12));
 }

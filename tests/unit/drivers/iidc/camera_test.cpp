@@ -18,7 +18,7 @@ TEST_F(IidcCamera, framesCarryCounterStampAndPixels) {
   EXPECT_TRUE(c.bus->model().transmitting);
   for (std::uint64_t n = 0; n < 5; ++n) {
     c.bus->expose(1);
-    const Frame f = c.take();
+    const Frame f = c.read();
     EXPECT_EQ(f.counter, n);
     EXPECT_EQ(f.status, FrameStatus::complete);
     EXPECT_EQ(f.exposure, c.actual.exposure);
@@ -40,7 +40,7 @@ TEST_F(IidcCamera, framesCarryCounterStampAndPixels) {
   EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::timeout);
   const CameraStatistics s = c.camera->statistics();
   EXPECT_EQ(s.delivered, 5U);
-  EXPECT_EQ(s.lost + s.torn + s.underruns, 0U);
+  EXPECT_EQ(s.lost + s.incomplete + s.underruns, 0U);
 }
 
 TEST_F(IidcCamera, stampsContinueAcrossTheBusClockWrap) {
@@ -49,7 +49,7 @@ TEST_F(IidcCamera, stampsContinueAcrossTheBusClockWrap) {
   // The camera's clock runs from 100 s to 160 s.
   for (int i = 0; i < 60; ++i) {
     c.bus->expose(1, Duration::seconds(1.0));
-    const Frame f = c.take_and_release();
+    const Frame f = c.read_and_release();
     if (i > 0) {
       EXPECT_NEAR(static_cast<double>((f.exposure_start - last).ns()), 1e9, 82) << i;
     }
@@ -66,13 +66,13 @@ TEST_F(IidcCamera, shortFrameIsIncompleteAndKeepsItsNumber) {
   // Four bytes contain no frame number.
   c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes = 4; });
   c.bus->expose(1);
-  EXPECT_EQ(c.take_and_release().counter, 0U);
-  const Frame torn = c.take_and_release();
-  EXPECT_EQ(torn.status, FrameStatus::incomplete);
-  EXPECT_EQ(torn.counter, 1U);
-  EXPECT_EQ(c.take_and_release().counter, 4U);
+  EXPECT_EQ(c.read_and_release().counter, 0U);
+  const Frame incomplete = c.read_and_release();
+  EXPECT_EQ(incomplete.status, FrameStatus::incomplete);
+  EXPECT_EQ(incomplete.counter, 1U);
+  EXPECT_EQ(c.read_and_release().counter, 4U);
   const CameraStatistics s = c.camera->statistics();
-  EXPECT_EQ(s.torn, 1U);
+  EXPECT_EQ(s.incomplete, 1U);
   EXPECT_EQ(s.lost, 2U);
 }
 
@@ -99,11 +99,11 @@ TEST_F(IidcCamera, lostPacketIsFoundByTheNextEmbeddedStamp) {
                 image->begin() + static_cast<std::ptrdiff_t>(keep));
     });
     own.bus->expose(1);
-    EXPECT_EQ(own.take_and_release().status, FrameStatus::complete);
-    const Frame torn = own.take_and_release();
-    EXPECT_EQ(torn.status, FrameStatus::incomplete) << lost;
-    EXPECT_EQ(torn.counter, 1U);
-    const Frame good = own.take_and_release();
+    EXPECT_EQ(own.read_and_release().status, FrameStatus::complete);
+    const Frame incomplete = own.read_and_release();
+    EXPECT_EQ(incomplete.status, FrameStatus::incomplete) << lost;
+    EXPECT_EQ(incomplete.counter, 1U);
+    const Frame good = own.read_and_release();
     EXPECT_EQ(good.status, FrameStatus::complete);
     EXPECT_EQ(good.counter, 3U);
     EXPECT_EQ(own.camera->statistics().lost, 1U);
@@ -116,7 +116,7 @@ TEST_F(IidcCamera, stampAtOptionSelectsTheStampedInstant) {
     CameraUnderTest own;
     own.start(CameraUnderTest::usual_with("stamp_at", at));
     own.bus->expose(1);
-    starts.push_back(own.take_and_release().exposure_start.ns());
+    starts.push_back(own.read_and_release().exposure_start.ns());
   }
   EXPECT_NEAR(static_cast<double>(starts[0] - starts[1]), 2.5e6, 2);
   EXPECT_NEAR(static_cast<double>(starts[0] - starts[2]), 5e6, 2);
@@ -129,7 +129,7 @@ TEST_F(IidcCamera, sixteenBitPixelsBecomeGreyInOwnSlots) {
   c.bus->expose(7);
   EXPECT_EQ(c.camera->statistics().underruns, 2U);
   for (std::uint64_t n = 0; n < 5; ++n) {
-    const Frame f = c.take();
+    const Frame f = c.read();
     EXPECT_EQ(f.counter, n);
     const ImageView view = c.camera->view(f.slot);
     EXPECT_EQ(view.at(639, 479), (479 + n) & 0xFFU);
@@ -167,8 +167,8 @@ TEST_F(IidcCamera, exposureSetWhileStreamingIsWrittenOrClamped) {
 TEST_F(IidcCamera, framesAreCountedWithoutEmbeddedCounter) {
   c.start(CameraUnderTest::usual_with("embedded", "no"));
   c.bus->expose(3, Duration::milliseconds(100), {1});
-  EXPECT_EQ(c.take_and_release().counter, 0U);
-  const Frame f = c.take_and_release();
+  EXPECT_EQ(c.read_and_release().counter, 0U);
+  const Frame f = c.read_and_release();
   EXPECT_EQ(f.counter, 1U);
   EXPECT_EQ(f.exposure_start.ns(), f.arrival.ns() - f.exposure.ns());
 }

@@ -39,13 +39,13 @@ struct CameraUnderTest {
     ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   }
   /// The next frame, which must be there.
-  Frame take() {
+  Frame read() {
     Frame f;
     EXPECT_EQ(camera->wait(Duration{}, &f), DeviceStatus::ok);
     return f;
   }
-  Frame take_and_release() {
-    const Frame f = take();
+  Frame read_and_release() {
+    const Frame f = read();
     camera->release(f.slot);
     return f;
   }

@@ -69,7 +69,7 @@ DeviceStatus FakeBus::reopen() noexcept {
 
 void FakeBus::unplug() {
   plugged_ = false;
-  if (sink_ != nullptr) sink_->gone(now());
+  if (sink_ != nullptr) sink_->disconnected(now());
 }
 
 void FakeBus::replug() {

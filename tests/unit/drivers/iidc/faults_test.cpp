@@ -82,8 +82,8 @@ TEST_F(IidcFaults, unpluggedCameraReturnsAsConfigured) {
   c.bus->unplug();
   // The frame is not delivered.
   c.bus->expose(1);
-  EXPECT_EQ(c.take_and_release().counter, 0U);
-  const Frame held = c.take();
+  EXPECT_EQ(c.read_and_release().counter, 0U);
+  const Frame held = c.read();
   Frame f;
   EXPECT_EQ(c.camera->wait(Duration::milliseconds(20), &f), DeviceStatus::disconnected);
   EXPECT_EQ(f.arrival, c.bus->now() - Duration::milliseconds(100));
@@ -97,7 +97,7 @@ TEST_F(IidcFaults, unpluggedCameraReturnsAsConfigured) {
   EXPECT_EQ(c.bus->model().format, 7U) << "all registers are written anew";
   EXPECT_EQ(c.bus->reopened(), 2);
   c.bus->expose(1);
-  EXPECT_EQ(c.take_and_release().counter, 0U);
+  EXPECT_EQ(c.read_and_release().counter, 0U);
   c.camera->release(held.slot);
 }
 
@@ -127,14 +127,14 @@ TEST_F(IidcFaults, replugWithoutBandwidthIsRetried) {
   c.bus->start_status = DeviceStatus::ok;
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->last_error();
   c.bus->expose(1);
-  EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+  EXPECT_EQ(c.read_and_release().status, FrameStatus::complete);
 }
 
 TEST_F(IidcFaults, silentCameraRestartsWhileAnImageIsHeld) {
   c.start();
   c.bus->expose(2);
-  (void)c.take_and_release();
-  const Frame held = c.take();
+  (void)c.read_and_release();
+  const Frame held = c.read();
   const std::uint8_t seen = c.camera->view(held.slot).at(0, 1);
   Frame f;
   DeviceStatus status = DeviceStatus::timeout;
@@ -148,14 +148,14 @@ TEST_F(IidcFaults, silentCameraRestartsWhileAnImageIsHeld) {
   c.camera->release(held.slot);
   for (std::size_t i = 0; i < 2 * c.bus->shape().buffers; ++i) {
     c.bus->expose(1);
-    EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+    EXPECT_EQ(c.read_and_release().status, FrameStatus::complete);
   }
 }
 
 TEST_F(IidcFaults, streamOutOfStepRestarts) {
   c.start();
   c.bus->expose(1);
-  (void)c.take_and_release();
+  (void)c.read_and_release();
   for (int i = 0; i < iidc::IidcCamera::kStrays; ++i)
     c.bus->expose_tampered([](std::vector<std::uint8_t>* image, std::size_t*) {
       std::rotate(image->begin(), image->begin() + 4096, image->end());
@@ -164,18 +164,18 @@ TEST_F(IidcFaults, streamOutOfStepRestarts) {
   EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::disconnected);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(1);
-  EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+  EXPECT_EQ(c.read_and_release().status, FrameStatus::complete);
 }
 
 TEST_F(IidcFaults, restartedCounterIsFollowedAfterTwoFrames) {
   c.start();
   c.bus->expose(5);
-  for (int i = 0; i < 5; ++i) (void)c.take_and_release();
+  for (int i = 0; i < 5; ++i) (void)c.read_and_release();
   // The camera rebooted.
   c.bus->model().frames_made = 0;
   c.bus->expose(3);
-  EXPECT_EQ(c.take_and_release().counter, 5U);
-  EXPECT_EQ(c.take_and_release().counter, 6U);
+  EXPECT_EQ(c.read_and_release().counter, 5U);
+  EXPECT_EQ(c.read_and_release().counter, 6U);
 }
 
 }  // namespace

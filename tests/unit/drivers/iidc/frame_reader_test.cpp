@@ -40,7 +40,7 @@ TEST(FrameReader, noiseIsNotTakenForTheNextFrame) {
               .bytes = pixels.size(),
               .at = HostStamp(n * std::int64_t{100'000'000})};
     const ReadFrame f = reader.read(a);
-    ASSERT_TRUE(f.taken);
+    ASSERT_TRUE(f.accepted);
     ASSERT_EQ(f.status, FrameStatus::complete) << n;
     ASSERT_EQ(f.counter, n);
   }
@@ -64,7 +64,7 @@ TEST(FrameReader, anyBytesGiveAResult) {
                 .bytes = bytes.size(),
                 .at = HostStamp(n * std::int64_t{10'000'000})};
       const ReadFrame f = reader.read(a);
-      if (!f.taken) continue;
+      if (!f.accepted) continue;
       ASSERT_TRUE(!any || f.counter > last);
       any = true;
       last = f.counter;

@@ -41,19 +41,19 @@ struct MockBench {
     EXPECT_EQ(rig->trigger().configure(board, nullptr), DeviceStatus::ok);
   }
 
-  /// `pause_at`: asks for a pause of five pulses when the report of that pulse is taken.
+  /// `pause_at`: asks for a pause of five pulses when the report of that pulse is read.
   void drive(std::optional<std::uint64_t> pause_at = {}) {
     EXPECT_EQ(rig->ins().start(nullptr), DeviceStatus::ok);
     for (int k = 0; k < 2; ++k) EXPECT_EQ(rig->camera(k).start(nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->trigger().start(nullptr), DeviceStatus::ok);
     std::array<bool, 4> ended{};
     while (!(ended[0] && ended[1] && ended[2] && ended[3])) {
-      for (std::size_t k = 0; k < 2; ++k) ended[k] = take_frame(k) || ended[k];
+      for (std::size_t k = 0; k < 2; ++k) ended[k] = read_frame(k) || ended[k];
       InsReading r;
       const DeviceStatus status = rig->ins().wait(Duration::microseconds(50), &r);
       if (status == DeviceStatus::ok) readings.push_back(r);
       ended[2] = ended[2] || status == DeviceStatus::ended;
-      ended[3] = take_pulse(pause_at) || ended[3];
+      ended[3] = read_pulse(pause_at) || ended[3];
     }
     for (std::size_t k = 0; k < 2; ++k)
       statistics[k] = rig->camera(static_cast<int>(k)).statistics();
@@ -62,7 +62,7 @@ struct MockBench {
   std::unique_ptr<MockRig> rig;
   std::array<std::vector<Seen>, 2> frames;
   // Number of disconnects followed by a reconnect, per camera.
-  std::array<int, 2> gone{};
+  std::array<int, 2> disconnects{};
   std::array<CameraStatistics, 2> statistics;
   std::vector<InsReading> readings;
   std::vector<Pulse> pulses;
@@ -70,7 +70,7 @@ struct MockBench {
 
  private:
   /// True: it has ended.
-  bool take_frame(std::size_t k) {
+  bool read_frame(std::size_t k) {
     CameraDevice& camera = rig->camera(static_cast<int>(k));
     Frame f;
     DeviceStatus status = camera.wait(Duration{}, &f);
@@ -79,11 +79,11 @@ struct MockBench {
       camera.release(f.slot);
     } else if (status == DeviceStatus::disconnected) {
       status = camera.start(nullptr);
-      gone[k] += status == DeviceStatus::ok ? 1 : 0;
+      disconnects[k] += status == DeviceStatus::ok ? 1 : 0;
     }
     return status == DeviceStatus::ended;
   }
-  bool take_pulse(std::optional<std::uint64_t> pause_at) {
+  bool read_pulse(std::optional<std::uint64_t> pause_at) {
     TriggerDevice& board = rig->trigger();
     Pulse p;
     DeviceStatus status = board.wait(Duration::microseconds(50), &p);

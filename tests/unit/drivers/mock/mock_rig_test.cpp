@@ -39,12 +39,12 @@ TEST(MockRig, coveredLensIsBlackForItsDuration) {
   for (const Seen& s : h.frames[0]) EXPECT_GT(s.mean, 30);
 }
 
-// Frames of 0.8 s on would arrive after the camera is gone: none of them does, and no event of its
-// return is taken for a frame.
+// Frames of 0.8 s on would arrive after the camera is disconnected: none of them does, and no event
+// of its return is taken for a frame.
 TEST(MockRig, framesInTransitAreLostWithTheCamera) {
   const MockBench h = drive_with(
       {"late_frames@0.5 camera=1 duration_s=0.5 share=1", "camera_gone@1 camera=1 duration_s=0.5"});
-  EXPECT_EQ(h.gone[1], 1);
+  EXPECT_EQ(h.disconnects[1], 1);
   EXPECT_GE(h.statistics[1].lost, 3U);
   EXPECT_EQ(h.frames[1].size() + h.statistics[1].lost, 51U);
   std::size_t starts = 0;
@@ -167,9 +167,9 @@ TEST(MockRig, idealInsIsTheTruthToAMicrometre) {
 }
 
 TEST(MockRig, insFaultsActForTheirDuration) {
-  const MockBench gone = drive_with({"ins_gone@1 duration_s=1"});
-  EXPECT_EQ(gone.rig->ins().statistics().lost, 120U);
-  for (const InsReading& r : gone.readings)
+  const MockBench interrupted = drive_with({"ins_gone@1 duration_s=1"});
+  EXPECT_EQ(interrupted.rig->ins().statistics().lost, 120U);
+  for (const InsReading& r : interrupted.readings)
     EXPECT_FALSE(r.sample.number >= 120 && r.sample.number < 240);
 
   const MockBench dark = drive_with({"no_fix@1 duration_s=1"}, 3, true);

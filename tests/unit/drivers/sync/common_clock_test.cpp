@@ -26,7 +26,7 @@ TEST_P(CommonClock, pairsAreFormedByItsStampsAlone) {
       if (n == 100 && k == 1) continue;
       SyncFrame f = rig_frame(k, n, random.next(), rig_time(n), t + Duration::microseconds(k * 80));
       f.middle.host = f.middle.host + Duration::milliseconds(19 * k);
-      EXPECT_EQ(out.offer(&sync, f), SyncResult::taken) << n;
+      EXPECT_EQ(out.offer(&sync, f), SyncResult::accepted) << n;
     }
   }
   sync.finish();

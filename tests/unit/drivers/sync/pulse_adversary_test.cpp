@@ -149,7 +149,7 @@ TEST(PulsePairing, isVerifiedWithinASecondAfterBriefLoss) {
     for (const double seconds : {0.05, 0.1, 0.2, 0.3}) {
       PulseRigOptions o{.rate_hz = 20};
       const double at = 3 + 0.0137 * static_cast<double>(seed);
-      o.gone = {{0, at, at + seconds}, {1, at, at + seconds}};
+      o.outages = {{0, at, at + seconds}, {1, at, at + seconds}};
       expect_proven_within_a_second(o, seed, 8, 2);
     }
 }

@@ -43,11 +43,11 @@ struct PulseRigOptions {
   // Noise of the pulses' mapped edges.
   Duration host_noise = Duration::microseconds(20);
   // Events, seconds since the start.
-  struct Gone {
+  struct Outage {
     int camera = 0;
     double from = 0, until = 0;
   };
-  std::vector<Gone> gone{};
+  std::vector<Outage> outages{};
   // Times at which the board restarts; there are no pulses for 0.7 s.
   std::vector<double> reboots{};
   struct Jump {
@@ -163,7 +163,7 @@ class PulseRig {
   bool quiet(double t) const {
     const double s = t - kStart;
     if (s < o_.quiet) return true;
-    for (const auto& g : o_.gone)
+    for (const auto& g : o_.outages)
       if (s > g.from - o_.quiet && s < g.until + o_.quiet) return true;
     return std::any_of(o_.reboots.begin(), o_.reboots.end(),
                        [&](double r) { return std::abs(s - r) < o_.quiet; });
@@ -192,7 +192,7 @@ class PulseRig {
 
   void device_events(double t) {
     const double s = t - kStart;
-    for (const auto& g : o_.gone) {
+    for (const auto& g : o_.outages) {
       Camera& c = cameras_[static_cast<std::size_t>(g.camera)];
       if (c.here && s >= g.from && s < g.until) {
         deliver(ns(t));
@@ -307,11 +307,11 @@ class PulseRig {
     }
   }
 
-  /// Contract of the synchroniser: a slot that is taken comes out once.
+  /// Contract of the synchroniser: a slot that is accepted comes out once.
   void offer(const SyncFrame& frame) {
     const SyncResult verdict = sync_.offer(frame);
     std::uint8_t& held = held_[static_cast<std::size_t>(frame.slot)];
-    if (verdict == SyncResult::taken) truth_.broken += held++ == 0 ? 0 : 1;
+    if (verdict == SyncResult::accepted) truth_.broken += held++ == 0 ? 0 : 1;
   }
   void check_contract(const SyncedSet& set) {
     bool complete = true;

@@ -18,7 +18,7 @@ inline PulseRigOptions ten_hours(std::uint64_t seed) {
   Random random(seed, 3);
   for (int i = 0; i < 5; ++i) {
     const double at = 600 + 7000.0 * i + random.uniform(0, 3000);
-    o.gone.push_back({static_cast<int>(random.below(2)), at, at + random.uniform(1, 20)});
+    o.outages.push_back({static_cast<int>(random.below(2)), at, at + random.uniform(1, 20)});
   }
   for (int i = 0; i < 3; ++i) o.reboots.push_back(4500 + 9000.0 * i + random.uniform(0, 1000));
   return o;
@@ -38,7 +38,7 @@ inline void expect_ten_hours_right(std::uint64_t seed) {
   EXPECT_LE(t.ambiguous, 2 * (t.missed[0] + t.missed[1]));
   EXPECT_EQ(c.reboots, 3U);
   std::array<std::uint64_t, 2> acquisitions{4, 4};
-  for (const auto& g : o.gone) ++acquisitions[static_cast<std::size_t>(g.camera)];
+  for (const auto& g : o.outages) ++acquisitions[static_cast<std::size_t>(g.camera)];
   for (std::size_t k = 0; k < 2; ++k) {
     EXPECT_EQ(c.lost[k], t.lost[k]) << k;
     EXPECT_EQ(c.missed_trigger[k], t.missed[k]) << k;
@@ -83,7 +83,7 @@ inline void expect_never_wrong(std::uint64_t seed, double seconds) {
     const int camera = static_cast<int>(random.below(static_cast<std::uint32_t>(o.cameras)));
     switch (random.below(3)) {
       case 0:
-        o.gone.push_back({camera, at, at + random.uniform(0.05, 3)});
+        o.outages.push_back({camera, at, at + random.uniform(0.05, 3)});
         break;
       case 1:
         o.reboots.push_back(at);

@@ -39,7 +39,7 @@ std::vector<SyncedSet> drain(RigSynchronizer* sync) {
 }
 
 std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f,
-                             SyncResult expected = SyncResult::taken) {
+                             SyncResult expected = SyncResult::accepted) {
   EXPECT_EQ(sync->offer(f), expected) << "camera " << f.camera << " counter " << f.counter;
   return drain(sync);
 }
@@ -140,12 +140,12 @@ TEST(RigSynchronizer, matchesAModelUnderRandomLossAndDelay) {
       }
       const SyncResult expected = given[k].contains(number) ? SyncResult::duplicate
                                   : number < first          ? SyncResult::late
-                                                            : SyncResult::taken;
+                                                            : SyncResult::accepted;
       ASSERT_EQ(sync.offer(frame(static_cast<int>(k), number, number, slot)), expected)
           << "step " << step << " camera " << k << " pulse " << number;
       duplicates += expected == SyncResult::duplicate ? 1 : 0;
       lates += expected == SyncResult::late ? 1 : 0;
-      if (expected == SyncResult::taken) given[k].insert(number), waiting[number][k] = slot;
+      if (expected == SyncResult::accepted) given[k].insert(number), waiting[number][k] = slot;
       slot = static_cast<FrameSlot>(slot + 1);
       capture_sets();
       ASSERT_TRUE(waiting.empty() || waiting.begin()->second.size() < cameras) << "step " << step;
@@ -153,7 +153,7 @@ TEST(RigSynchronizer, matchesAModelUnderRandomLossAndDelay) {
     }
     sync.finish();
     capture_sets();
-    EXPECT_TRUE(waiting.empty()) << "every slot that was taken has come out";
+    EXPECT_TRUE(waiting.empty()) << "every slot that was accepted has come out";
     const SyncCounters& c = sync.counters();
     EXPECT_EQ(c.complete + c.incomplete, sets);
     EXPECT_EQ(std::accumulate(c.duplicate.begin(), c.duplicate.end(), std::uint64_t{0}),
@@ -242,7 +242,7 @@ TEST(RigSynchronizer, freeRunningImagesArePairedByTime) {
   Random random(5);
   std::uint64_t complete = 0;
   std::vector<HostStamp> stamps;
-  const auto take = [&](const SyncFrame& f) {
+  const auto offer_and_collect = [&](const SyncFrame& f) {
     for (const SyncedSet& set : offer(&sync, f)) {
       complete += set.complete ? 1 : 0;
       stamps.push_back(set.stamp);
@@ -255,8 +255,8 @@ TEST(RigSynchronizer, freeRunningImagesArePairedByTime) {
   for (std::uint64_t n = 0; n < 200; ++n) {
     // The cameras rest for five seconds.
     const double at = n < 15 ? 50.0 * static_cast<double>(n) : 50.0 * static_cast<double>(n) + 5013;
-    take(timed(0, n, at));
-    if (n != 7) take(timed(1, n + 1000, at + random.uniform(-2.5, 2.5)));
+    offer_and_collect(timed(0, n, at));
+    if (n != 7) offer_and_collect(timed(1, n + 1000, at + random.uniform(-2.5, 2.5)));
   }
   EXPECT_EQ(complete, 199U);
   EXPECT_EQ(sync.counters().lost[1], 1U);

@@ -207,7 +207,7 @@ TEST(Board, otherBoardOnThePortIsRefused) {
                  *bytes = closed(f);
                });
   const auto all = rig.drive();
-  EXPECT_EQ(rig.disconnects, 1) << "gone while the other is there";
+  EXPECT_EQ(rig.disconnects, 1) << "disconnected while the other is there";
   for (const Pulse& p : all) EXPECT_FALSE(rig.truth(p) > at_s(10.5) && rig.truth(p) < at_s(20));
   EXPECT_GT(rig.truth(all.back()), at_s(59));
 }

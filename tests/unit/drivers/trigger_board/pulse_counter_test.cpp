@@ -22,10 +22,10 @@ struct Accounted : ::testing::Test {
   Accounted() {
     account.begin(7, 0);
     account.set_intervals(30'000, 0);
-    EXPECT_TRUE(account.take(event(0, kPeriod, 1), &pulse));
+    EXPECT_TRUE(account.accept(event(0, kPeriod, 1), &pulse));
   }
-  bool take(std::uint32_t number, std::uint8_t flags = 0) {
-    return account.take(event(number, kPeriod * (number + 1ULL), flags), &pulse);
+  bool accept(std::uint32_t number, std::uint8_t flags = 0) {
+    return account.accept(event(number, kPeriod * (number + 1ULL), flags), &pulse);
   }
   PulseCounter account;
   Pulse pulse{};
@@ -33,47 +33,47 @@ struct Accounted : ::testing::Test {
 
 TEST_F(Accounted, pauseWithLostFirstReportIsRecognised) {
   account.expect_pause(4);
-  ASSERT_TRUE(take(1));
-  ASSERT_TRUE(take(7));
+  ASSERT_TRUE(accept(1));
+  ASSERT_TRUE(accept(7));
   EXPECT_TRUE(pulse.resumed);
   EXPECT_EQ(account.counters().lost, 1U);
 }
 
 TEST_F(Accounted, lossesBeforeAPauseAreCounted) {
   account.expect_pause(4);
-  ASSERT_TRUE(take(3));
+  ASSERT_TRUE(accept(3));
   EXPECT_FALSE(pulse.resumed);
   EXPECT_EQ(account.counters().lost, 2U);
-  ASSERT_TRUE(take(8, 1));
+  ASSERT_TRUE(accept(8, 1));
   EXPECT_EQ(account.counters().lost, 2U);
 }
 
 TEST_F(Accounted, numbersSkippedByTheBoardAreNotLost) {
-  ASSERT_TRUE(take(4, 2));
+  ASSERT_TRUE(accept(4, 2));
   EXPECT_EQ(account.counters().lost, 0U);
 }
 
 TEST_F(Accounted, missingReportsAreCountedAtTheEnd) {
-  ASSERT_TRUE(take(1));
+  ASSERT_TRUE(accept(1));
   account.end(2, 0);
   EXPECT_EQ(account.counters().lost, 0U);
   account.end(6, 1);
   EXPECT_EQ(account.counters().lost, 3U);
-  ASSERT_TRUE(take(6, 1));
+  ASSERT_TRUE(accept(6, 1));
   EXPECT_EQ(account.counters().lost, 3U);
 }
 
 TEST_F(Accounted, repeatedAndOlderEventsAreRefused) {
-  ASSERT_TRUE(take(1));
-  EXPECT_FALSE(take(1));
-  EXPECT_FALSE(take(0));
-  EXPECT_FALSE(account.take(event(2, kPeriod), &pulse));
-  EXPECT_FALSE(account.take(event(2, 2 * kPeriod), &pulse)) << "at the tick of the one before";
-  EXPECT_FALSE(account.take(event(2, kMaxTicks + 1), &pulse));
-  EXPECT_FALSE(account.take(event(100'000, 3 * kPeriod), &pulse));
+  ASSERT_TRUE(accept(1));
+  EXPECT_FALSE(accept(1));
+  EXPECT_FALSE(accept(0));
+  EXPECT_FALSE(account.accept(event(2, kPeriod), &pulse));
+  EXPECT_FALSE(account.accept(event(2, 2 * kPeriod), &pulse)) << "at the tick of the one before";
+  EXPECT_FALSE(account.accept(event(2, kMaxTicks + 1), &pulse));
+  EXPECT_FALSE(account.accept(event(100'000, 3 * kPeriod), &pulse));
   EXPECT_EQ(account.refused_in_row(), 6);
   EXPECT_EQ(pulse.number, 1U) << "untouched";
-  EXPECT_TRUE(take(2));
+  EXPECT_TRUE(accept(2));
   EXPECT_EQ(account.refused_in_row(), 0);
   EXPECT_EQ(account.counters().lost, 0U);
 }
@@ -84,11 +84,11 @@ TEST(PulseCounter, numbersContinueBeyond32Bits) {
   account.begin(7, 0xFFFFFFFEU);
   Pulse pulse;
   const std::uint64_t years = 4'294'967'296ULL * kPeriod;
-  ASSERT_TRUE(account.take(event(0xFFFFFFFFU, years), &pulse));
+  ASSERT_TRUE(account.accept(event(0xFFFFFFFFU, years), &pulse));
   EXPECT_EQ(account.counters().lost, 1U) << "the board said what its next number is";
-  ASSERT_TRUE(account.take(event(0, years + kPeriod), &pulse));
+  ASSERT_TRUE(account.accept(event(0, years + kPeriod), &pulse));
   EXPECT_EQ(pulse.number, 0x100000000ULL);
-  ASSERT_TRUE(account.take(event(2, years + 3 * kPeriod), &pulse));
+  ASSERT_TRUE(account.accept(event(2, years + 3 * kPeriod), &pulse));
   EXPECT_EQ(pulse.number, 0x100000002ULL);
   EXPECT_EQ(account.counters().lost, 2U);
 }
@@ -99,7 +99,7 @@ TEST_F(Accounted, impossibleExposuresAreRefusedAndCounted) {
   e.exposure[1] = {-5, 100};
   e.exposure[2] = {100, 50};
   e.exposure[3] = {100, TRIGGER_NOT_SEEN};
-  ASSERT_TRUE(account.take(e, &pulse));
+  ASSERT_TRUE(account.accept(e, &pulse));
   EXPECT_TRUE(pulse.exposure[0].seen);
   EXPECT_EQ(pulse.exposure[0].start, Duration::microseconds(120));
   EXPECT_EQ(pulse.exposure[0].end, Duration::microseconds(8120));

@@ -63,8 +63,8 @@ struct BoardRig {
     ASSERT_EQ(device->configure(requested, nullptr), DeviceStatus::ok) << device->last_error();
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
   }
-  /// Pulses until the device has no more, or this many, each stamped within its bound; `gone` is
-  /// passed over.
+  /// Pulses until the device has no more, or this many, each stamped within its bound;
+  /// `disconnected` is passed over.
   std::vector<Pulse> pulses(std::size_t most = SIZE_MAX) {
     const auto all = all_of<Pulse>(*device, most, &disconnects);
     EXPECT_FALSE(all.empty());

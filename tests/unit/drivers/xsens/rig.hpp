@@ -55,7 +55,7 @@ struct XsensRig {
     ASSERT_EQ(device->configure(rate_hz, nullptr), DeviceStatus::ok) << device->last_error();
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
   }
-  /// All readings until the device has no more, or this many; `gone` is passed over.
+  /// All readings until the device has no more, or this many; `disconnected` is passed over.
   std::vector<InsReading> readings(std::size_t most = SIZE_MAX) {
     return all_of<InsReading>(*device, most, &disconnects);
   }

@@ -38,14 +38,14 @@ TEST(FrameInfo, absentFeatureOrItemsGiveNoLayout) {
 
 TEST(CounterUnwrapper, countsFromZeroAcrossTheWrap) {
   CounterUnwrapper c;
-  EXPECT_EQ(c.take(0xFFFF'FFFEU), 0U);
+  EXPECT_EQ(c.unwrap(0xFFFF'FFFEU), 0U);
   EXPECT_EQ(c.step(0xFFFF'FFFFU), 1);
-  EXPECT_EQ(c.take(0xFFFF'FFFFU), 1U);
+  EXPECT_EQ(c.unwrap(0xFFFF'FFFFU), 1U);
   EXPECT_EQ(c.step(2), 3);
-  EXPECT_EQ(c.take(2), 4U);
+  EXPECT_EQ(c.unwrap(2), 4U);
   EXPECT_EQ(c.step(1), -1);
   EXPECT_EQ(c.rebase(0), 5U);
-  EXPECT_EQ(c.take(1), 6U);
+  EXPECT_EQ(c.unwrap(1), 6U);
 }
 
 TEST(FrameInfo, everyRegisterValueGivesAFittingLayout) {

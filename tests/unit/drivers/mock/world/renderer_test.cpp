@@ -61,7 +61,7 @@ struct RenderedImage {
   }
 };
 
-RenderedImage take(Renderer* renderer, const Transform& T_camera_enu, const RenderRequest& shot) {
+RenderedImage render(Renderer* renderer, const Transform& T_camera_enu, const RenderRequest& shot) {
   const Intrinsics& k = renderer->camera().intrinsics();
   RenderedImage p{k.width, k.height,
                   std::vector<std::uint8_t>(static_cast<std::size_t>(k.width * k.height))};
@@ -103,7 +103,7 @@ TEST(Renderer, edgesLieWhereTheLensModelPutsThem) {
          // A pixel at 6 m is 0.02 m, so the shifts cover every sub-pixel phase.
          shift += 0.0041) {
       const Transform T_camera_enu = looking_north({shift, 0, 0});
-      const RenderedImage p = take(&renderer, T_camera_enu, clean());
+      const RenderedImage p = render(&renderer, T_camera_enu, clean());
       const double dark = p.at(2, 120), bright = p.at(160, 120);
       ASSERT_GT(bright - dark, 150);
       for (const double plate_x : {-1.2, 1.7}) {
@@ -132,7 +132,7 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   scene.plate(-2, -0.5, -3, 3, 8.0, 1);
   Renderer renderer(scene.world(), Camera(lens(false)));
   for (double shift = 0; shift < 0.03; shift += 0.0037) {
-    const RenderedImage p = take(&renderer, looking_north({shift, 0, 0}), clean());
+    const RenderedImage p = render(&renderer, looking_north({shift, 0, 0}), clean());
     const double step = p.at(110, 120) - p.at(2, 120);
     ASSERT_GT(step, 150);
     double sum = 0;
@@ -151,10 +151,10 @@ TEST(Renderer, noiseHasTheStatedVarianceAndSeed) {
   shot.shot_noise = 0.03;
   shot.read_noise = 1.5;
   shot.noise_seed = 7;
-  const RenderedImage a = take(&renderer, T, shot), again = take(&renderer, T, shot);
+  const RenderedImage a = render(&renderer, T, shot), again = render(&renderer, T, shot);
   EXPECT_EQ(a.pixels, again.pixels);
   shot.noise_seed = 8;
-  const RenderedImage b = take(&renderer, T, shot);
+  const RenderedImage b = render(&renderer, T, shot);
   double mean = 0, difference2 = 0, product = 0;
   const double n = static_cast<double>(a.pixels.size());
   for (const std::uint8_t v : a.pixels) mean += v / n;
@@ -184,7 +184,7 @@ TEST(Renderer, everySimdTargetDrawsTheSameImage) {
   for (const std::int64_t target : targets) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    const RenderedImage p = take(&renderer, T_town, noisy);
+    const RenderedImage p = render(&renderer, T_town, noisy);
     if (first.pixels.empty()) first = p;
     // Fused or not, a product rounds differently in the last bit: a grey value may round to its
     // neighbour, and where two surfaces are equally deep the order may change, whose pixels are

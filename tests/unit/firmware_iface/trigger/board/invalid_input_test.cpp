@@ -19,7 +19,7 @@ TEST(BoardInvalidInput, stalledHostLosesCountedEventsOnly) {
   b.send(trigger_ping, {1, 0, 0, 0});
   b.deaf = false;
   b.listen();
-  EXPECT_EQ(b.take(trigger_pong).size(), 1U) << "answers have room of their own";
+  EXPECT_EQ(b.pop(trigger_pong).size(), 1U) << "answers have room of their own";
   b.run_for_us(1'100'000);
   const TriggerStatus s = b.status();
   EXPECT_GT(s.events_dropped, 70U);
@@ -33,7 +33,7 @@ TEST(BoardInvalidInput, pingFloodDropsOnlyItsAnswers) {
   for (int i = 0; i < 1000; ++i) b.send(trigger_ping, {1, 0, 0, 0});
   b.deaf = false;
   b.listen();
-  EXPECT_EQ(b.take(trigger_pong).size() + 1, std::size_t{outbox_capacity})
+  EXPECT_EQ(b.pop(trigger_pong).size() + 1, std::size_t{outbox_capacity})
       << "and the STATUS of the start";
   EXPECT_EQ(b.board.outbox.dropped, 1000U - (outbox_capacity - 1));
 }

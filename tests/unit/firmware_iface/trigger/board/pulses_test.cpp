@@ -258,8 +258,8 @@ TEST_F(WithFeedback, edgesBeforeConfigurationAreIgnored) {
   b.edge_at(b.now + 3000, board_input_pps, true);
   b.edge_at(b.now + 4000, board_input_ins, true);
   b.run_for_us(500'000);
-  b.take(trigger_status);
-  EXPECT_TRUE(b.take(trigger_event).empty());
+  b.pop(trigger_status);
+  EXPECT_TRUE(b.pop(trigger_event).empty());
   EXPECT_EQ(b.status().pps_age_ms, 0U) << "no STATUS was due";
   b.run_for_us(600'000);
   EXPECT_EQ(b.status().pps_age_ms, 0xFFFFFFFFU);
@@ -273,7 +273,7 @@ TEST(BoardInputs, configuredInsEdgesAreCountedAndStamped) {
   for (std::uint64_t k = 0; k < 20; ++k)
     b.edge_at(1'000'000 + (k + 1) * 2500 * kUs, board_input_ins, k % 2 == 0);
   b.run_for_us(100'000);
-  const auto reported = b.take(trigger_ins);
+  const auto reported = b.pop(trigger_ins);
   ASSERT_EQ(reported.size(), 10U);
   for (std::uint32_t k = 0; k < 10; ++k) {
     TriggerEdge e{};

@@ -11,7 +11,7 @@ using Bytes = VirtualBoard::Bytes;
 TEST(BoardTalk, invalidMessagesAreAnsweredByErrorCode) {
   VirtualBoard b;
   b.send(trigger_hello, {trigger_protocol_version + 1});
-  const auto errors = b.take(trigger_error);
+  const auto errors = b.pop(trigger_error);
   ASSERT_EQ(errors.size(), 1U);
   EXPECT_EQ(errors[0].sequence, b.sequence);
   EXPECT_EQ(errors[0].payload[0], trigger_hello);
@@ -43,7 +43,7 @@ TEST(BoardTalk, pongCarriesReceiveAndSendTicks) {
   // The answer leaves 150 us later.
   b.now += 84ULL * 150;
   b.listen();
-  const auto pongs = b.take(trigger_pong);
+  const auto pongs = b.pop(trigger_pong);
   ASSERT_EQ(pongs.size(), 1U);
   EXPECT_EQ(pongs[0].sequence, 77);
   TriggerPong pong{};
@@ -133,7 +133,7 @@ TEST(BoardConfig, statusCarriesItsCrc) {
 TEST(BoardStates, statusIsSentEverySecond) {
   VirtualBoard b;
   b.run_for_us(10'500'000);
-  EXPECT_EQ(b.take(trigger_status).size(), 11U) << "at boot, then every second";
+  EXPECT_EQ(b.pop(trigger_status).size(), 11U) << "at boot, then every second";
 }
 
 TEST(BoardStates, stateChangeIsSentAtOnce) {
@@ -144,9 +144,9 @@ TEST(BoardStates, stateChangeIsSentAtOnce) {
   b.pause(4);
   EXPECT_EQ(b.status().state, trigger_paused);
   b.run_for_us(450'000);
-  EXPECT_EQ(b.take(trigger_status).size(), 0U) << "nothing new";
+  EXPECT_EQ(b.pop(trigger_status).size(), 0U) << "nothing new";
   b.run_for_us(2'000);
-  const auto reported = b.take(trigger_status);
+  const auto reported = b.pop(trigger_status);
   ASSERT_EQ(reported.size(), 1U) << "the pause has ended by itself";
   TriggerStatus s{};
   ASSERT_TRUE(trigger_get_status(reported[0].payload, reported[0].size, &s));

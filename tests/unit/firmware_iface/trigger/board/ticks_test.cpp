@@ -1,4 +1,4 @@
-// The board's microseconds: by the crystal, by PPS, and after PPS is gone.
+// The board's microseconds: by the crystal, by PPS, and after PPS is lost.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -201,7 +201,7 @@ TEST_F(Disciplined, movedPhaseIsSteeredUntilPpsIsLost) {
   EXPECT_LT(std::abs(error_us(299.4) - before + kMoved * 1e6), 2)
       << "whole seconds at the moved edges";
   // Back again, for 20 s: the slope sees it no more, the phase is still being steered, and then PPS
-  // is gone.
+  // is lost.
   feed(300, 320);
   EXPECT_GT(std::abs(static_cast<double>(b.board.ticks.segment.rate) /
                          static_cast<double>(b.board.ticks.estimate) -
@@ -210,11 +210,11 @@ TEST_F(Disciplined, movedPhaseIsSteeredUntilPpsIsLost) {
   b.run_until(pps.count(326));
   EXPECT_EQ(b.status().pps_locked, 0);
   EXPECT_EQ(b.board.ticks.segment.rate, b.board.ticks.estimate) << "nothing steers any more";
-  const double gone = error_us(326);
+  const double lost = error_us(326);
   feed(400, 500);
   EXPECT_EQ(b.status().pps_locked, 1);
   EXPECT_LT(std::abs(error_us(499.4) - before), 2);
-  EXPECT_LT(std::abs(gone - before), 60);
+  EXPECT_LT(std::abs(lost - before), 60);
 }
 
 TEST(BoardTicks, rateChangeKeepsTicksOfEarlierStamps) {

@@ -100,29 +100,29 @@ class VirtualBoard {
       }
   }
 
-  std::vector<TriggerFrame> take(std::uint8_t type) {
-    std::vector<TriggerFrame> taken;
+  std::vector<TriggerFrame> pop(std::uint8_t type) {
+    std::vector<TriggerFrame> popped;
     for (const TriggerFrame& f : frames)
-      if (f.type == type) taken.push_back(f);
+      if (f.type == type) popped.push_back(f);
     frames.clear();
-    return taken;
+    return popped;
   }
   std::vector<TriggerEvent> events() {
     std::vector<TriggerEvent> all;
-    for (const TriggerFrame& f : take(trigger_event))
+    for (const TriggerFrame& f : pop(trigger_event))
       trigger_get_event(f.payload, f.size, &all.emplace_back());
     return all;
   }
   /// The newest STATUS; forgets the other frames.
   TriggerStatus status() {
     TriggerStatus s{};
-    for (const TriggerFrame& f : take(trigger_status)) trigger_get_status(f.payload, f.size, &s);
+    for (const TriggerFrame& f : pop(trigger_status)) trigger_get_status(f.payload, f.size, &s);
     return s;
   }
   /// Code of the newest ERROR; 0: none.
   int error() {
     int code = 0;
-    for (const TriggerFrame& f : take(trigger_error)) code = f.payload[1];
+    for (const TriggerFrame& f : pop(trigger_error)) code = f.payload[1];
     return code;
   }
 
