@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <string>
 #include <tuple>
@@ -200,9 +199,7 @@ TEST_F(Calibrate, missingToolNamesItsPackage) {
     const std::string command = fmt::format("'{}' {} >'{}' 2>&1 </dev/null", file("alone").string(),
                                             arguments, file("said").string());
     const int status = std::system(command.c_str());
-    std::ifstream in(file("said"));
-    return std::pair(WIFEXITED(status) ? WEXITSTATUS(status) : -1,
-                     std::string(std::istreambuf_iterator<char>(in), {}));
+    return std::pair(WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(file("said")));
   };
   auto [code, said] = alone("calibrate target --quiet" + images() + kArguments + " --out '" +
                             file("none.yaml").string() + "'");

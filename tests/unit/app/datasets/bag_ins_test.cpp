@@ -153,16 +153,6 @@ TEST_P(BagIns, refusesUnknownTopic) {
   }
 }
 
-// If one of two is named, the choice is not missing.
-TEST_P(BagIns, comparesNothingWithoutOrientation) {
-  writer_->channel(6, "/gps/fix", "sensor_msgs/NavSatFix");
-  fix(0);
-  fix(0.1, 0, 6);
-  const RecordedIns ins = open({"", "", "/gps/fix", ""});
-  EXPECT_TRUE(ins.readings.empty());
-  EXPECT_TRUE(mentions(all(ins), "/gps/fix"));
-}
-
 TEST_P(BagIns, skipsInvalidNumbersAndBackwardStamps) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   for (const double t : {0.0, 0.01, 0.02}) imu(t);

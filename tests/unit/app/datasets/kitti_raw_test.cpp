@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stamp_text.hpp"
 #include "app/datasets/stereo_sequence.hpp"
@@ -243,19 +242,6 @@ TEST(KittiRaw, stampsAreUtcNanoseconds) {
                             "2011-09-26 14:05:35.", "2011-09-26 14:05:35.5e3", "2011-09-26 14:05:3",
                             "2011-09-26 14:05:35 x", "-011-09-26 14:05:35"})
     EXPECT_FALSE(parse_iso_time(wrong)) << wrong;
-}
-
-TEST(Stamps, longestAscendingPartIsKept) {
-  const auto of = [](const std::vector<std::int64_t>& values) {
-    std::vector<Stamp> list;
-    for (const std::int64_t v : values) list.emplace_back(v);
-    return detail::ascending(list);
-  };
-  using Places = std::vector<std::size_t>;
-  EXPECT_EQ(of({}), Places{});
-  EXPECT_EQ(of({1, 99, 2, 3}), (Places{0, 2, 3}));
-  EXPECT_EQ(of({5, 6, 1, 7, 7, 8}), (Places{0, 1, 3, 5}));
-  EXPECT_EQ(of({9, 8, 7}), (Places{2}));
 }
 
 // ---- INS

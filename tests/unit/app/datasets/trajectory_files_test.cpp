@@ -29,15 +29,6 @@ constexpr const char* kSensor =
     "0.0, 0.0, "
     "1.0, 0.3,\n         0.0, 0.0, 0.0, 1.0]\n";
 
-TEST(Split, assignsEveryByteToAField) {
-  for (int byte = 0; byte < 256; ++byte) {
-    const std::string line =
-        std::string("1 2") + static_cast<char>(byte) + "3 " + static_cast<char>(byte);
-    std::array<std::string_view, 8> fields;
-    EXPECT_LE(split(line, ' ', fields), 4U) << byte;
-  }
-}
-
 /// As PowerShell writes a text.
 std::string wide(const std::string& text) {
   std::string bytes = "\xFF\xFE";

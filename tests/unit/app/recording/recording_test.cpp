@@ -241,7 +241,8 @@ TEST(Recording, refusesUnwritableDiskAtStart) {
 }
 
 TEST(Recording, postingAndWritingDoNotAllocate) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "no allocation hooks in this build";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
