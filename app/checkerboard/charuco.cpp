@@ -1,7 +1,6 @@
 #include "app/checkerboard/charuco.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <vector>
 

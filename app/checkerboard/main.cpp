@@ -1,7 +1,6 @@
 // Implements the parts of `vergence calibrate` that need OpenCV. `vergence` starts it with its own
 // words; users do not call it by name.
 #include <iostream>
-#include <memory>
 
 #include <fmt/format.h>
 

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cstring>
 #include <iostream>
-#include <string>
 #include <vector>
 
 #include "app/command_line/common_options.hpp"

@@ -1,4 +1,3 @@
-#include <memory>
 #include <optional>
 
 #include "app/command_line/calibrate_options.hpp"

@@ -1,4 +1,3 @@
-#include <memory>
 #include <numbers>
 
 #include "app/command_line/common_options.hpp"

@@ -1,4 +1,3 @@
-#include <memory>
 #include <string>
 
 #include "app/command_line/common_options.hpp"

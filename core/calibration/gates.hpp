@@ -1,5 +1,4 @@
 #pragma once
-#include <array>
 
 #include "core/calibration/options.hpp"
 #include "core/calibration/rig_solver.hpp"

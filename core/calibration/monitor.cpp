@@ -1,6 +1,5 @@
 #include "core/calibration/monitor.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>

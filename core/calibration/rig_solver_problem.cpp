@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <span>
 
 #include "core/calibration/rig_solver.hpp"

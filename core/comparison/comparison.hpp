@@ -2,7 +2,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "core/comparison/enu_alignment_builder.hpp"
 #include "core/comparison/geodesy.hpp"

@@ -1,7 +1,6 @@
 #pragma once
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <span>
 
 #include "core/math/se3.hpp"

@@ -1,6 +1,5 @@
 #include "core/estimator/estimator.hpp"
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <new>

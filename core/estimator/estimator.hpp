@@ -1,7 +1,5 @@
 #pragma once
 #include <array>
-#include <cstddef>
-#include <memory>
 #include <span>
 
 #include "core/calibration/monitor.hpp"

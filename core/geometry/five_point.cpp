@@ -5,7 +5,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "core/geometry/detail/polynomial.hpp"
 #include "core/geometry/epipolar.hpp"

@@ -219,14 +219,12 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
   out.score = best;
   Vec5 unused;
   out.information = information(cap, out.T_right_left, &unused);
-  out.rotation_sigma = out.direction_sigma = std::numeric_limits<double>::infinity();
+  out.direction_sigma = std::numeric_limits<double>::infinity();
   const Vec5 along = semidefinite_eigenvalues(out.information);
   const Cholesky<5> factor(out.information);
   if (along[4] > along[0] / kMaxCondition && factor.ok()) {
     const Mat5 covariance = factor.inverse();
-    const Mat3 turn = covariance.topLeftCorner<3, 3>();
     const Mat2 direction = covariance.bottomRightCorner<2, 2>();
-    out.rotation_sigma = std::sqrt(semidefinite_eigenvalues(turn)[0]);
     out.direction_sigma = std::sqrt(semidefinite_eigenvalues(direction)[0]);
   }
   return out;

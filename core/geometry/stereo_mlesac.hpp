@@ -33,10 +33,7 @@ struct StereoEstimate {
 
   /// Σ JᵀJ/σ² over the inliers, for δ of moved_on_sphere().
   Mat5 information = Mat5::Zero();
-  /// Standard deviation in the worst direction, in rad; infinite if the matches do not determine
-  /// it.
-  double rotation_sigma = 0;
-  /// Standard deviation of the direction of t, in rad.
+  /// Standard deviation of the direction of t, in rad; infinite if the matches do not determine it.
   double direction_sigma = 0;
 
   /// Number of matches within T² and in front of both cameras.

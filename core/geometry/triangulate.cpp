@@ -119,7 +119,6 @@ TriangulatedPoint triangulate(std::span<const RayView> views) noexcept {
     out.status = TriangulateStatus::no_baseline;
     return out;
   }
-  out.chi2 = now.chi2;
   out.inverse_depth = abr[2];
   out.inverse_depth_sigma = std::sqrt(S(2, 2));
   const double rho = abr[2], sigma = out.inverse_depth_sigma;
@@ -137,11 +136,6 @@ TriangulatedPoint triangulate(std::span<const RayView> views) noexcept {
   out.status = TriangulateStatus::ok;
   const double d = 1.0 / rho;
   out.p_world = T_world_first * Vec3(abr[0] * d, abr[1] * d, d);
-  // ∂p_first/∂(a, b, ρ).
-  Mat3 J;
-  J << d, 0, -abr[0] * d * d, 0, d, -abr[1] * d * d, 0, 0, -d * d;
-  J = T_world_first.R * J;
-  out.covariance = J * S * J.transpose();
   return out;
 }
 

@@ -33,14 +33,9 @@ struct TriangulatedPoint {
   TriangulateStatus status = TriangulateStatus::invalid_input;
   /// Position in metres, for ok and no_parallax only.
   Vec3 p_world = Vec3::Zero();
-  /// Covariance of p_world in m², for ok only; without significant depth the distribution is not an
-  /// ellipsoid.
-  Mat3 covariance = Mat3::Zero();
   /// 1/Z in the first view, in 1/m; not for invalid_input and no_baseline.
   double inverse_depth = 0;
   double inverse_depth_sigma = 0;
-  /// Σ |e|²/σ² at the end, with 2·views − 3 degrees of freedom.
-  double chi2 = 0;
 };
 
 /// Triangulates a point from two or more views: linear in the inverse depth, then Gauss–Newton on

@@ -1,6 +1,5 @@
 #include "core/odometry/odometry.hpp"
 
-#include <algorithm>
 #include <bit>
 #include <limits>
 

@@ -1,7 +1,6 @@
 #include "drivers/sync/pulse_train.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "drivers/sync/durations.hpp"
 

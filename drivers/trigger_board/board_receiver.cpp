@@ -1,7 +1,6 @@
 #include "drivers/trigger_board/board_receiver.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 #include "drivers/trigger_board/pulse_counter.hpp"

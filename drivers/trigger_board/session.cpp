@@ -1,8 +1,6 @@
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <exception>
-#include <utility>
 
 #include "drivers/trigger_board/device.hpp"
 

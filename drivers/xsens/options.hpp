@@ -1,6 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <optional>
 
 #include "core/types/time.hpp"
 #include "firmware_iface/xbus/xbus.hpp"

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string_view>
 
 /// NMEA 0183 sentences of a satellite receiver or compass: framing, checksum, and the fields of

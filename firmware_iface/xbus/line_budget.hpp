@@ -1,7 +1,6 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "firmware_iface/xbus/configuration.hpp"
 #include "firmware_iface/xbus/mtdata.hpp"

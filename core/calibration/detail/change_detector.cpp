@@ -1,7 +1,6 @@
 #include "core/calibration/detail/change_detector.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/math/linear_solve.hpp"
 

@@ -1,7 +1,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <span>
 
 #include "core/calibration/detail/monitor_evidence.hpp"
 #include "core/calibration/monitor.hpp"

@@ -2,7 +2,6 @@
 
 #include <pthread.h>
 
-#include <algorithm>
 #include <cstddef>
 
 #include "drivers/clock.hpp"

@@ -3,7 +3,6 @@
 #include <pthread.h>
 
 #include <chrono>
-#include <cstdint>
 #include <mutex>
 
 #include "drivers/clock.hpp"

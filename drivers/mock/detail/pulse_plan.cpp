@@ -1,7 +1,6 @@
 #include "drivers/mock/detail/pulse_plan.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "firmware_iface/trigger/trigger.h"
 

@@ -1,6 +1,5 @@
 #pragma once
 #include <span>
-#include <vector>
 
 #include "core/math/random.hpp"
 #include "drivers/mock/world/detail/materials.hpp"
