@@ -33,7 +33,7 @@ std::string find_invalid(const CameraConfiguration& requested) {
            " us, longer than the time between two images";
   if (requested.offset_x < 0 || requested.offset_y < 0)
     return "a region that begins outside the sensor";
-  if (!std::isfinite(requested.gain_db)) return "a gain that is no number";
+  if (!std::isfinite(requested.gain_db)) return "a gain that is not a number";
   return {};
 }
 

@@ -148,7 +148,8 @@ double BoardCalibrator::calibrate_fisheye(const Points3& object, const Points2& 
       // Another start may converge.
     }
   }
-  if (!std::isfinite(best)) refuse("no start of the fisheye lens converges");
+  if (!std::isfinite(best))
+    refuse("the fisheye model does not converge; check --model and add views near the image edges");
   return best;
 }
 
@@ -170,10 +171,10 @@ void BoardCalibrator::calibrate_alone(std::size_t camera, const std::vector<std:
     }
   }
   if (at.size() < (start != nullptr ? 2 : kMinViews))
-    throw InputError(fmt::format(
-        "camera {} has the board in {} views that agree with each other; {} are the least, 15 good "
-        "ones are enough",
-        camera, at.size(), kMinViews));
+    throw InputError(
+        fmt::format("camera {} sees the target in only {} consistent views; at least {} are "
+                    "needed, 15 good ones are enough",
+                    camera, at.size(), kMinViews));
   Lens& lens = s->lenses[camera];
   std::vector<cv::Mat> rvecs, tvecs;
   std::vector<double> errors(at.size());
@@ -195,7 +196,8 @@ void BoardCalibrator::calibrate_alone(std::size_t camera, const std::vector<std:
                   std::sqrt(static_cast<double>(image[i].size()));
     }
   }
-  if (!cv::checkRange(lens.K) || !cv::checkRange(lens.D)) refuse("the lens is not finite");
+  if (!cv::checkRange(lens.K) || !cv::checkRange(lens.D))
+    refuse("the intrinsics are not finite; add tilted views");
   for (std::size_t i = 0; i < at.size(); ++i) {
     s->view_rms[at[i]] = std::max(s->view_rms[at[i]], errors[i]);
     if (camera == 0) s->T_left_board[at[i]] = transform_from(rvecs[i], tvecs[i]);
@@ -232,8 +234,8 @@ void BoardCalibrator::calibrate_pair(std::size_t camera, const std::vector<std::
   }
   if (at.size() < kMinViews)
     throw InputError(
-        fmt::format("cameras 0 and {} see the board together in {} views that agree with each "
-                    "other; {} are the least",
+        fmt::format("cameras 0 and {} see the target together in only {} consistent views; at "
+                    "least {} are needed",
                     camera, at.size(), kMinViews));
   const bool refine = radtan() && !hold_lenses && camera == 1;
   Lens &first = s->lenses[0], &second = s->lenses[camera];
@@ -243,7 +245,7 @@ void BoardCalibrator::calibrate_pair(std::size_t camera, const std::vector<std::
       radtan() ? second.D : none[1], size(0), R, T, E, F, by_view,
       refine ? cv::CALIB_USE_INTRINSIC_GUESS | k3_flag() : cv::CALIB_FIX_INTRINSIC, kCriteria);
   if (!std::isfinite(rms) || !cv::checkRange(R) || !cv::checkRange(T))
-    refuse("the pair is not finite");
+    refuse("the extrinsics are not finite; add views that both cameras see");
   if (camera == 1) s->rms = rms;
   s->T_camera_left[camera] = transform_from(R, T);
   for (std::size_t i = 0; i < at.size(); ++i) {
@@ -367,10 +369,10 @@ BoardCalibration BoardCalibrator::run() const {
     if (cameras_ == 1) return result;
     rig.baseline = rig.T_camera_left[1].t.norm();
     if (const auto bad = find_implausible(&rig))
-      result.error = "the views do not determine the lenses: " + bad->message;
+      result.error = "the views do not determine the intrinsics: " + bad->message;
   } catch (const cv::Exception& e) {
-    result.error = "the views do not determine lenses and places (" + e.err +
-                   "): more of them, tilted, are needed";
+    result.error =
+        "the views do not determine intrinsics and extrinsics (" + e.err + "); add tilted views";
   }
   return result;
 }

@@ -90,7 +90,8 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns,
     ::globfree(&found);
     if (status != 0)
       throw InputError(
-          fmt::format("{} \"{}\": no such files; put a pattern in quotes, '{} \"left*.png\"'",
+          fmt::format("{} \"{}\": no file matches; check the path, and put a pattern in quotes: {} "
+                      "\"left*.png\"",
                       option, pattern.substr(0, 200), option));
   }
   std::vector<fs::path> sorted(files.begin(), files.end());
@@ -136,13 +137,14 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
     std::string counts;
     for (const auto& files : cameras)
       counts += (counts.empty() ? "" : ", ") + std::to_string(files.size());
-    throw InputError(fmt::format(
-        "the cameras have {} images, and numbers in their names do not say which belong together",
-        counts));
+    throw InputError(
+        fmt::format("the cameras have {} images, and the numbers in their names do not show which "
+                    "belong together; give the images of a view the same number",
+                    counts));
   }
   for (const fs::path& file : alone)
-    remarks->push_back(
-        fmt::format("{}: skipped, not every camera has an image of that number", file.string()));
+    remarks->push_back(fmt::format(
+        "{}: skipped, because not every camera has an image with that number", file.string()));
   return views;
 }
 
@@ -167,13 +169,14 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
       ImageSize& size = images.sizes[k];
       if (size.width == 0) size = grey.size;
       if (grey.size != size)
-        throw InputError(fmt::format(
-            "{}: has {} x {} pixels, the images before it {} x {}; one camera has one size",
-            file.string(), grey.size.width, grey.size.height, size.width, size.height));
+        throw InputError(
+            fmt::format("{}: has {} x {} pixels, the images before it {} x {}; use images of one "
+                        "size per camera",
+                        file.string(), grey.size.width, grey.size.height, size.width, size.height));
       const ImageView pixels{grey.pixels.data(), size.width, size.height, size.width};
       view.corners[k] = find_board(pixels, board, BoardSearch::thorough, view.corners[0]);
       if (view.corners[k].empty())
-        without.push_back(fmt::format("no board of {}{} in {}", board.describe(),
+        without.push_back(fmt::format("no target with {}{} in {}", board.describe(),
                                       part_is_enough ? ", or too little of it," : "",
                                       file.string()));
     }

@@ -49,14 +49,14 @@ std::size_t parse_dictionary(const std::string& text) {
   for (std::size_t i = 0; i < kMarkerDictionaries.size(); ++i)
     if (upper(kMarkerDictionaries[i]) == name) return i;
   throw InputError(
-      fmt::format("--dictionary is \"{}\"; it takes {}", text.substr(0, 60),
+      fmt::format("--dictionary is \"{}\"; use {}", text.substr(0, 60),
                   fmt::join(kMarkerDictionaries.begin(), kMarkerDictionaries.end(), ", ")));
 }
 
 void check_side(double square) {
   if (!(square >= kSmallestSquare && square <= kLargest))
     throw InputError(
-        fmt::format("--square is {}; it takes the side of a square in metres, {} to {}", square,
+        fmt::format("--square is {}; it must be the side of a square in metres, {} to {}", square,
                     kSmallestSquare, kLargest));
 }
 
@@ -90,14 +90,15 @@ BoardPattern parse_checkerboard(const std::string& inner_corners, double square)
   BoardPattern board;
   if (!parse_product(inner_corners, &board) || std::min(board.columns, board.rows) < kMin ||
       std::max(board.columns, board.rows) > kMax)
-    throw InputError(fmt::format(
-        "--checkerboard is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
-        inner_corners.substr(0, 60), kMin, kMax));
+    throw InputError(
+        fmt::format("--checkerboard is \"{}\"; write the inner corners, columns x rows, {} to {} "
+                    "each, like 9x6",
+                    inner_corners.substr(0, 60), kMin, kMax));
   if (board.columns == board.rows)
-    throw InputError(fmt::format(
-        "--checkerboard {}: a board with as many corners along as down looks the same after a "
-        "quarter turn; take another",
-        inner_corners));
+    throw InputError(
+        fmt::format("--checkerboard {}: a square board looks the same after a rotation by 90°; use "
+                    "one with different numbers of columns and rows",
+                    inner_corners));
   check_side(square);
   board.square = square;
   return board;
@@ -109,14 +110,14 @@ BoardPattern parse_aprilgrid(const std::string& tags, double side, double spacin
   if (!parse_product(tags, &board) || std::min(board.columns, board.rows) < 1 ||
       std::max(board.columns, board.rows) > kMaxTagsAlong || board.columns * board.rows > kFamily)
     throw InputError(
-        fmt::format("--aprilgrid is \"{}\"; it takes the tags along and up, 1 to {}, like 6x6",
+        fmt::format("--aprilgrid is \"{}\"; write the tags, columns x rows, 1 to {} each, like 6x6",
                     tags.substr(0, 60), kMaxTagsAlong));
   check_side(side);
   if (!(spacing >= kNarrowest && spacing <= kWidest))
-    throw InputError(fmt::format(
-        "--spacing is {}; it takes the gap between two tags over the side of a tag, {} to {}: 0.3 "
-        "on Kalibr's own sheets",
-        spacing, kNarrowest, kWidest));
+    throw InputError(
+        fmt::format("--spacing is {}; it must be the gap between two tags divided by the tag size, "
+                    "{} to {} (0.3 on Kalibr's sheets)",
+                    spacing, kNarrowest, kWidest));
   board.square = side;
   board.spacing = spacing;
   return board;
@@ -128,15 +129,14 @@ BoardPattern parse_charuco(const std::string& squares, double square, double mar
   board.kind = BoardKind::charuco;
   if (!parse_product(squares, &board) || std::min(board.columns, board.rows) < kMin ||
       std::max(board.columns, board.rows) > kMax)
-    throw InputError(
-        fmt::format("--charuco is \"{}\"; it takes the squares along and down, {} to {}, like 11x8",
-                    squares.substr(0, 60), kMin, kMax));
+    throw InputError(fmt::format(
+        "--charuco is \"{}\"; write the squares, columns x rows, {} to {} each, like 11x8",
+        squares.substr(0, 60), kMin, kMax));
   check_side(square);
   if (!(marker >= kSmallestMarker * square && marker <= kLargestMarker * square))
-    throw InputError(
-        fmt::format("--marker is {}; it takes the side of a marker in metres, {} to {} with this "
-                    "--square",
-                    marker, kSmallestMarker * square, kLargestMarker * square));
+    throw InputError(fmt::format(
+        "--marker is {}; it must be the side of a marker in metres, {} to {} with this --square",
+        marker, kSmallestMarker * square, kLargestMarker * square));
   // The pattern counts inner corners, not squares.
   --board.columns, --board.rows;
   board.square = square;

@@ -58,7 +58,7 @@ std::string lens_table(const BoardReport& r) {
     for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>36}", value(k));
     text += "\n";
   };
-  row("rms alone, px",
+  row("RMS of this camera, px",
       [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].alone_rms_px); });
   row("images", [&](std::size_t k) { return std::to_string(r.found.cameras[k].images); });
   return text;
@@ -72,7 +72,7 @@ std::string place_table(const BoardReport& r, std::size_t k) {
                               "t_x, mm",       "t_y, mm",       "t_z, mm"};
   std::string text = fmt::format("{} from {}: X_{} = R X_{} + t\n", r.file.names[k],
                                  r.file.names[0], r.file.names[k], r.file.names[0]);
-  text += fmt::format("{:<16}{:>12}{:>12}{:>14}\n", "", "", "1 σ", "lenses held");
+  text += fmt::format("{:<16}{:>12}{:>12}{:>14}\n", "", "", "1 σ", "intrinsics fixed");
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
     const double sigma = unit * rig.sigma_total[k][i];
@@ -96,7 +96,7 @@ std::string baseline_message(const BoardReport& r) {
                         1e3 * *r.measured_baseline, 1e3 * off, 100 * off / *r.measured_baseline);
     if (std::abs(off) > 3 * rig.baseline_sigma)
       text += fmt::format(
-          ", more than 3 sigma: squares of {:.4g} mm would agree; measure the board over all its "
+          ", more than 3 sigma: squares of {:.4g} mm would agree; measure the target over all its "
           "squares",
           1e3 * r.board.square * *r.measured_baseline / rig.T_camera_left[1].t.norm());
   }
@@ -109,12 +109,12 @@ std::string format_report(const BoardReport& r) {
   const RigCalibration& rig = r.file.rig;
   const auto refused = std::count_if(r.found.views.begin(), r.found.views.end(),
                                      [](const BoardViewResult& v) { return !v.used; });
-  std::string text = fmt::format("{} views of a board of {} of {:g} mm: {} used, {} refused\n",
+  std::string text = fmt::format("{} views of a target with {} of {:g} mm: {} used, {} rejected\n",
                                  r.found.views.size(), r.board.describe(), 1e3 * r.board.square,
                                  rig.frames, refused);
   for (const BoardViewResult& v : r.found.views)
-    if (!v.used) text += fmt::format("  refused: {}, {:.3g} px rms\n", v.name, v.rms_px);
-  text += fmt::format("reprojection {:.4f} px rms\n\n", rig.reprojection_px);
+    if (!v.used) text += fmt::format("  rejected: {}, {:.3g} px RMS\n", v.name, v.rms_px);
+  text += fmt::format("reprojection {:.4f} px RMS\n\n", rig.reprojection_px);
   text += lens_table(r) + "± 1 σ\n\n";
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
     text += place_table(r, k) + "\n";

@@ -26,11 +26,11 @@ const char* phrase(OfferResult verdict) {
     case OfferResult::accepted:
       return "taken";
     case OfferResult::not_seen:
-      return "board not seen by both";
+      return "target not seen by all cameras";
     case OfferResult::moving:
       return "hold it still";
     case OfferResult::nothing_new:
-      return "seen that";
+      return "already covered";
   }
   return "";
 }
@@ -82,9 +82,9 @@ class Collection {
   void report(const DeviceEvent& event) {
     const bool disconnected = event.kind == DeviceEvent::Kind::camera_disconnected;
     if (disconnected || event.kind == DeviceEvent::Kind::camera_reconnected)
-      progress_->print(
-          fmt::format("vergence: camera {} {}", event.camera,
-                      disconnected ? "is disconnected; waiting for it" : "is reconnected"));
+      progress_->print(fmt::format(
+          "vergence: camera {} {}", event.camera,
+          disconnected ? "is disconnected; check its cable. Waiting for it" : "is reconnected"));
   }
 
   void offer(const RigFrame& frame) {
@@ -113,7 +113,7 @@ class Collection {
       try {
         write_png(file, frame.images[k]);
       } catch (const InputError& e) {
-        progress_->print(fmt::format("vergence: {}; the view is used all the same", e.what()));
+        progress_->print(fmt::format("vergence: {}; the view is used nevertheless", e.what()));
       }
     }
   }
@@ -162,12 +162,12 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   const auto stopped = signals.stop_code();
   for (const int camera : source.missing())
     progress.print(
-        fmt::format("vergence: camera {} did not come back; check its cable and power", camera));
+        fmt::format("vergence: camera {} did not reconnect; check its cable and power", camera));
   if (collection.views().size() < kMinViews) {
-    progress.print(fmt::format(
-        "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}, "
-        "whole and lit in every image?",
-        collection.views().size(), kMinViews, request.board.describe()));
+    progress.print(
+        fmt::format("vergence: no calibration: {} views of the target were taken, at least {} are "
+                    "needed; check that it is {}, complete and well lit in every image",
+                    collection.views().size(), kMinViews, request.board.describe()));
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
                                                      : ExitCode::device_failed);
   }

@@ -39,30 +39,29 @@ void remark(const CalibrationFile& file, Progress* progress) {
     const Intrinsics& lens = file.rig.intrinsics[k];
     if (lens.sigma[0] > kVagueFocal * lens.fx)
       progress->print(
-          fmt::format("vergence: {}: the focal length is only known to {:.1f} %; tilt the board "
+          fmt::format("vergence: {}: the focal length is only known to {:.1f} %; tilt the target "
                       "more, and show it nearer and farther",
                       file.names[k], 100 * lens.sigma[0] / lens.fx));
     if (const double differ = std::abs(lens.fx / lens.fy - 1); differ > kSquarePixels)
-      progress->print(fmt::format(
-          "vergence: {}: fx and fy differ by {:.1f} %, pixels of cameras are square: look whether "
-          "--checkerboard has its corners the "
-          "right way round "
-          "(9x6 or 6x9), whether images were stretched, and show the board tilted both ways",
-          file.names[k], 100 * differ));
+      progress->print(
+          fmt::format("vergence: {}: fx and fy differ by {:.1f} %, but pixels are usually square; "
+                      "check the order in --checkerboard (9x6 or 6x9), check whether images were "
+                      "stretched, and show the target tilted both ways",
+                      file.names[k], 100 * differ));
   }
 }
 
 const char* how_to_count(BoardKind kind) {
   switch (kind) {
     case BoardKind::aprilgrid:
-      return "tags are of the family 36h11, and four have to be seen at least";
+      return "at least four tags of the family 36h11 must be visible";
     case BoardKind::charuco:
-      return "count squares of both colours; four markers have to be seen at least, and "
-             "--dictionary has to be theirs";
+      return "count squares of both colours; at least four markers must be visible, and "
+             "--dictionary must match them";
     case BoardKind::checkerboard:
       break;
   }
-  return "count them where four squares meet";
+  return "count the points where four squares meet";
 }
 
 /// Views whose boards lie differently: by 2 degrees, or 3 % of their distance. One view many times
@@ -88,18 +87,16 @@ std::string undetermined(const BoardCalibration& found) {
   constexpr double kMaxSigma = 0.02;
   if (const std::size_t distinct = distinct_views(found); distinct < kFewest)
     return fmt::format(
-        "only {} of {} views show the board differently; {} are the least, better 15: move and "
-        "tilt "
-        "it between the images",
+        "only {} of {} views differ from each other; at least {} are needed, 15 are better: move "
+        "and tilt the target between the images",
         distinct, found.views.size(), kFewest);
   for (std::size_t k = 0; k < static_cast<std::size_t>(found.rig.cameras); ++k) {
     const Intrinsics& lens = found.rig.intrinsics[k];
     if (lens.sigma[0] > kMaxSigma * lens.fx)
       return fmt::format(
-          "the views do not determine the lens of camera {}: the focal length {:.0f} px has a "
-          "sigma "
-          "of {:.0f} px ({:.1f} %, {:.0f} % are the most): tilt the board more, and show it nearer "
-          "and farther",
+          "the views do not determine the intrinsics of camera {}: the focal length {:.0f} px has "
+          "a sigma of {:.0f} px ({:.1f} %; at most {:.0f} % is accepted): tilt the target more, "
+          "and show it nearer and farther",
           k, lens.fx, lens.sigma[0], 100 * lens.sigma[0] / lens.fx, 100 * kMaxSigma);
   }
   return "";
@@ -111,9 +108,8 @@ void remark_square(double square, Progress* progress) {
   constexpr double kSmallest = 0.002, kLargest = 0.5;
   if (square < kSmallest || square > kLargest)
     progress->print(
-        fmt::format("vergence: --square is {:g} m, unusually {}: it takes metres, and the baseline "
-                    "comes out in "
-                    "the same unit",
+        fmt::format("vergence: --square is {:g} m, unusually {}; check that it is in metres, "
+                    "because the baseline scales with it",
                     square, square < kSmallest ? "small" : "large"));
 }
 
@@ -136,7 +132,7 @@ BoardCalibration calibrate_with_k3(const std::vector<BoardView>& views,
     if (!(std::abs(lens.distortion[4]) > kSigmas * lens.distortion_sigma[4])) return without;
   }
   progress->print(fmt::format(
-      "vergence: k3 is estimated, too: the residuals are {:.3f} px with it and {:.3f} px without",
+      "vergence: k3 is also estimated: the residuals are {:.3f} px with it and {:.3f} px without",
       with.rig.reprojection_px, without.rig.reprojection_px));
   return with;
 }
@@ -180,8 +176,8 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
   }
   progress->print(fmt::format("{}: written{}", request.out.string(),
                               file.rig.cameras == 1
-                                  ? "; one camera makes no rig, its intrinsics go into a "
-                                    "configuration or another calibration.yaml"
+                                  ? "; it has one camera: copy its intrinsics into a configuration "
+                                    "or into a calibration.yaml of the rig"
                                   : ""));
   return ExitCode::done;
 }
@@ -201,7 +197,7 @@ ExitCode calibrate_images(const CalibrateRequest& request,
         state.state = "calibrate";
         state.frame = done;
         state.frames = views.size();
-        state.activity = fmt::format("{} with the board", found);
+        state.activity = fmt::format("{} with the target", found);
         progress.update(state);
       });
   progress.finish();
@@ -209,7 +205,7 @@ ExitCode calibrate_images(const CalibrateRequest& request,
   // One message per view would hide the message that helps.
   if (images.views.empty())
     throw InputError(
-        fmt::format("no view has the board of {}{}; {} ({})", request.board.describe(),
+        fmt::format("no view shows the target with {}{}; {} ({})", request.board.describe(),
                     patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.board.kind),
                     images.remarks.empty() ? "there are no images" : images.remarks.front()));
   for (const std::string& message : images.remarks) progress.print("vergence: " + message);

@@ -43,7 +43,7 @@ ImageSize parse_size(const std::string& text) {
   const auto height = cross ? std::from_chars(width.ptr + 1, end, size.height) : width;
   if (!cross || height.ec != std::errc() || height.ptr != end || size.width < 1 || size.height < 1)
     throw InputError("--size is \"" + text.substr(0, 60) +
-                     "\"; it takes the image's width and height in pixels, like 640x480");
+                     "\"; write the image's width and height in pixels, like 640x480");
   return size;
 }
 
@@ -59,7 +59,7 @@ CalibrationFormat format_of_name(const std::string& out) {
   if (extension == ".yaml") return CalibrationFormat::vergence;
   throw InputError(
       out +
-      ": its name does not say which format to write; add --to vergence, kalibr, ros or opencv");
+      ": the format does not follow from the file name; add --to vergence, kalibr, ros or opencv");
 }
 
 std::vector<fs::path> files_written(const std::string& out, CalibrationFormat format) {
@@ -85,7 +85,8 @@ void write_any_calibration(const std::string& out, CalibrationFormat format,
   const bool folder = is_ros_folder(out, format);
   const std::vector<fs::path> files = detail::split_files(out, folder);
   const auto one_file = [&](const char* what) {
-    if (files.size() != 1) throw InputError(fmt::format("{}: {} is one file", out, what));
+    if (files.size() != 1)
+      throw InputError(fmt::format("{}: {} is one file; name one file", out, what));
   };
   std::vector<std::string> texts;
   switch (format) {
@@ -113,8 +114,8 @@ void write_any_calibration(const std::string& out, CalibrationFormat format,
     std::error_code error;
     fs::create_directories(out, error);
     if (error)
-      throw InputError(
-          out + ": cannot be made a folder for left.yaml and right.yaml: " + error.message());
+      throw InputError(out + ": the directory for left.yaml and right.yaml cannot be created: " +
+                       error.message());
   }
   for (std::size_t i = 0; i < files.size(); ++i) replace_durably(files[i], texts[i]);
 }

@@ -26,13 +26,13 @@ BoardPattern make_board(const CalibrateOptions& a) {
   if (!a.aprilgrid.empty()) return parse_aprilgrid(a.aprilgrid, *a.square, a.spacing);
   if (!a.board.empty()) return parse_checkerboard(a.board, *a.square);
   if (!a.marker)
-    throw InputError("--marker is missing: the side of a marker in metres, like 0.018");
+    throw InputError("--marker is missing; pass the side of a marker in metres, like 0.018");
   return parse_charuco(a.charuco, *a.square, *a.marker, a.dictionary);
 }
 
 CalibrateRequest make_request(const CalibrateOptions& a) {
   if (a.sixth_order && a.model == "equidistant")
-    throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
+    throw InputError("--k3 is for --model radtan; remove it, because equidistant has k1 to k4");
   CalibrateRequest r;
   r.board = make_board(a);
   r.model = parse_model(a.model);
@@ -71,8 +71,8 @@ ExitCode calibrate_target(const CalibrateOptions& a) {
   if (!a.right.empty()) patterns.push_back(a.right);
   for (const std::string& pattern : a.more_cameras) patterns.push_back({pattern});
   if (patterns.size() > kMaxCameras)
-    throw InputError(
-        fmt::format("a rig has up to {} cameras, {} are given", kMaxCameras, patterns.size()));
+    throw InputError(fmt::format("{} cameras are given, and a rig has at most {}; remove some",
+                                 kMaxCameras, patterns.size()));
   return calibrate_images(make_request(a), patterns);
 }
 

@@ -62,7 +62,9 @@ std::array<std::string, 2> format_ros(const CalibrationFile& calibration, Remark
       cv::fisheye::stereoRectify(K[0], D[0], K[1], D[1], size, R, t, R_l, R_r, P_l, P_r, Q,
                                  cv::CALIB_ZERO_DISPARITY);
   } catch (const cv::Exception& error) {
-    throw InputError(std::string("this rig cannot be rectified for camera_info: ") + error.err);
+    throw InputError(
+        std::string("this rig cannot be rectified for camera_info; use --to kalibr or opencv: ") +
+        error.err);
   }
   return {format_info(l, calibration.names[0], K[0], R_l, P_l),
           format_info(r, calibration.names[1], K[1], R_r, P_r)};

@@ -39,7 +39,9 @@ void check_pair(const CalibrationFile& calibration, const char* format, Remarks*
                                   std::pair("size", l.width == r.width && l.height == r.height)})
     if (!same)
       throw InputError(
-          fmt::format("cameras.1.{0} is not that of camera 0; {1} has one {0}", key, format));
+          fmt::format("cameras.1.{0} differs from that of camera 0, but {1} has one {0} for both; "
+                      "choose another format",
+                      key, format));
   if (rig.cameras > 2)
     remarks->push_back(fmt::format("{} holds two cameras; {} of {} are left out", format,
                                    rig.cameras - 2, rig.cameras));

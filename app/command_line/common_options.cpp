@@ -35,16 +35,16 @@ void CommonOptions::declare_quiet(CLI::App& command) {
 
 void CommonOptions::declare(CLI::App& command) {
   declare_set(command);
-  add_option(command, "--threads", threads, "Threads of the estimator, 1 or 2; same poses", "N",
-             "Performance");
-  add_option(command, "--seed", seed, "Seed of the random sampling; same seed, same poses", "N",
-             "Performance");
+  add_option(command, "--threads", threads,
+             "Threads of the estimator, 1 or 2; the poses are the same", "N", "Performance");
+  add_option(command, "--seed", seed,
+             "Seed of the random sampling; the same seed gives the same poses", "N", "Performance");
   declare_quiet(command);
 }
 
 void declare_session_options(CLI::App& command, bool* memory, bool* page) {
   command.add_flag("--print-memory", *memory, "Print memory use per component")->group("Output");
-  command.add_flag("--live-page", *page, "Serve the live page (default 127.0.0.1:8080)")
+  command.add_flag("--live-page", *page, "Serve the live page at publish.http [127.0.0.1:8080]")
       ->group("Output");
 }
 

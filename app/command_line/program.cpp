@@ -68,7 +68,8 @@ UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
   argument.name = given.substr(0, given.find('='));
   argument.option = argument.name.size() > 1 && argument.name.front() == '-';
   if (!argument.option) argument.why = did_you_mean(argument.name, command_names(command));
-  if (argument.why.empty())
+  // The first argument of `calibrate` was a configuration.
+  if (argument.why.empty() && (argument.option || argument.name.find('.') != std::string::npos))
     argument.why =
         new_name(Renamed::Kind::option,
                  full_name(command) + " " + (argument.option ? argument.name : "CONFIG"));
@@ -84,8 +85,8 @@ std::string conversion_message(const CLI::ParseError& error, const CLI::App& com
     if (message.find(": " + name + " = ") == std::string::npos) continue;
     const std::string type = option->get_type_name();
     const std::string given = option->results().empty() ? "" : option->results().back();
-    return name + ": \"" + given + "\" is no " + (type == "N" ? "whole number" : "number") +
-           (type.empty() ? "" : " (" + type + ")") + " or is out of range";
+    return name + ": \"" + given + "\" is not a " + (type == "N" ? "whole number" : "number") +
+           (type.empty() || type == "N" ? "" : " (" + type + ")") + " or is out of range";
   }
   return message;
 }
@@ -122,7 +123,7 @@ std::string error_message(const CLI::ParseError& error, CLI::App& root) {
 
 /// A first word that is no command is answered here: CLI11 would only call it unexpected.
 void check_command(CLI::App& root, int argc, const char* const* argv) {
-  if (argc < 2) throw InputError("no command given; 'vergence --help' lists them");
+  if (argc < 2) throw InputError("no command is given; 'vergence --help' lists the commands");
   const std::string argument = argv[1];
   if (!argument.empty() && argument.front() == '-') return;
   auto words = command_names(root);
@@ -189,7 +190,8 @@ ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands
     check_stack();
     const ExitCode code = parse_and_run(argc, argv, add_commands);
     std::cout.flush();
-    if (!std::cout) throw InputError("standard output cannot be written; is the disk full?");
+    if (!std::cout)
+      throw InputError("standard output cannot be written; check the free space of the disk");
     return code;
   } catch (const InputError& error) {
     print_error(error.what());

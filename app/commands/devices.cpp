@@ -25,8 +25,8 @@ void write_rules(const std::string& file, const std::string& rules) {
   const std::string kind = std::filesystem::path(file).extension();
   if (kind == ".yaml" || kind == ".yml")
     throw InputError(file +
-                     ": rules do not go into a configuration; name it by --rig, as in vergence "
-                     "devices --rig " +
+                     ": is a configuration, and udev rules would overwrite it; pass it with --rig, "
+                     "as in vergence devices --rig " +
                      file + " --write-udev");
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
   out << rules;
@@ -63,9 +63,9 @@ void list(const DevicesArguments& a, bool rules_asked) {
 
 void add_devices(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<DevicesArguments>();
-  CLI::App* command = root.add_subcommand("devices",
-                                          "List connected cameras, serial ports and boards as "
-                                          "configuration snippets");
+  CLI::App* command = root.add_subcommand(
+      "devices",
+      "List connected cameras, serial ports and trigger boards as configuration snippets");
   command->add_flag("--json", a->json, "Print JSON (docs/deployment.md)");
   CLI::Option* rules = add_option(*command, "--write-udev", a->rules,
                                   "Write udev rules to FILE, or to standard output", "[FILE]")

@@ -47,7 +47,7 @@ Duration parse_duration(const char* option, double seconds) {
   // Maximum in s: eleven days, longer than any recording.
   constexpr double kLongest = 1e6;
   if (!(seconds >= 0) || seconds > kLongest)
-    throw InputError(std::string(option) + " needs seconds between 0 and 1e6");
+    throw InputError(std::string(option) + " must be 0 to 1e6 seconds");
   return Duration::seconds(seconds);
 }
 
@@ -71,7 +71,7 @@ std::array<std::optional<Value>, 2> parse_pair(const char* option, const std::st
   const bool read = (fields[0].empty() || pair[0]) && (fields[1].empty() || pair[1]);
   if (count > fields.size() || !read)
     throw InputError(std::string(option) + " is \"" + text.substr(0, 40) + "\"; it takes " + words +
-                     " of ESTIMATE, and after a comma that of REFERENCE");
+                     " for ESTIMATE, and after a comma the same for REFERENCE, as in s,ns");
   return pair;
 }
 
@@ -87,7 +87,7 @@ EvaluationOptions make_options(const EvaluateArguments& a) {
   options.max_gap = parse_duration("--max-gap", a.max_gap);
   options.max_difference = parse_duration("--max-difference", a.max_difference);
   options.axes = a.axes == "flu" ? BodyAxes::forward_left_up : BodyAxes::camera;
-  if (a.step && *a.step < 1) throw InputError("--step needs a whole number of poses, 1 or more");
+  if (a.step && *a.step < 1) throw InputError("--step must be a whole number of poses, 1 or more");
   if (a.lengths)
     options.segments = {{parse_lengths(*a.lengths), a.step.value_or(10), false}};
   else
@@ -119,27 +119,29 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
              "Trajectory file, KITTI or EuRoC directory, or ins.csv", "DIR|FILE");
   command->add_flag("--json", a->request.json, "Print JSON");
   add_option(*command, "--lengths", a->lengths,
-             "Segment lengths in metres [100,200 … 800; shorter on short paths]", "M,…");
+             "Segment lengths in metres [100 to 800; shorter ones for short paths]", "M,…");
   add_option(*command, "--step", a->step,
-             "Start a segment at every Nth pose [10; with short lengths 1]", "N");
-  command->add_option("--associate", a->associate, "How reference poses are associated")
+             "Start a segment at every Nth pose [10; 1 for short segments]", "N");
+  command
+      ->add_option("--associate", a->associate,
+                   "Reference at an estimate's stamp: interpolated, or the nearest pose")
       ->check(one_of({"interpolate", "nearest"}))
       ->capture_default_str();
   add_option(*command, "--max-gap", a->max_gap,
-             "interpolate: largest reference gap to interpolate across", "SECONDS")
+             "With interpolate: longest gap of the reference that is bridged", "SECONDS")
       ->capture_default_str();
-  add_option(*command, "--max-difference", a->max_difference, "nearest: maximum stamp difference",
-             "SECONDS")
+  add_option(*command, "--max-difference", a->max_difference,
+             "With nearest: largest difference of the stamps", "SECONDS")
       ->capture_default_str();
   command
       ->add_option("--axes", a->axes,
-                   "Body axes: camera (z forward) or flu (x forward, y left, z up)")
+                   "Axes of both bodies: camera (z forward), or flu (x forward, y left, z up)")
       ->check(one_of({"camera", "flu"}))
       ->capture_default_str();
   add_option(*command, "--time-unit", a->unit,
-             "Time unit of ESTIMATE[,REFERENCE]: s, ms, us, ns [by magnitude, or s]", "UNIT");
+             "Time unit of ESTIMATE[,REFERENCE]: s, ms, us or ns [detected]", "UNIT");
   add_option(*command, "--quaternion", a->quaternion,
-             "Quaternion order of ESTIMATE[,REFERENCE]: xyzw, wxyz [by headings, or xyzw]",
+             "Quaternion order of ESTIMATE[,REFERENCE]: xyzw or wxyz [detected, else xyzw]",
              "ORDER");
   command->add_flag("--estimate-ins-extrinsics", a->request.estimate_ins_extrinsics,
                     "Estimate lever arm and boresight of the INS");

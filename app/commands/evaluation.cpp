@@ -67,24 +67,25 @@ void warn(const std::string& message) { std::cerr << "vergence: " << harmless(me
 void pair_rows(const EvaluationRequest& a, const Reference& from, Files* files) {
   TrajectoryFile &e = files->estimate, &r = files->reference;
   if (e.timed && (r.timed || from.is_ins)) return;
-  const std::string help = "put the sequence's times.txt beside it";
+  const std::string help = "put the sequence's times.txt next to it";
   if (from.is_ins) throw InputError(a.estimate.string() + ": has no times; " + help);
   if (e.rows != r.rows)
-    throw InputError(fmt::format(
-        "{}: has {} poses and {} has {}: {}, so that row belongs to row, which takes as many; {}",
-        a.estimate.string(), e.rows, from.path.string(), r.rows,
-        e.timed   ? "the reference has no times"
-        : r.timed ? "the estimate has no times"
-                  : "neither has times",
-        help));
+    throw InputError(
+        fmt::format("{}: has {} poses and {} has {}: {}, so poses are matched row by row and both "
+                    "files need the same number of rows; {}",
+                    a.estimate.string(), e.rows, from.path.string(), r.rows,
+                    e.timed   ? "the reference has no times"
+                    : r.timed ? "the estimate has no times"
+                              : "neither has times",
+                    help));
   warn(
       std::string(e.timed == r.timed ? "neither file has times" : "one of the files has no times") +
-      ": row belongs to row");
+      ": poses are matched row by row");
   if (e.timed == r.timed) return;
   TrajectoryFile& without = e.timed ? r : e;
   const TrajectoryFile& with = e.timed ? e : r;
   if (without.poses.size() != with.poses.size())
-    throw InputError("rows without numbers are skipped in one of the files, which has no times; " +
+    throw InputError("one file has no times, and rows with NaN are skipped in one of the files; " +
                      help);
   for (std::size_t i = 0; i < with.poses.size(); ++i) without.poses[i].stamp = with.poses[i].stamp;
 }
@@ -149,7 +150,9 @@ Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readi
                   const Trajectory& estimate) {
   const std::vector<MountReference> moments = ins_moments(read_ins_file(readings));
   if (moments.empty())
-    throw InputError(readings.string() + ": has no reading with an attitude and a satellites' fix");
+    throw InputError(
+        readings.string() +
+        ": has no sample with an attitude and a satellite fix; record the INS with both");
   Brought out;
   out.poses = poses_of(moments);
   // With axes other than the camera's both bodies are forward, left, up.
@@ -183,8 +186,8 @@ ExitCode report_no_mount(const EvaluationRequest& a, const Reference& from,
     out["mount"] = mount_json(found);
     std::cout << out.dump(1) << '\n';
   }
-  std::cerr << "vergence: no mount between " << a.estimate.string() << " and " << from.path.string()
-            << ": " << mount_problem(found.status) << '\n';
+  std::cerr << "vergence: no INS extrinsics between " << a.estimate.string() << " and "
+            << from.path.string() << ": " << mount_problem(found.status) << '\n';
   return ExitCode::not_usable;
 }
 
@@ -221,7 +224,7 @@ std::optional<double> constant_turn(const Trajectory& estimate, const Trajectory
 std::string rotation_remark(const EvaluationRequest& a, const Files& files,
                             const Trajectory& reference, const EvaluationOptions& options,
                             const TrajectoryEvaluation& e) {
-  const std::string what = fmt::format("positions agree and rotations do not ({:.0f} deg, median)",
+  const std::string what = fmt::format("positions agree, but rotations differ by {:.0f}° (median)",
                                        e.rotation_se3.median * kDegreesPerRadian);
   const auto helps = [&](const Trajectory& of_estimate, const Trajectory& of_reference) {
     const TrajectoryEvaluation other = evaluate(of_estimate, of_reference, options);
@@ -231,9 +234,9 @@ std::string rotation_remark(const EvaluationRequest& a, const Files& files,
     return file.order == QuaternionOrder::xyzw ? "wxyz" : "xyzw";
   };
   const auto order = [&](const fs::path& path, const char* comma, const TrajectoryFile& file) {
-    return fmt::format(
-        "{}: probably {} has the quaternion with w {}; --quaternion {}{} reads it so", what,
-        path.string(), file.order == QuaternionOrder::xyzw ? "first" : "last", comma, option(file));
+    return fmt::format("{}: {} probably has w {} in its quaternions; use --quaternion {}{}", what,
+                       path.string(), file.order == QuaternionOrder::xyzw ? "first" : "last", comma,
+                       option(file));
   };
   const Trajectory& estimate = files.estimate.poses;
   const auto of_estimate = [&] {
@@ -252,18 +255,16 @@ std::string rotation_remark(const EvaluationRequest& a, const Files& files,
   if (of_reference()) return order(a.reference, ",", files.reference);
   if (const auto turn = constant_turn(estimate, reference, options, e))
     return fmt::format(
-        "{}: the two bodies have different axes, turned by {:.0f} deg all the way (a camera and an "
-        "IMU or a vehicle?); --estimate-ins-extrinsics finds the turn",
+        "{}: the axes of the two bodies differ by a constant rotation of {:.0f}° (a camera and an "
+        "IMU or a vehicle?); --estimate-ins-extrinsics estimates it",
         what, *turn * kDegreesPerRadian);
   Trajectory inverse = estimate;
   for (StampedPose& pose : inverse) pose.T_world_body.R.transposeInPlace();
   if (helps(inverse, reference))
     return what +
-           ": the estimate's rotations are probably from world to body, the inverse of what "
-           "is expected";
-  return what +
-         ": check which axes and which order of the quaternion the two files have "
-         "(--quaternion wxyz)";
+           ": the estimate's rotations are probably from world to body; write the inverse, from "
+           "body to world";
+  return what + ": check the axes and the quaternion order of both files (--quaternion wxyz)";
 }
 
 void print(const EvaluationRequest& a, const EvaluationOptions& options, const Brought& reference,
@@ -307,8 +308,8 @@ ExitCode run_evaluation(const EvaluationRequest& a) {
        evaluation_problem(evaluation, options, interval));
   if (counts_frames(estimate) != counts_frames(reference.poses))
     warn((counts_frames(estimate) ? a.estimate : from.path).string() +
-         ": its first column counts the poses: these are numbers of frames and no times; put the "
-         "times of the frames there");
+         ": its first column has frame numbers instead of times; write the times of the frames "
+         "there");
   return ExitCode::not_usable;
 }
 

@@ -186,8 +186,8 @@ std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& o
   constexpr double kSteps = 20;
   const double seconds = interval.to_seconds();
   return fmt::format(
-      "{} poses are in gaps of the reference longer than --max-gap {:g}; its poses are {:.3g} s "
-      "apart (median): use --max-gap {:g}",
+      "{} poses are in gaps of the reference longer than --max-gap {:g}; the poses of the "
+      "reference are {:.3g} s apart (median): use --max-gap {:g}",
       e.gap, options.max_gap.to_seconds(), seconds, std::ceil(kSteps * kRoom * seconds) / kSteps);
 }
 
@@ -198,14 +198,15 @@ std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOp
     case EvaluationStatus::no_match:
       if (!holes.empty()) return holes;
       return fmt::format(
-          "no pose of the estimate has a reference at its time ({}): are both stamped by the same "
-          "clock?",
+          "no pose of the estimate has a reference at its time ({}); check that both files use the "
+          "same clock and time unit (--time-unit)",
           left_out(e, options));
     case EvaluationStatus::too_few:
       return fmt::format("only {} poses matched, an alignment needs three ({}){}{}", e.matched,
                          left_out(e, options), holes.empty() ? "" : "; ", holes);
     case EvaluationStatus::no_motion:
-      return "one of the two trajectories stays in one place, there is nothing to align";
+      return "one of the two trajectories does not move, so they cannot be aligned; use a part "
+             "with motion";
     case EvaluationStatus::ok:
       break;
   }
@@ -258,9 +259,8 @@ InsMount load_ins_mount(const std::filesystem::path& estimate,
 
 std::string ins_mount_text(const InsMount& mount) {
   if (mount.axes_only)
-    return "the data set has no INS-to-camera extrinsics: the camera is assumed to look along the "
-           "INS's x, at "
-           "its place; --estimate-ins-extrinsics finds more\n";
+    return "the data set has no INS-to-camera extrinsics: the camera is assumed at the INS, "
+           "looking along its x axis; --estimate-ins-extrinsics estimates both\n";
   return fmt::format("the INS is brought to the left camera by {}\n", mount.source);
 }
 
@@ -293,13 +293,13 @@ std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
 const char* mount_problem(MountStatus status) {
   switch (status) {
     case MountStatus::too_few:
-      return "fewer than 20 moments in common; give a longer drive, or check that both have the "
+      return "fewer than 20 stamps in common; use a longer sequence, or check that both have the "
              "same clock";
     case MountStatus::no_motion:
-      return "nothing moved: a mount shows only while driving";
+      return "nothing moved: INS extrinsics can only be estimated in motion";
     case MountStatus::not_converged:
-      return "no fit: the two trajectories are not of the same drive, their clocks are more than "
-             "0.3 s apart, or their attitudes drift apart by more than 15 degrees";
+      return "no fit: check that both trajectories are of the same run, that their clocks differ "
+             "by less than 0.3 s and their attitudes by less than 15°";
     case MountStatus::ok:
       break;
   }

@@ -52,7 +52,7 @@ ExitCode run_export(const ExportArguments& a) {
     state.state = "export";
     state.frame = done;
     state.frames = session.frames().size();
-    state.activity = "images as PNG";
+    state.activity = "PNG images";
     progress.update(state);
   });
   progress.finish();

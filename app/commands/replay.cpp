@@ -30,7 +30,7 @@ std::optional<AssumedIntrinsics> known_numbers(const ReplayArguments& a) {
   if (!a.focal) return std::nullopt;
   if (a.request.calibration)
     throw InputError(
-        "--focal is for rigs without a calibration; use either --focal or --calibration");
+        "--focal and --calibration exclude each other; use --focal only without a calibration");
   if (!a.request.baseline)
     throw InputError(
         "--focal needs --baseline, the distance of the two cameras in metres; images cannot show "

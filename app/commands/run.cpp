@@ -23,7 +23,7 @@ struct RunArguments {
 RunRequest& complete(RunArguments* a) {
   RunRequest& r = a->request;
   if (r.duration_s && !(*r.duration_s > 0 && *r.duration_s <= 86400))
-    throw InputError("--duration needs seconds, more than 0 and at most 86400");
+    throw InputError("--duration must be above 0 and at most 86400 seconds");
   r.configuration = a->common.configuration(
       a->configuration, a->record ? std::vector<std::string>{"record=[" + *a->record + "]"}
                                   : std::vector<std::string>{});

@@ -14,39 +14,41 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
   command->group("Research");
   command->option_defaults()->always_capture_default();
   SimulationOptions& s = a->simulation;
-  command->add_option("--points", s.points, "Number of points of the cloud")
+  command->add_option("--points", s.points, "Number of points in the cloud")
       ->check(CLI::Range(5, 100000));
-  command->add_option("--radius", s.radius, "Radius of the cloud, m")->check(CLI::Range(1e-3, 1e4));
-  command
-      ->add_option("--shape", a->shape, "ball: points fill a ball; shell: they lie on its surface")
+  command->add_option("--radius", s.radius, "Radius of the cloud in metres")
+      ->check(CLI::Range(1e-3, 1e4));
+  command->add_option("--shape", a->shape, "Points fill a ball, or lie on its surface (shell)")
       ->check(one_of({"ball", "shell"}));
-  command->add_option("--noise", a->noise, "Noise levels in pixels per coordinate")
+  command
+      ->add_option("--noise", a->noise,
+                   "Standard deviations of the image noise in pixels, one experiment each")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 100.0));
-  command->add_option("--runs", a->runs, "Random problems per noise level")
+  command->add_option("--runs", a->runs, "Number of random rigs per noise level")
       ->check(CLI::Range(1, 1000000));
-  command->add_option("--seed", a->seed, "Seed of the random problems");
+  command->add_option("--seed", a->seed, "Seed of the random numbers");
   command
       ->add_option("--generator", a->generator,
-                   "ring: rigs at 20 to 25 m; tight: as near as all points stay in view")
+                   "Distance of the rig from the cloud: 20 to 25 m (ring), or the shortest with "
+                   "all points in view (tight)")
       ->check(one_of({"ring", "tight"}));
   command
       ->add_option("--start-position", s.start_position,
-                   "Maximum initial error of the rig positions, m per axis")
+                   "Largest error of the initial rig positions, metres per axis")
       ->check(CLI::Range(0.0, 1e3));
   command
       ->add_option("--start-rotation", s.start_rotation,
-                   "Maximum initial error of the stereo rotation, rad per axis")
+                   "Largest error of the initial rotation between cameras, rad per axis")
       ->check(CLI::Range(0.0, std::numbers::pi));
   command
       ->add_option("--start-translation", s.start_translation,
-                   "Maximum initial error of the stereo translation, m per axis")
+                   "Largest error of the initial translation between cameras, metres per axis")
       ->check(CLI::Range(0.0, 1e3));
-  command
-      ->add_option("--length", a->length, "exact: baseline length known exactly; measured: to 1 mm")
+  command->add_option("--length", a->length, "Baseline length: known exactly, or measured to 1 mm")
       ->check(one_of({"exact", "measured"}));
   command->add_option("--cameras", s.cameras, "Number of cameras, 2 to 4")->check(CLI::Range(2, 4));
-  command->add_option("--json", a->json, "Write JSON to this file, one object per noise level");
+  command->add_option("--json", a->json, "File to write with one JSON object per noise level");
   command->footer(
       "Example: vergence simulate --runs 20 --noise 0.1\nExit codes: 0 success; 2 bad arguments.");
   command->add_flag("--quiet", a->quiet, "Print no progress line");

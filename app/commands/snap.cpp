@@ -17,10 +17,9 @@ struct SnapArguments {
 /// The rest of the request, checked when the command runs.
 const SnapRequest& complete(SnapArguments* a) {
   SnapRequest& r = a->request;
-  if (r.count < 1 || r.count > 9999)
-    throw InputError("--count needs a number of sets from 1 to 9999");
+  if (r.count < 1 || r.count > 9999) throw InputError("--count must be 1 to 9999 image sets");
   if (!(r.wait_s > 0 && r.wait_s <= 3600))
-    throw InputError("--wait needs seconds, more than 0 and at most 3600");
+    throw InputError("--wait must be above 0 and at most 3600 seconds");
   r.configuration = load_configuration(a->configuration, a->set);
   return r;
 }

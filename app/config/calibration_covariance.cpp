@@ -91,11 +91,11 @@ std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
     const std::string name = file.text(item, field);
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-      file.fail(item, fmt::format("{} has \"{}\", which is no parameter of this rig{}", field,
+      file.fail(item, fmt::format("{} has \"{}\", which is not a parameter of this rig{}", field,
                                   name.substr(0, 60), did_you_mean(name, names)));
     const int row = known[static_cast<std::size_t>(found - names.begin())].row;
     if (std::any_of(rows.begin(), rows.end(), [row](const NamedRow& r) { return r.row == row; }))
-      file.fail(item, fmt::format("{} has {} twice", field, name));
+      file.fail(item, fmt::format("{} has {} twice; remove one", field, name));
     rows.push_back({name, row});
   }
   return rows;
@@ -134,7 +134,10 @@ std::string format_covariance(const CalibrationFile& calibration) {
 void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationFile* calibration) {
   file.check_keys(group, "covariance", {"parameters", "upper"});
   for (const char* key : {"parameters", "upper"})
-    if (!group[key]) file.fail(group, fmt::format("covariance.{} is missing", key));
+    if (!group[key])
+      file.fail(
+          group,
+          fmt::format("covariance.{} is missing; add it, or remove the block `covariance`", key));
   const std::vector<NamedRow> rows = read_rows(file, group["parameters"], *calibration);
   const std::size_t n = rows.size(), count = n * (n + 1) / 2;
   const std::vector<double> upper = file.numbers(group["upper"], "covariance.upper", count, count);
@@ -156,7 +159,7 @@ std::optional<std::string> find_flaw(const RigCovariance& covariance) {
       if (!std::isfinite(value)) return "holds a number that is not finite";
       if (i == j && value < 0) return "has a negative variance";
       if (value != 0 && !(covariance.known(i) && covariance.known(j)))
-        return "ties a parameter to another that has no variance";
+        return "correlates a parameter with one that has no variance";
     }
   const std::vector<int> rows = known_rows(covariance);
   const auto n = static_cast<Eigen::Index>(rows.size());
@@ -264,8 +267,8 @@ Finding check_intrinsics(const Intrinsics& k, const std::string& camera) {
     if (f < kShortestFocal * side || f > kLongestFocal * side)
       return finding(
           intrinsics,
-          fmt::format("has the focal length {} px, which does not go with an image of {} x {}; "
-                      "{:g} to {:g} px are expected (the order is fx, fy, cx, cy)",
+          fmt::format("has the focal length {} px, which does not fit an image of {} x {}; {:g} to "
+                      "{:g} px are expected (the order is fx, fy, cx, cy)",
                       f, k.width, k.height, kShortestFocal * side, kLongestFocal * side));
   }
   if (std::max(k.fx, k.fy) > kLargestAspect * std::min(k.fx, k.fy))
@@ -298,7 +301,8 @@ Finding check_rotation(Mat3* R, const std::string& field) {
                                       "are rows and columns in order (r11 r12 r13 t1, r21 …)?",
                                       off, kNearRotation));
   if (R->determinant() < 0)
-    return finding(field, "has a rotation that mirrors (its determinant is -1)");
+    return finding(field,
+                   "has a rotation that mirrors (determinant -1); check the signs of its rows");
   if (off > kSameRotation) {
     const Svd3 s = svd(*R);
     *R = s.U * s.V.transpose();
@@ -326,7 +330,7 @@ Finding check_baseline(const RigCalibration& rig) {
   const double tolerance = kBaselineTolerance * t.norm() + 4.0 * rig.baseline_sigma;
   if (rig.baseline > 0 && std::abs(rig.baseline - t.norm()) > tolerance)
     return finding("rig.baseline", fmt::format("is {:g} m, but cameras.1.T_camera_left has a "
-                                               "translation of {:g} m; one of them is wrong",
+                                               "translation of {:g} m; correct one of them",
                                                rig.baseline, t.norm()));
   // Where camera 1 is, in the axes of camera 0: t has those of camera 1, which may be mounted
   // upside down.
@@ -370,15 +374,16 @@ std::string baseline_warning(const RigCalibration& rig) {
   const double length = rig.T_camera_left[1].t.norm();
   if (length >= kUsuallyShortest && length <= kUsuallyLongest) return "";
   return fmt::format(
-      "a baseline of {:.4g} m is unusually {}: is the calibration's unit metres, and not {}?",
+      "a baseline of {:.4g} m is unusually {}; check that the calibration is in metres, not in {}",
       length, length < kUsuallyShortest ? "short" : "long",
-      length < kUsuallyShortest ? "another" : "centimetres, millimetres or squares of a board");
+      length < kUsuallyShortest ? "another"
+                                : "centimetres, millimetres or squares of a calibration target");
 }
 
 std::optional<ValidationError> find_implausible(RigCalibration* rig) {
   if (rig->cameras < 2 || rig->cameras > kMaxCameras)
     return finding("cameras",
-                   fmt::format("lists {}; a rig has 2 to {}", rig->cameras, kMaxCameras));
+                   fmt::format("lists {} cameras; a rig has 2 to {}", rig->cameras, kMaxCameras));
   for (int k = 0; k < rig->cameras; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const std::string camera = fmt::format("cameras.{}.", k);

@@ -93,7 +93,7 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   if (word == kEquidistant)
     k.kind = CameraModelKind::pinhole_equidistant;
   else if (word != kRadtan)
-    file.fail(model, fmt::format("{} is \"{}\"; {} and {} are known", camera.field("model"),
+    file.fail(model, fmt::format("{} is \"{}\"; use {} or {}", camera.field("model"),
                                  word.substr(0, 60), kRadtan, kEquidistant));
 
   const auto f = camera.numbers("intrinsics", 4, 4);
@@ -135,19 +135,21 @@ void refuse_other_transforms(const YamlFile& file, const YAML::Node& node,
     const char *key, *message;
   };
   constexpr const char* kInverse =
-      "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is "
-      "[R^T, -R^T t] of it";
+      "is the inverse of T_camera_left; invert it to [R^T, -R^T t], so that X_camera = R X_left + "
+      "t";
   constexpr std::array kOthers{
       Other{"T_left_camera", kInverse},
       Other{"T_left_right", kInverse},
-      Other{"T_right_left", "is called T_camera_left here: X_camera = R X_left + t"},
+      Other{"T_right_left", "is not a key here; write T_camera_left, with X_camera = R X_left + t"},
       Other{"T_cn_cnm1",
-            "is Kalibr's: give the camchain itself with --calibration, or convert it with vergence "
-            "calibrate convert IN OUT"},
-      Other{"T_BS", "is of EuRoC's sensor.yaml: T_camera_left = T_BS(camera)^-1 T_BS(left)"},
-      Other{
-          "extrinsics",
-          "is called T_camera_left here: twelve numbers, rows of [R t], X_camera = R X_left + t"}};
+            "is a key of Kalibr; pass the camchain itself with --calibration, or convert it with "
+            "vergence calibrate convert IN OUT"},
+      Other{"T_BS",
+            "is a key of EuRoC's sensor.yaml; write T_camera_left = T_BS(camera)^-1 T_BS(left) "
+            "instead"},
+      Other{"extrinsics",
+            "is not a key here; write T_camera_left: twelve numbers, rows of [R t], with X_camera "
+            "= R X_left + t"}};
   if (!node.IsMap()) return;
   for (const Other& other : kOthers)
     if (const YAML::Node given = node[other.key])
@@ -175,8 +177,7 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
   if (k == 0 || (use.length_only && !camera.has("T_camera_left"))) return;
   if (!camera.has("T_camera_left"))
     file.fail(node, camera.field("T_camera_left") +
-                        " is missing; --from-scratch finds it from the drive, a file without it is "
-                        "enough there");
+                        " is missing; add it, or use --from-scratch to estimate it");
   rig.T_camera_left[k] = read_transform(camera);
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_total", &rig.sigma_total[k]);
@@ -212,21 +213,25 @@ YAML::Node locate(const YAML::Node& root, const std::string& field) {
 }
 
 CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
-  if (file.root().IsNull()) throw InputError(file.name() + ": is empty; a calibration is expected");
+  if (file.root().IsNull()) throw InputError(file.name() + ": is empty; pass a calibration.yaml");
   const Section top(file, file.root(), "",
                     {"version", "rig", "cameras", "covariance", "found", "configured"});
   if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000);
       version != kVersion)
-    file.fail(top.need("version"),
-              fmt::format("version is {}; this program reads version {}", version, kVersion));
+    file.fail(
+        top.need("version"),
+        fmt::format(
+            "version is {}; this program reads version {}; use the program that wrote the file",
+            version, kVersion));
 
   CalibrationFile calibration;
   RigCalibration& rig = calibration.rig;
   const YAML::Node cameras = top.need("cameras");
-  if (!cameras.IsSequence()) file.fail(cameras, "cameras is not a list");
+  if (!cameras.IsSequence())
+    file.fail(cameras, "cameras is not a list; begin each camera with `- `");
   if (cameras.size() < 2 || cameras.size() > kMaxCameras)
-    file.fail(cameras,
-              fmt::format("cameras lists {}; a rig has 2 to {}", cameras.size(), kMaxCameras));
+    file.fail(cameras, fmt::format("cameras lists {} cameras; a rig has 2 to {}", cameras.size(),
+                                   kMaxCameras));
   rig.cameras = static_cast<int>(cameras.size());
   for (std::size_t k = 0; k < cameras.size(); ++k)
     read_camera(file, cameras[k], k, use, &calibration);
@@ -252,8 +257,8 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (top.has("found")) read_found(file, top.need("found"), &calibration);
   if (use.length_only && !(use.baseline > 0) && !(rig.baseline > 0))
     file.fail(file.root(),
-              "gives no baseline length (rig.baseline), which images alone cannot; give it "
-              "with --baseline M");
+              "has no baseline length (rig.baseline), which images cannot show; pass it with "
+              "--baseline M");
   apply_use(use, &rig);
   if (const auto bad = find_implausible(&rig))
     file.fail(locate(file.root(), bad->field), bad->message);

@@ -40,7 +40,7 @@ std::optional<std::filesystem::path> environment_folder(const char* variable) {
 
 /// Why a calibration was found under another configuration; empty: it was not.
 std::string other_configuration(const CalibrationFile& found, const CalibrationFile& expected) {
-  if (!found.configured) return "it does not say under which configuration it was found";
+  if (!found.configured) return "the configuration it was found with is not recorded";
   const auto value = [](const CalibrationFile& file, const std::string& key) {
     const auto at = file.configured->find(key);
     return at == file.configured->end() ? "its default" : at->second;
@@ -48,7 +48,7 @@ std::string other_configuration(const CalibrationFile& found, const CalibrationF
   for (const CalibrationFile* file : {&found, &expected})
     for (const auto& [key, ignored] : *file->configured)
       if (value(found, key) != value(expected, key))
-        return fmt::format("when it was found {} was {}, it is {} now", key, value(found, key),
+        return fmt::format("{} was {} when it was saved and is now {}", key, value(found, key),
                            value(expected, key));
   // Differs after a drive with --calibration. Images do not show which length is right.
   const double found_m = found.rig.baseline, expected_m = expected.rig.baseline;
@@ -61,10 +61,10 @@ std::string other_configuration(const CalibrationFile& found, const CalibrationF
 std::string mismatch(const CalibrationFile& found, const CalibrationFile& expected) {
   const RigCalibration &a = found.rig, &b = expected.rig;
   if (a.cameras != b.cameras)
-    return fmt::format("it is of {} cameras, the configuration has {}", a.cameras, b.cameras);
+    return fmt::format("it has {} cameras, the configuration {}", a.cameras, b.cameras);
   for (std::size_t k = 0; k < static_cast<std::size_t>(a.cameras); ++k) {
     if (found.serials[k] != expected.serials[k])
-      return fmt::format("its camera {} has the serial \"{}\", the one that is there \"{}\"", k,
+      return fmt::format("its camera {} has the serial \"{}\", the connected one \"{}\"", k,
                          found.serials[k], expected.serials[k]);
     const Intrinsics &x = a.intrinsics[k], &y = b.intrinsics[k];
     if (x.width != y.width || x.height != y.height)
@@ -105,7 +105,7 @@ CalibrationState read_state(const std::filesystem::path& file, const Calibration
   std::error_code error;
   if (!std::filesystem::exists(file, error)) {
     if (error)
-      state.message = file.string() + ": cannot be looked at (" + error.message() +
+      state.message = file.string() + ": cannot be accessed (" + error.message() +
                       "); the run starts without it";
     return state;
   }
@@ -125,8 +125,8 @@ void write_state(const std::filesystem::path& file, const CalibrationFile& calib
   std::error_code error;
   std::filesystem::create_directories(file.parent_path(), error);
   if (error)
-    throw InputError(file.parent_path().string() + ": cannot be made (" + error.message() +
-                     "): set rig.state_dir to a folder that can, or to none");
+    throw InputError(file.parent_path().string() + ": cannot be created (" + error.message() +
+                     "); set rig.state_dir to a writable directory, or to none");
   std::string text = format_calibration(calibration);
   if (calibration.configured) {
     text += "configured:  # keys that were not at their default when it was found\n";

@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <map>
 #include <set>
@@ -46,10 +47,11 @@ void flatten(const YamlFile& file, const YAML::Node& node, const std::string& na
     throw InputError(here + ": \"" + name.substr(0, 60) +
                      "\" is nested too deeply; see docs/configuration.md");
   if (entries->size() >= kMaxEntries)
-    throw InputError(here + ": too many values; is this the right file?");
+    throw InputError(here + ": too many values; check that this is the right file");
   if (node.IsMap() && node.size() > 0) {
     for (const auto& item : node) {
-      if (!item.first.IsScalar()) throw InputError(here + ": a key that is not a word");
+      if (!item.first.IsScalar())
+        throw InputError(here + ": a list or a group is used as a key; write `key: value`");
       flatten(file, item.second,
               name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar(), origin,
               entries, depth + 1);
@@ -67,13 +69,14 @@ void flatten(const YamlFile& file, const YAML::Node& node, const std::string& na
 void add_file(const YamlFile& file, std::vector<Entry>* entries) {
   if (file.root().IsNull()) return;
   if (!file.root().IsMap())
-    file.fail(file.root(), "is not a configuration: groups of `key: value` are expected");
+    file.fail(file.root(),
+              "is not a configuration; write `key: value`, with a space after the colon");
   flatten(file, file.root(), "", "", entries);
   std::set<std::string_view> names;
   for (const Entry& entry : *entries)
     if (!names.insert(entry.name).second)
       throw InputError(entry.origin + ": the key \"" + entry.name.substr(0, 120) +
-                       "\" is given twice");
+                       "\" is given twice; remove one");
 }
 
 /// A list, a group or a quoted text is YAML; any other value is taken as it stands, so that nothing
@@ -112,6 +115,25 @@ std::string last_part(const std::string& name) { return name.substr(name.rfind('
 /// The nearest known key by its whole name; else the one whose last part is nearest (the group was
 /// forgotten).
 std::string suggestion(const std::string& name) {
+  // Keys that are often looked for in the wrong group, with those that set the same thing.
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kElsewhere{
+      {{"rate", "trigger.rate"},
+       {"fps", "trigger.rate"},
+       {"frame_rate", "trigger.rate"},
+       {"baseline", "rig.nominal.baseline_m"},
+       {"baseline_m", "rig.nominal.baseline_m"},
+       {"format", "cameras.N.pixel_format"},
+       {"exposure", "cameras.N.exposure_us"}}};
+  if (name.find(':') != std::string::npos)
+    return "; a colon needs a space after it, as in `name: van`";
+  if (name.starts_with("cameras.") && name.size() > 8) {
+    if (name[8] < '0' || name[8] > '9')
+      return "; cameras is a list with one item for each camera, as in `- {driver: v4l2}`";
+    if (name.find_first_of("0123", 8) != 8 || (name.size() > 9 && name[9] != '.'))
+      return fmt::format("; a rig has at most {} cameras, numbered from 0", kMaxCameras);
+    for (const auto& [key, instead] : kElsewhere)
+      if (last_part(name) == key) return fmt::format("; did you mean \"{}\"?", instead);
+  }
   std::vector<std::string> names, last_parts;
   for (const Group& group : schema())
     for (const Key& key : group.keys) {
@@ -156,7 +178,8 @@ std::string suggestion(const std::string& name) {
 /// Suggests a keyword instead of one that the key does not have; empty if nothing is close.
 std::string value_suggestion(const std::string& value, const Key& key) {
   const std::string why = new_name(Renamed::Kind::value, key.name + " " + value);
-  return why.empty() ? did_you_mean(value, key.words) : why;
+  return why.empty() ? did_you_mean(value, key.words)
+                     : fmt::format("; \"{}\"{}", value, why.substr(4));
 }
 
 /// The rest of a message "it must be …".
@@ -201,7 +224,9 @@ std::string as_switch(const std::string& value, const std::vector<std::string>& 
 void apply(const Entry& entry, Configuration* configuration) {
   if (is_group(entry.name)) {
     if (entry.scalar && !entry.value.empty())
-      throw InputError(entry.origin + ": " + entry.name + " is a group of keys, not a value");
+      throw InputError(
+          entry.origin + ": " + entry.name +
+          " is a group of keys, not a value; set one of its keys (docs/configuration.md)");
     return;
   }
   const Key* key = find_key(entry.name);
@@ -220,15 +245,15 @@ void apply(const Entry& entry, Configuration* configuration) {
         const std::string value = as_switch(entry.value, key->words);
         const bool unset = value.empty() && to_text(key->get(Configuration{})).empty();
         if (!unset && std::find(key->words.begin(), key->words.end(), value) == key->words.end())
-          throw InputError(fmt::format("{}: {} is \"{}\"{}; it is one of {}", entry.origin,
-                                       key->name, entry.value.substr(0, 60),
-                                       value_suggestion(entry.value, *key), range_text(*key)));
+          throw InputError(fmt::format("{}: {} is \"{}\"; it must be one of {}{}", entry.origin,
+                                       key->name, entry.value.substr(0, 60), range_text(*key),
+                                       value_suggestion(entry.value, *key)));
         key->set(*configuration, value);
         break;
       }
       if (static_cast<double>(entry.value.size()) > key->most)
-        throw InputError(
-            fmt::format("{}: {} is longer than {} bytes", entry.origin, key->name, key->most));
+        throw InputError(fmt::format("{}: {} is longer than the limit of {} bytes; shorten it",
+                                     entry.origin, key->name, key->most));
       key->set(*configuration, entry.value);
       break;
   }
@@ -247,7 +272,7 @@ std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
     } else {
       if (!entry.scalar || entry.value.find_first_of(" =@") != std::string::npos)
         throw InputError(entry.origin + ": " + entry.name.substr(0, 120) +
-                         " takes one number or word");
+                         " takes one number or keyword");
       faults[entry.name.substr(0, dot)].insert_or_assign(entry.name.substr(dot + 1), entry);
     }
   }
@@ -297,7 +322,7 @@ void apply_camera_options(const std::vector<Entry>& entries, Configuration* conf
       why = set_camera_options(entry.value, &settings);
     else if (!entry.scalar || entry.value.empty() ||
              entry.value.find_first_of(" =") != std::string::npos)
-      why = name.substr(0, 120) + " takes one number or word";
+      why = name.substr(0, 120) + " takes one number or keyword";
     else
       why = set_camera_option(name, entry.value, &settings);
     if (!why.empty())
@@ -319,9 +344,9 @@ std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
         entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos;
     if (!item) continue;
     if (!entry.scalar || std::find(words.begin(), words.end(), entry.value) == words.end())
-      throw InputError(fmt::format("{}: record lists \"{}\"{}; it takes {}", entry.origin,
-                                   entry.value.substr(0, 60), did_you_mean(entry.value, words),
-                                   fmt::join(words, ", ")));
+      throw InputError(fmt::format("{}: record lists \"{}\"; its values are {}{}", entry.origin,
+                                   entry.value.substr(0, 60), fmt::join(words, ", "),
+                                   did_you_mean(entry.value, words)));
     entry.name = std::string(kGroup) + entry.value;
     entry.value = "on";
   }
@@ -416,9 +441,8 @@ constexpr std::size_t kShown = 60;
 std::string no_such_option(const std::string& name, const CameraSettings& camera) {
   std::vector<std::string> names;
   for (const OptionRow& row : option_rows(camera.options)) names.push_back(row.name);
-  const std::string near = did_you_mean(name, names);
-  return fmt::format("there is no option \"{}\"{} {} cameras have {}", name.substr(0, kShown),
-                     near.empty() ? ";" : near, camera.driver, fmt::join(names, ", "));
+  return fmt::format("there is no option \"{}\"; {} cameras have {}{}", name.substr(0, kShown),
+                     camera.driver, fmt::join(names, ", "), did_you_mean(name, names));
 }
 
 }  // namespace
@@ -444,8 +468,8 @@ std::string set_camera_options(const std::string& text, CameraSettings* camera) 
     const auto equals = word.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == word.size())
       return fmt::format(
-          "\"{}\" is no option; they are NAME=VALUE, as in packet_size=9000, or a "
-          "group {{packet_size: 9000}}",
+          "\"{}\" is not an option; write NAME=VALUE, as in packet_size=9000, or a group "
+          "{{packet_size: 9000}}",
           word.substr(0, kShown));
     if (std::string why =
             set_camera_option(word.substr(0, equals), word.substr(equals + 1), camera);

@@ -267,14 +267,16 @@ std::vector<std::pair<std::string, SyncMode>> sync_modes() {
 Group rig() {
   using R = RigSettings;
   return Rows("rig", "The rig as a whole.", &Configuration::rig)
-      .text("name", &R::name, 64, "Name of the rig in the calibration.yaml that a session writes.")
+      .text("name", &R::name, 64,
+            "Name of the rig in `calibration.yaml` and in the path of the state file.")
       .number("nominal.baseline_m", &R::baseline_m, 0.02, 10, "m",
               "Distance of the right camera from the left one, to its right.")
       .number("nominal.focal_px", &R::focal_px, 0, 20000, "px",
               "Focal length of every camera; 0: 0.72 of the image's width.")
       .number("nominal.k1", &R::k1, -1, 1, "",
-              "First radial coefficient of every lens, of the model that it has.")
-      .number("nominal.k2", &R::k2, -1, 1, "", "Second radial coefficient of every lens.")
+              "First radial distortion coefficient of every camera, in its lens model.")
+      .number("nominal.k2", &R::k2, -1, 1, "",
+              "Second radial distortion coefficient of every camera.")
       .text("state_dir", &R::state_dir, 400,
             "Directory of `calibration_state.yaml`, the last calibration accepted or verified, "
             "with which the next `run` starts. Empty: "
@@ -301,8 +303,9 @@ Group cameras() {
                 {{"whole", ImageHalf::whole},
                  {"left", ImageHalf::left},
                  {"right", ImageHalf::right}},
-                "For a camera that delivers both images side by side: the half that this entry "
-                "uses. Two entries with the same `serial` are one camera of twice the `size.0`.")
+                "For a camera that sends both images side by side in one frame: the half that is "
+                "this image; `whole`: the frame is one image. Write two entries with the same "
+                "`driver` and `serial`, `left` and `right`; `size` is that of one half.")
             .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
             .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
             .integer("offset.0", &C::offset_x, 0, 16384, "px",
@@ -316,9 +319,8 @@ Group cameras() {
                 {{"hardware", CameraTrigger::hardware},
                  {"software", CameraTrigger::software},
                  {"free", CameraTrigger::free}},
-                "Trigger source: `hardware`, a pulse at its input; `software`, a command "
-                "at `trigger.rate`; `free`, its own "
-                "clock. All cameras alike.")
+                "Trigger source: `hardware`, a pulse at its input; `software`, a command at "
+                "`trigger.rate`; `free`, its own clock. Equal for all cameras.")
             .options("options", &C::options, 400,
                      "Options of this driver (drivers/*/README.md): `NAME=VALUE …`, or "
                      "a group: "
@@ -336,8 +338,9 @@ Group cameras() {
                     "verifies the pairing.")
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
             .text("mask", &C::mask, 400,
-                  "PNG or PGM of the image size; pixels of value 0 are not used (bonnet, dirt). "
-                  "Paths are relative to this file.")
+                  "PNG or PGM of the image size; pixels of value 0 are not used (bonnet, dirt). A "
+                  "relative path is looked up in the directory of the configuration file, then in "
+                  "the working directory.")
             .choice<CameraModelKind>(
                 "model", &C::model,
                 {{"pinhole-radtan", CameraModelKind::pinhole_radtan},
@@ -385,8 +388,8 @@ Group trigger() {
   return Rows("trigger", "Trigger of the cameras.", &Configuration::trigger)
       .word("driver", &T::driver, {"none", "mock", "board"},
             "Source of the pulses: `board`, a trigger board on a serial port "
-            "(docs/synchronisation.md); `mock`, with mock cameras; `none`: a source that reports "
-            "nothing, or no source.")
+            "(docs/synchronisation.md); `mock`, with mock cameras; `none`: pulses that are not "
+            "reported (a generator, a camera's strobe), or none at all.")
       .text("port", &T::port, 200,
             "Serial port of the trigger board, `/dev/ttyACM0`, or its serial number. Empty: the "
             "only one connected.")
@@ -408,12 +411,12 @@ Group trigger() {
                "measured middle of the exposure.")
       .integer("feedback_active_low", &T::feedback_active_low, 0, 15, "",
                "Bit mask of the feedback inputs that are low during exposure.")
-      .choice(
-          "pps", &T::pps, edges(),
-          "Edge of the GNSS receiver's pulse per second at the board: `none` is wired, `rising` "
-          "or `falling`.")
+      .choice("pps", &T::pps, edges(),
+              "Edge of the GNSS receiver's pulse per second at the trigger board, `rising` or "
+              "`falling`; `none`: not wired.")
       .choice("ins", &T::ins, edges(),
-              "Edge of the INS's SyncOut at the board: `none` is wired, `rising` or `falling`.")
+              "Edge of the INS's SyncOut at the trigger board, `rising` or `falling`; `none`: not "
+              "wired.")
       .done();
 }
 
@@ -423,14 +426,12 @@ Group sync() {
       .choice<SyncMode>(
           "mode", &S::mode, sync_modes(),
           "How images are paired and verified (docs/synchronisation.md). Verified: `board`, by a "
-          "trigger board's pulses; `ins_syncout`, by "
-          "the INS's; `master_strobe`, camera 0 triggers the others; `ieee1394_cycle_time`, stamps "
-          "of one IEEE "
-          "1394 cycle timer; `ptp`, stamps of one PTP "
-          "clock; `side_by_side`, both images come in one (`cameras.N.image_half`). Not verified: "
-          "`frame_counter`, images with equal exposure counts; "
-          "`approximate_time`, images stamped within "
-          "`tolerance_ms` by the host's clock, for cameras without a trigger.")
+          "trigger board's pulses; `ins_syncout`, by the INS's; `master_strobe`, camera 0 triggers "
+          "the others; `ieee1394_cycle_time`, stamps of one IEEE 1394 cycle timer; `ptp`, stamps "
+          "of one PTP clock; `side_by_side`, both images are in one frame "
+          "(`cameras.N.image_half`). Not verified: `frame_counter`, images with equal exposure "
+          "counts; `approximate_time`, images stamped within `tolerance_ms` by the host's clock, "
+          "for cameras without a trigger.")
       .number("timeout_ms", &S::timeout_ms, 1, 10000, "ms",
               "Maximum wait for a late image of a pulse.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
@@ -511,8 +512,8 @@ Group odometry() {
               "Standard deviation of a tracked corner per coordinate at full resolution; scales "
               "all residuals.")
       .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
-              "Added to it (in quadrature) for a patch seen from one depth further to the side "
-              "than where it was cut: its slope is unknown.")
+              "Added in quadrature to `pixel_sigma`, times the sideways motion since the patch was "
+              "extracted divided by its depth, because the slope of the surface is unknown.")
       .number("huber", &O::huber, 1, 10, "sigmas", "Huber threshold of the residuals.")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
                "Keyframes in the sliding window.")
@@ -539,7 +540,7 @@ Group odometry() {
   return rows
       .also(Rows<Configuration>("odometry", "", whole)
                 .choice("preset", &Configuration::preset, {"default", "small"},
-                        "`small`, for small boards: `odometry.features` 250, "
+                        "`small`, for small single-board computers: `odometry.features` 250, "
                         "`odometry.window_keyframes` 8, `calibration.max_frames` 100 and "
                         "`calibration.max_observations` 50000 unless these are set; see "
                         "docs/deployment.md.")
@@ -754,16 +755,17 @@ std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
   const bool none = std::none_of(numbers.begin(), numbers.end(), given);
   if (!none && !std::all_of(numbers.begin(), numbers.end(), given))
     return fmt::format(
-        "cameras.{}.intrinsics is [{}]; it takes all four of fx, fy, cx, cy in pixels, or none", k,
+        "cameras.{}.intrinsics is [{}]; set all of fx, fy, cx, cy in pixels, or none", k,
         fmt::join(numbers, ", "));
   if (none && std::any_of(camera.distortion.begin(), camera.distortion.end(), given))
     return fmt::format(
-        "cameras.{}.distortion is given without cameras.{}.intrinsics, so that the lens is that of "
-        "rig.nominal with rig.nominal.k1 and k2; give the intrinsics, too",
+        "cameras.{}.distortion is set without cameras.{}.intrinsics; set both, or use "
+        "rig.nominal.k1 and rig.nominal.k2",
         k, k);
   if (camera.model == CameraModelKind::pinhole_equidistant && given(camera.distortion[4]))
     return fmt::format(
-        "cameras.{}.distortion has five coefficients; a pinhole-equidistant lens has k1 to k4", k);
+        "cameras.{}.distortion has five coefficients; the model pinhole-equidistant has k1 to k4",
+        k);
   return {};
 }
 
@@ -774,25 +776,26 @@ std::string find_contradiction(const Configuration& c) {
     if (std::string unread = find_unread_lens(c.cameras[k], k); !unread.empty()) return unread;
   if (c.odometry.ok_inliers < c.odometry.min_inliers)
     return fmt::format(
-        "odometry.ok_inliers ({}) is below odometry.min_inliers ({}); a pose would be lost before "
-        "it is degraded",
+        "odometry.ok_inliers ({}) is below odometry.min_inliers ({}), so a pose would be lost "
+        "before it is degraded; raise odometry.ok_inliers",
         c.odometry.ok_inliers, c.odometry.min_inliers);
   if (c.calibration.max_frames < c.calibration.min_frames)
     return fmt::format(
-        "calibration.max_frames ({}) is below calibration.min_frames ({}); no calibration would "
-        "ever be tried",
+        "calibration.max_frames ({}) is below calibration.min_frames ({}), so no calibration would "
+        "be attempted; raise calibration.max_frames",
         c.calibration.max_frames, c.calibration.min_frames);
   if (c.calibration.usable_depth_percent < c.calibration.good_depth_percent)
     return fmt::format(
-        "calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({})",
+        "calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({}); raise "
+        "the first or lower the second",
         c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
   for (const auto& [key, list] :
        {std::pair<const char*, const std::string&>{"affinity", c.realtime.affinity},
         {"solver_affinity", c.realtime.solver_affinity}})
     if (!list.empty() && !parse_cpu_list(list))
       return fmt::format(
-          "realtime.{} ({}) is no list of processors; write numbers and ranges, as 0-1,3", key,
-          list);
+          "realtime.{} ({}) is not a list of processors; write numbers and ranges, as in 0-1,3",
+          key, list);
   return {};
 }
 

@@ -32,13 +32,16 @@ std::string contents(const std::filesystem::path& path) {
     throw InputError(path.string() + ": is a pipe or a device; name a YAML file");
   errno = 0;
   std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError(path.string() + ": cannot be opened: " + std::strerror(errno));
+  if (!in)
+    throw InputError(path.string() +
+                     ": cannot be opened; check its permissions: " + std::strerror(errno));
   std::string text(kLargestYaml + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad()) throw InputError(path.string() + ": cannot be read: " + std::strerror(errno));
+  if (in.bad())
+    throw InputError(path.string() + ": cannot be read; check its disk: " + std::strerror(errno));
   text.resize(static_cast<std::size_t>(in.gcount()));
   if (text.size() > kLargestYaml)
-    throw InputError(fmt::format("{}: is larger than {} bytes; is it the right file?",
+    throw InputError(fmt::format("{}: is larger than {} bytes; check that it is the right file",
                                  path.string(), kLargestYaml));
   return text;
 }
@@ -88,7 +91,7 @@ void check_documents(const std::string& text, const std::string& name) {
   if (documents.start[0].pos == documents.start[1].pos)
     throw InputError(
         fmt::format("{}:{}: is not YAML: a value is expected", name, documents.start[0].line + 1));
-  throw InputError(name + ": holds several YAML documents (lines of ---); one is expected");
+  throw InputError(name + ": holds several YAML documents; remove the lines `---` between them");
 }
 
 template <class Number>
@@ -96,6 +99,57 @@ bool parse_whole(const std::string& text, Number* value) {
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, *value);
   return error == std::errc() && stop == end;
+}
+
+/// Line `number` of a text, counted from 0; empty after the last one.
+std::string line_of(const std::string& text, int number) {
+  std::istringstream in(text);
+  std::string line;
+  for (int i = 0; i <= number && std::getline(in, line); ++i) {
+  }
+  return in ? line : std::string();
+}
+
+/// Explains an error of yaml-cpp, whose own words name the grammar's rules, and the usual fix.
+std::string explain(const YAML::Exception& error, const std::string& text) {
+  struct Explanation {
+    std::string_view message, meaning;
+  };
+  constexpr std::string_view kIndentation =
+      "the indentation does not match the lines above; indent the keys of a group, and the items "
+      "of a list, by the same number of spaces";
+  constexpr std::string_view kOpen =
+      "a `{` or `[` is not closed, or a comma is missing; close it, and separate its items by "
+      "commas";
+  constexpr std::array kExplanations{
+      Explanation{
+          "illegal map value",
+          "a second `key: value` on one line, or a line that is indented too far; write one "
+          "key per line, indented as its neighbours are, and put a text with a colon in "
+          "quotes"},
+      Explanation{"end of map not found", kIndentation},
+      Explanation{"end of sequence not found", kIndentation},
+      Explanation{"illegal block entry", kIndentation},
+      Explanation{"end of map flow not found", kOpen},
+      Explanation{"end of sequence flow not found", kOpen},
+      Explanation{"illegal flow end", "a `}` or `]` that nothing opens; remove it"},
+      Explanation{"the referenced anchor is not defined",
+                  "a value that begins with `*` is a reference; put the value in quotes"},
+      Explanation{
+          "unknown token",
+          "a value begins with a character that YAML reserves, such as @ or %; put the value "
+          "in quotes"}};
+  if (!error.mark.is_null()) {
+    const std::string line = line_of(text, error.mark.line);
+    if (line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos)
+      return "the line is indented by a tab; use spaces";
+  }
+  const auto* const known =
+      std::find_if(kExplanations.begin(), kExplanations.end(),
+                   [&](const Explanation& e) { return e.message == error.msg; });
+  return known != kExplanations.end()
+             ? std::string(known->meaning)
+             : error.msg + "; check indentation, quotes, brackets and the space after each colon";
 }
 
 }  // namespace
@@ -112,8 +166,9 @@ YamlFile YamlFile::parse(std::string_view text, std::string name) {
     check_documents(whole, file.name_);
     file.root_.reset(YAML::Load(whole));
   } catch (const YAML::Exception& error) {
-    const std::string line = error.mark.is_null() ? "" : ":" + std::to_string(error.mark.line + 1);
-    throw InputError(file.name_ + line + ": is not YAML: " + error.msg);
+    const bool has_line = !error.mark.is_null() && !file.name_.starts_with("--");
+    const std::string line = has_line ? ":" + std::to_string(error.mark.line + 1) : "";
+    throw InputError(file.name_ + line + ": is not YAML: " + explain(error, std::string(text)));
   }
   return file;
 }
@@ -129,16 +184,18 @@ void YamlFile::fail(const YAML::Node& node, const std::string& message) const {
 
 void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
                           const std::vector<std::string>& known) const {
-  if (!map.IsMap()) fail(map, what + " is not a group of keys (`key: value`)");
+  if (!map.IsMap())
+    fail(map, what + " is not a group of keys; write `key: value`, with a space after the colon");
   std::vector<std::string> seen;
   for (const auto& item : map) {
-    if (!item.first.IsScalar()) fail(item.first, what + " has a key that is not a word");
+    if (!item.first.IsScalar())
+      fail(item.first, what + " has a list or a group as a key; write `key: value`");
     const std::string& key = item.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end())
       fail(item.first, fmt::format("{} has the unknown key \"{}\"{}", what, shown(key),
                                    did_you_mean(key, known)));
     if (std::find(seen.begin(), seen.end(), key) != seen.end())
-      fail(item.first, fmt::format("{} has the key \"{}\" twice", what, key));
+      fail(item.first, fmt::format("{} has the key \"{}\" twice; remove one", what, key));
     seen.push_back(key);
   }
 }
@@ -172,7 +229,8 @@ std::int64_t YamlFile::integer(const YAML::Node& node, const std::string& field,
 
 std::string YamlFile::text(const YAML::Node& node, const std::string& field) const {
   if (node.IsNull()) return {};
-  if (!node.IsScalar()) fail(node, field + " is not a text");
+  if (!node.IsScalar())
+    fail(node, field + " is not a text; a list or a group is not possible here");
   return node.Scalar();
 }
 

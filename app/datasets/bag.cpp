@@ -45,20 +45,19 @@ std::string list_of_image_topics(const BagIndex& bag) {
   for (const auto& [name, topic] : bag.images) {
     const LeftOut& out = topic.left_out;
     list += fmt::format("{}{} ({} images{})", list.empty() ? "" : ", ", name, topic.images.size(),
-                        out.unreadable > 0
-                            ? fmt::format(", {} that cannot be read, of the encoding \"{}\"",
-                                          out.unreadable, out.encoding)
-                            : "");
+                        out.unreadable > 0 ? fmt::format(", {} of the unsupported encoding \"{}\"",
+                                                         out.unreadable, out.encoding)
+                                           : "");
     unreadable += out.unreadable;
   }
   if (unreadable > 0)
     list +=
-        "; encodings that can be read: mono8, mono16, rgb8, bgr8, rgba8, bgra8, 8UC1, 8UC3, 16UC1, "
+        "; supported encodings: mono8, mono16, rgb8, bgr8, rgba8, bgra8, 8UC1, 8UC3, 16UC1, "
         "yuv422, yuv422_yuy2, uyvy, yuyv, nv12, nv21, bayer_*8, bayer_*16, and PNG and JPEG";
   if (list.empty() && !bag.others.empty())
     return fmt::format(
-        "none, for messages are those of ROS, in CDR or as ROS 1 has them; topics that are not "
-        "read: {}",
+        "none, because messages must be serialised by ROS (CDR or ROS 1); topics with other "
+        "encodings: {}",
         fmt::join(bag.others, ", "));
   return list.empty() ? "none" : list;
 }
@@ -70,8 +69,7 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
   if (requested.empty()) return;
   const auto found = bag.images.find(requested);
   if (found == bag.images.end() || found->second.images.empty())
-    refuse(path, 0,
-           "has no image on {} that can be read; choose with --{}-topic; topics of images: {}",
+    refuse(path, 0, "has no readable image on {}; choose another with --{}-topic; image topics: {}",
            requested, side, list_of_image_topics(bag));
 }
 
@@ -128,9 +126,9 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
   if (best.empty())
     if (const auto only = only_named(names, requested)) return *only;
   refuse(path, 0,
-         "has {} pairs of topics of images with the names of a left and a right camera "
-         "(left/right, infra1/infra2, cam0/cam1, image_0/image_1 …); choose with --left-topic and "
-         "--right-topic; topics of images: {}",
+         "has {} pairs of image topics named like a left and a right camera (left/right, "
+         "infra1/infra2, cam0/cam1, image_0/image_1 …); choose with --left-topic and "
+         "--right-topic; image topics: {}",
          best.size(), list_of_image_topics(bag));
 }
 
@@ -195,20 +193,20 @@ std::vector<std::array<std::size_t, 2>> pair_images(
            1e3 * interval.to_seconds());
   if (pairs.empty())
     refuse(path, 0,
-           "has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no two are within "
-           "{:.0f} % of the interval of each other",
+           "has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no two differ by "
+           "less than {:.0f} % of the interval; check the clocks, or choose other topics",
            topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(), 100 * kMaxApart);
   const PairOffset kept = pair_offset(stamps[0], stamps[1], pairs);
   sequence->assumptions.push_back(fmt::format(
-      "images are paired by the nearest {}, right ones are later by {}",
-      ambiguous ? "time of recording, as their stamps do not tell" : "stamp", describe(kept)));
+      "images are paired by the nearest {}; right ones are later by {}",
+      ambiguous ? "recording time, because their stamps are ambiguous" : "stamp", describe(kept)));
   if (is_suspicious(kept, interval))
     sequence->remarks.push_back(pairing_warning(topics[0], topics[1], kept, interval));
   const Duration late = recorded_later(images, pairs) - kept.median;
   if (std::max(late, -late) > most && !ambiguous)
     sequence->remarks.push_back(fmt::format(
-        "the images of a pair of {} and {} were recorded {:.3g} ms further apart than their stamps "
-        "say, near the interval: is one camera stamped a frame early or late?",
+        "the images of a pair of {} and {} were recorded {:.3g} ms further apart than their "
+        "stamps, almost one interval; check whether one camera is stamped a frame early or late",
         topics[0], topics[1], 1e3 * std::max(late, -late).to_seconds()));
   return pairs;
 }
@@ -217,8 +215,8 @@ void remark_left_out(const std::string& name, const LeftOut& out,
                      std::vector<std::string>* remarks) {
   if (out.first.empty()) return;
   remarks->push_back(
-      fmt::format("{}: left out were {} images that cannot be read, {} of another size than the "
-                  "first and {} whose stamps do not go forward; the first in {}",
+      fmt::format("{}: skipped are {} unreadable images, {} of another size than the first and {} "
+                  "whose stamps do not increase; the first in {}",
                   name, out.unreadable, out.other_size, out.backwards, out.first));
 }
 
@@ -228,12 +226,12 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
   const auto found = bag.infos.find(name);
   if (found == bag.infos.end())
     refuse(path, 0,
-           "has no CameraInfo on {}, where that of {} is expected; give a calibration with "
+           "has no CameraInfo on {}, where that of {} is expected; pass a calibration with "
            "--calibration",
            name, topic);
   const RosCameraInfo& info = found->second;
   const std::string& fault = is_rectified(topic) ? info.fault_rectified : info.fault;
-  if (!fault.empty()) refuse(path, 0, "{}: {}; give a calibration with --calibration", name, fault);
+  if (!fault.empty()) refuse(path, 0, "{}: {}; pass a calibration with --calibration", name, fault);
   RosCamera camera = info.camera;
   const ImageSize size = bag.images.at(topic).images.front().image.size;
   if (const std::string remark = apply_crop(info.crop, size, &camera); !remark.empty())
@@ -249,17 +247,17 @@ void remark_mosaics(const BagIndex& bag, const std::string& topic, StereoSequenc
     std::array<std::uint8_t, 2> first{};
     (void)bag.files[image.file].bytes->read(image.place.offset + image.image.offset, first);
     const bool jpeg = image.place.chunk == BagPlace::kNoChunk ? first[0] == 0xFF : true;
-    sequence->assumptions.push_back(topic +
-                                    " holds mosaics, by its format, and grey is made of them");
+    sequence->assumptions.push_back(
+        topic + " holds Bayer mosaics according to its format; they are converted to grey");
     if (jpeg)
       sequence->remarks.push_back(
           topic +
-          ": mosaics were compressed as they are, and JPEG mixes their colours: poses suffer; "
-          "record PNG, or debayer before compressing");
+          ": Bayer mosaics were compressed as JPEG, which mixes their colours and makes poses less "
+          "accurate; record PNG, or debayer before compressing");
   }
   if (of_topic.unstamped > 0)
     sequence->assumptions.push_back(
-        fmt::format("{}: {} images have no stamp (0), the time of recording is taken", topic,
+        fmt::format("{}: {} images have no stamp (0); their recording time is used", topic,
                     of_topic.unstamped));
 }
 
@@ -275,7 +273,10 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
   auto ins = std::make_shared<const RecordedIns>(bag_ins(path, bag, topics));
   const Topics chosen = choose(path, bag, topics, given);
   if (chosen[0] == chosen[1])
-    refuse(path, 0, "is to give the left and the right images from one topic, " + chosen[0]);
+    refuse(path, 0,
+           "has one topic selected for left and right images; choose two with --left-topic and "
+           "--right-topic: " +
+               chosen[0]);
   StereoSequence sequence;
   sequence.root = path;
   sequence.times = path;
@@ -291,16 +292,16 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
       sequence.assumptions.push_back(chosen[0] + " is left and " + chosen[1] + " is right");
   for (const std::string& name : chosen) remark_mosaics(bag, name, &sequence);
   if (!given && camera_info_topic(bag, chosen[0]) == camera_info_topic(bag, chosen[1]))
-    refuse(path, 0,
-           "has no CameraInfo of its own for each of {} and {}, only {}; give a calibration with "
-           "--calibration",
-           chosen[0], chosen[1], camera_info_topic(bag, chosen[0]));
+    refuse(
+        path, 0,
+        "has no separate CameraInfo for {} and {}, only {}; pass a calibration with --calibration",
+        chosen[0], chosen[1], camera_info_topic(bag, chosen[0]));
   if (!given) {
     const std::array cameras{camera_info(path, bag, chosen[0], &sequence),
                              camera_info(path, bag, chosen[1], &sequence)};
     if (const std::string fault = set_ros_rig(cameras[0], cameras[1], &sequence.calibration);
         !fault.empty())
-      refuse(path, 0, "{}/camera_info: P {}; give a calibration with --calibration",
+      refuse(path, 0, "{}/camera_info: P {}; pass a calibration with --calibration",
              camera_namespace(chosen[1]), fault);
     sequence.calibration_source =
         "CameraInfo of " + camera_namespace(chosen[0]) + " and " + camera_namespace(chosen[1]);
@@ -311,13 +312,13 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
     if (images[k].back().image.stamp.ns() == 0)
       refuse(path, 0,
              chosen[k] +
-                 " has neither stamps (header.stamp is 0) nor times of recording that could stand "
-                 "instead");
+                 " has neither stamps (header.stamp is 0) nor recording times; record it again "
+                 "with stamps");
   const auto pairs = pair_images(path, chosen, images, &sequence);
   const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
   if (alone > 0)
     sequence.remarks.push_back(
-        fmt::format("{} images have no partner within {:.0f} % of the interval and were left out",
+        fmt::format("{} images have no partner within {:.0f} % of the interval and are skipped",
                     alone, 100 * kMaxApart));
   sequence.left_out += alone;
   const std::vector<Stamp> stamps = collect_stamps(images[0]);

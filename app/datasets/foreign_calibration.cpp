@@ -124,8 +124,8 @@ std::string join_names(const std::vector<YamlFile>& files) {
     if (const std::string program = find_program(file, &never); !program.empty())
       refuse(join_names(files), 0, "{} is missing; the file {}", what, program);
   refuse(join_names(files), 0,
-         "{} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS camera_info, "
-         "OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
+         "{} is missing; supported are calibration.yaml, Kalibr, ROS camera_info, OpenCV (M1 D1 M2 "
+         "D2 R T), EuRoC, KITTI, ORB-SLAM, VINS and Kimera",
          what);
 }
 
@@ -153,9 +153,9 @@ class RigReader {
     // The message about an unsupported model is more specific than the one about missing
     // intrinsics, so it comes first.
     for (int k = 0; k < 2; ++k) (void)model(k);
-    if (cameras < 2) fail_missing(files_, "the lens of a second camera");
+    if (cameras < 2) fail_missing(files_, "the camera matrix of a second camera");
     if (cameras > kMaxCameras)
-      refuse(join_names(files_), 0, "has {} cameras; a rig has up to {}", cameras, kMaxCameras);
+      refuse(join_names(files_), 0, "has {} cameras; a rig has at most {}", cameras, kMaxCameras);
     RigCalibration& rig = out_.rig;
     rig.cameras = cameras;
     for (int k = 0; k < cameras; ++k) {
@@ -234,10 +234,9 @@ class RigReader {
       const bool stated = of_rays || fact->key.find("odel") != std::string::npos ||
                           fact->key.find("amera.type") != std::string::npos;
       if (!kind && stated)
-        fail(*fact,
-             fmt::format(" is \"{}\"; lenses that are read are pinhole with radtan (plumb_bob) or "
-                         "equidistant (fisheye, Kannala-Brandt) distortion, or none",
-                         word.substr(0, 60)));
+        fail(*fact, fmt::format(" is \"{}\"; supported is pinhole with radtan (plumb_bob), "
+                                "equidistant (fisheye, Kannala-Brandt) or no distortion",
+                                word.substr(0, 60)));
       if (none != nullptr)
         *none = *none || word == "none" || word == "Rectified" || (word.empty() && of_rays);
       if (kind && !(found && word.empty())) found = kind;
@@ -274,7 +273,7 @@ class RigReader {
     if (!stated && values.size() == 4 && k == 0)
       remarks_->push_back(
           join_names(files_) +
-          ": four distortion coefficients are taken for k1 k2 p1 p2 (radtan); if they are k1 k2 k3 "
+          ": four distortion coefficients are read as k1 k2 p1 p2 (radtan); if they are k1 k2 k3 "
           "k4 of cv::fisheye, add the line `fisheye_model: 1`, else `fisheye_model: 0`");
     if (const std::string fault =
             set_ros_distortion(equidistant ? "equidistant" : "radtan", values, &lens(k));
@@ -294,13 +293,13 @@ class RigReader {
       sides = {static_cast<double>(size_->width), static_cast<double>(size_->height)};
     else if (width == nullptr)
       refuse(join_names(files_), 0,
-             "holds no image size, as OpenCV's sample writes none; add --size WIDTHxHEIGHT");
+             "has no image size (OpenCV's sample writes none); add --size WIDTHxHEIGHT");
     else
       sides = width == size ? read_numbers(*size, 2, "[width, height]")
                             : std::vector{number_of(*width), number_of(*height)};
     for (const double side : sides)
       if (!(side >= 1 && side <= kLargest) || side != std::floor(side))
-        fail(*width, " is no size of an image");
+        fail(*width, " is not an image size; two positive numbers are expected");
     lens(k).width = static_cast<int>(sides[0]), lens(k).height = static_cast<int>(sides[1]);
   }
 
@@ -467,11 +466,10 @@ void check_binning(const std::string& name, const Intrinsics& lens) {
   };
   for (const int parts : {2, 4})
     if (off(1) > 2 * kNear - 0.01 && off(parts) < kNear)
-      refuse(
-          name, 0,
-          "the size is {}x{}, but the principal point ({:.1f}, {:.1f}) is the middle of {}x{}: the "
-          "camera matrix is probably that of binned images; write their size",
-          lens.width, lens.height, lens.cx, lens.cy, lens.width / parts, lens.height / parts);
+      refuse(name, 0,
+             "the size is {}x{}, but the principal point ({:.1f}, {:.1f}) is the centre of {}x{}; "
+             "the camera matrix is probably of binned images, so write their size",
+             lens.width, lens.height, lens.cx, lens.cy, lens.width / parts, lens.height / parts);
 }
 
 void finish(const std::string& name, const CalibrationUse& use, CalibrationFile* calibration) {
@@ -480,7 +478,7 @@ void finish(const std::string& name, const CalibrationUse& use, CalibrationFile*
   calibration->source = "given";
   calibration->rig.baseline = calibration->rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&calibration->rig))
-    refuse(name, 0, "in the words of calibration.yaml, {}", bad->message);
+    refuse(name, 0, "converted to calibration.yaml: {}", bad->message);
   apply_use(use, &calibration->rig);
 }
 
@@ -514,7 +512,7 @@ bool is_own_calibration(const fs::path& file) {
 CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
                                       const std::optional<ImageSize>& size, Remarks* remarks,
                                       const CalibrationUse& use) {
-  if (texts.empty()) throw InputError("no file of a calibration is named");
+  if (texts.empty()) throw InputError("no calibration file is named; pass one");
   CalibrationFile out;
   std::optional<RigCalibration> kitti;
   std::vector<YamlFile> files;
@@ -525,11 +523,13 @@ CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
   if (kitti) {
     out.rig = *kitti;
   } else {
-    if (files.empty()) refuse(texts.front().name, 0, "is empty; a calibration is expected");
+    if (files.empty()) refuse(texts.front().name, 0, "is empty; pass a calibration");
     for (const YamlFile& file : files) {
       bool never = false;
       if (!file.root().IsMap())
-        refuse(file.name(), 0, "is not a group of keys (`key: value`); a calibration is expected");
+        refuse(file.name(), 0,
+               "is not a calibration: it has no lines `key: value`; pass a calibration.yaml, or a "
+               "file of Kalibr, ROS or OpenCV");
       if (const std::string program = find_program(file, &never); never)
         refuse(file.name(), 0, program);
     }
@@ -549,7 +549,7 @@ Transform read_body_mount(const fs::path& file) {
       if (!accept_rotation(T.R)) fail(fact, " is not a rigid transform");
       return T;
     }
-  refuse(file, 0, "has no T_BS, the place of the camera in the body");
+  refuse(file, 0, "has no T_BS, the pose of the camera in the body");
 }
 
 CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size,

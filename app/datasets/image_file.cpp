@@ -68,15 +68,15 @@ bool is_image_name(std::string_view file) {
 
 const char* to_phrase(ImageFileStatus status) noexcept {
   constexpr std::array kPhrases{
-      "is as it should be",
+      "is valid",
       "is missing",
       "cannot be read",
-      "cannot be opened: this program or the machine has as many files open as it may (ulimit -n)",
-      "is no PNG, JPEG, BMP or PGM image",
-      "is truncated: it ends before the image is complete, or its check sums fail",
-      "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours, uncompressed BMP "
-      "of 8, 24 or 32 bits can",
-      "has another size than the calibration"};
+      "cannot be opened, because the limit of open files is reached (ulimit -n)",
+      "is not a PNG, JPEG, BMP or PGM image",
+      "is truncated or damaged: it ends too early, or a checksum is wrong",
+      "cannot be decoded; use PNG, JPEG (8-bit grey or three colours), PGM or uncompressed BMP (8, "
+      "24 or 32 bits)",
+      "differs in size from the calibration"};
   return kPhrases[static_cast<std::size_t>(status)];
 }
 

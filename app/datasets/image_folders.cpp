@@ -116,8 +116,8 @@ std::vector<std::string> list_images(const fs::path& root, const std::string& be
     for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
       if (const fs::path& file = it->path(); file.has_extension() && file.stem() != "")
         advice = fmt::format(
-            "; files of the kind {0} are not read: convert them, for example with `mogrify -format "
-            "png *{0}`",
+            "; {0} files are not supported: convert them, for example with `mogrify -format png "
+            "*{0}`",
             file.extension().string());
     refuse(folder, 0,
            error ? "cannot be listed (" + error.message() + "): check its permissions"
@@ -283,7 +283,7 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
   const PairOffset offset = pair_offset(left, right, together);
   if (offset.farthest > Duration{})
     sequence->assumptions.push_back(
-        "images are paired by the nearest stamp, right ones are later by " + describe(offset));
+        "images are paired by the nearest stamp; right ones are later by " + describe(offset));
   if (is_suspicious(offset, interval))
     sequence->remarks.push_back(pairing_warning("left images", "right images", offset, interval));
   constexpr std::size_t kAlone = std::numeric_limits<std::size_t>::max();
@@ -390,16 +390,19 @@ Stamped stamped(const fs::path& root, const Camera& camera, const fs::path& list
     else
       ++(number ? without : odd);
   }
-  if (end == 0) refuse(list, 0, "has no line that an image of its camera is of: line N is image N");
+  if (end == 0)
+    refuse(list, 0,
+           "has no line for any image: line N must be image N; check that list and images belong "
+           "together");
   for (std::size_t i = 0; i < end; ++i) push(times.lines[i].stamp, of_line[i]);
   const auto add_remark = [&](std::size_t n, const char* what) {
     if (n > 0)
       sequence->remarks.push_back(
           fmt::format("{}: {} {}", list.lexically_relative(root).string(), n, what));
   };
-  add_remark(odd, "images are not named by their number and are left out");
-  add_remark(without, "images have no line and are left out");
-  add_remark(of_line.size() - end, "lines go on after the last image");
+  add_remark(odd, "images have no number in their name and are skipped");
+  add_remark(without, "images have no line and are skipped");
+  add_remark(of_line.size() - end, "lines follow the last image");
   sequence->left_out += odd + without;
   return out;
 }
@@ -415,8 +418,8 @@ std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<Ti
     if (std::none_of(pairs.begin(), pairs.end(),
                      [&](const StereoPair& pair) { return holds(cameras[k], pair.file[k]); }))
       refuse(file, 0,
-             "names no image that is there: the first is " + pairs.front().file[k] +
-                 ", the folder has " + cameras[k].names.front());
+             "names no existing image; its first name is " + pairs.front().file[k] +
+                 ", the directory has " + cameras[k].names.front());
   return pairs;
 }
 
@@ -465,12 +468,12 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
     pairs = numbers ? pair_by_number(*numbers, pairs, times.size()) : std::vector<StereoPair>{};
     if (!pairs.empty() && !by_number)
       assumptions->emplace_back(
-          "there are fewer pairs than times: an image belongs to the line of its number");
+          "there are fewer pairs than times: each image gets the line of its number");
   }
   if (pairs.size() != times.size())
     refuse(folder, 0,
-           "has {} left images, {} right ones and {} lines in its list of times; one of each a "
-           "pair is expected (a line may name its image: stamp,file)",
+           "has {} left images, {} right ones and {} lines in its list of times; the numbers must "
+           "be equal, or each line must name its image: stamp,file",
            left, right, times.size());
   for (std::size_t i = 0; i < times.size(); ++i) pairs[i].stamp = times[i].stamp;
   return pairs;
@@ -496,15 +499,15 @@ std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* came
   const auto &of_left = (*cameras)[0].names, &of_right = (*cameras)[1].names;
   if (!named && of_left.size() != of_right.size())
     refuse(folder, 0,
-           "has {} left images and {} right ones, whose names have no numbers in common; give the "
-           "images of a pair one name, or write a times.txt whose lines name them: stamp,left "
+           "has {} left images and {} right ones without common numbers in their names; give both "
+           "images of a pair the same name, or write a times.txt that names them: stamp,left "
            "file,right file",
            of_left.size(), of_right.size());
   std::vector<StereoPair> pairs = named ? std::move(*named) : pair_in_order(*cameras);
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kAssumedStep);
   sequence->assumptions.emplace_back(
-      "there is no times.txt, so pairs are 0.1 s apart (write the time of each pair, one per "
+      "there is no times.txt, so pairs are assumed 0.1 s apart (it has the time of one pair per "
       "line)");
   return pairs;
 }
@@ -518,8 +521,8 @@ void pair_cameras(Cameras* cameras, const Lists& lists, StereoSequence* sequence
                                 sequence);
     if (!pairs)
       refuse(*lists.own[1], 0,
-             "has no stamp near one of " + lists.own[0]->string() +
-                 "; the two do not belong together");
+             "has no stamp close to one of " + lists.own[0]->string() +
+                 "; check that both lists are of the same recording");
     sequence->pairs = std::move(*pairs);
     return;
   }
@@ -620,9 +623,9 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   pair_cameras(&cameras, find_lists(folder, cameras), &sequence);
   if (const auto& left = cameras[0].names, &right = cameras[1].names; left.size() != right.size())
     sequence.remarks.push_back(
-        fmt::format("there are {} left images and {} right ones: where one camera lost an image "
-                    "without leaving a gap in the names or in times.txt, all pairs after it are a "
-                    "frame off; check that the names of a pair belong together",
+        fmt::format("there are {} left images and {} right ones: if one camera lost an image "
+                    "without a gap in the names, all later pairs are one frame off; check that the "
+                    "names of a pair belong together",
                     left.size(), right.size()));
   if (!given) read_own_calibration(use, cameras, &sequence);
   return sequence;
@@ -646,7 +649,8 @@ StereoSequence open_kitti(const fs::path& folder, bool given) {
   sequence.root = folder;
   const bool colour = !present(folder / "image_0") && present(folder / "image_2");
   if (colour)
-    sequence.assumptions.emplace_back("the colour images image_2 and image_3 are taken (P2, P3)");
+    sequence.assumptions.emplace_back(
+        "the colour images image_2 and image_3 are used, with P2 and P3");
   Cameras cameras =
       cameras_in(folder, {colour ? "image_2" : "image_0", colour ? "image_3" : "image_1"});
   Lists lists = find_lists(folder, cameras);
@@ -655,9 +659,9 @@ StereoSequence open_kitti(const fs::path& folder, bool given) {
   pair_cameras(&cameras, lists, &sequence);
   if (!colour && !given && is_colour(folder / cameras[0].names.front()))
     sequence.remarks.emplace_back(
-        "image_0 and image_1 hold colour images, but P0 and P1 of calib.txt are those of the grey "
-        "cameras: if these are image_2 and image_3 of the benchmark, P2 and P3 are theirs (give "
-        "them with --calibration, or name the folders so)");
+        "image_0 and image_1 hold colour images, but P0 and P1 of calib.txt are of the grey "
+        "cameras; if these are image_2 and image_3 of the benchmark, rename the directories so "
+        "that P2 and P3 are used");
   if (given) return sequence;
   sequence.calibration =
       read_kitti_projections(folder / "calib.txt", colour ? std::array{2, 3} : std::array{0, 1},
@@ -670,7 +674,7 @@ StereoSequence open_kitti_raw(const fs::path& folder, bool given,
                               const std::array<int, 2>& numbers) {
   if (numbers[0] == numbers[1])
     refuse(folder, 0,
-           "kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
+           "kitti_raw.left and kitti_raw.right are both camera {}; choose two different cameras",
            numbers[0]);
   const KittiRawFolders folders = find_kitti_raw(folder);
   StereoSequence sequence;
@@ -679,8 +683,9 @@ StereoSequence open_kitti_raw(const fs::path& folder, bool given,
   Lists lists;
   for (std::size_t k = 0; k < 2; ++k) {
     const std::string camera = fmt::format("image_{:02d}", numbers[k]);
-    require_folder(folders.drive / camera,
-                   "data/ and timestamps.txt of a camera (kitti_raw.left and .right say which)");
+    require_folder(
+        folders.drive / camera,
+        "data/ and timestamps.txt of a camera (selected by kitti_raw.left and kitti_raw.right)");
     below[k] = camera + "/data";
     lists.own[k] = folders.drive / camera / "timestamps.txt";
   }

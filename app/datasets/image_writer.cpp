@@ -15,7 +15,8 @@ void write_png(const std::filesystem::path& file, const ImageView& image) {
   png.flags = PNG_IMAGE_FLAG_FAST;
   if (::png_image_write_to_file(&png, file.c_str(), 0, image.row(0), static_cast<int>(image.stride),
                                 nullptr) == 0)
-    throw InputError(file.string() + ": cannot be written; is the disk full?");
+    throw InputError(file.string() +
+                     ": cannot be written; check the free space and the permissions");
 }
 
 }  // namespace vergence::app

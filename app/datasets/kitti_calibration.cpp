@@ -22,7 +22,7 @@ class Text {
   Text(const std::filesystem::path& file, const char* without) : file_(file) {
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored))
-      refuse(file, 0, "is missing: unpack the date's calibration there{}", without);
+      refuse(file, 0, "is missing; unpack the calibration of that date there{}", without);
     // In bytes.
     constexpr std::size_t kLargest = std::size_t{1} << 20U;
     text_ = read_text(file, kLargest);
@@ -47,10 +47,12 @@ class Text {
   [[nodiscard]] std::array<double, N> numbers(const std::string& key) const {
     const auto found = found_.find(key);
     if (found == found_.end())
-      refuse(file_, 0, "has no line `{}:`, {} numbers are expected there", key, N);
+      refuse(file_, 0, "has no line `{}:` with {} numbers; check that it is the right file", key,
+             N);
     std::array<std::string_view, N> fields;
     const std::size_t count = split(found->second.rest, ' ', fields);
-    if (count != N) fail(key, fmt::format("has {} numbers where {} are expected", count, N));
+    if (count != N)
+      fail(key, fmt::format("has {} numbers instead of {}; check the line", count, N));
     std::array<double, N> values{};
     for (std::size_t i = 0; i < N; ++i)
       if (!parse_number(fields[i], &values[i]))
@@ -61,7 +63,9 @@ class Text {
   [[nodiscard]] Mat3 rotation(const std::string& key) const {
     const auto r = numbers<9>(key);
     const Mat3 R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data());
-    if (!accept_rotation(R)) fail(key, "is no rotation, it is off orthonormal by more than 1e-4");
+    if (!accept_rotation(R))
+      fail(key,
+           "is not a rotation: it deviates from orthonormal by more than 1e-4; check its numbers");
     return normalised(R);
   }
 
@@ -78,7 +82,7 @@ class Text {
     // In px.
     constexpr int kWidest = 1 << 15;
     if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest))
-      fail(key, "is no size of an image");
+      fail(key, "is not an image size; two positive numbers are expected");
     return {static_cast<int>(v[0]), static_cast<int>(v[1])};
   }
 
@@ -142,7 +146,7 @@ bool accept_rotation(const Mat3& written) noexcept {
 RigCalibration read_kitti_projections(const std::filesystem::path& file,
                                       const std::array<int, 2>& cameras,
                                       const std::optional<ImageSize>& size) {
-  const Text text(file, ", or give a calibration with --calibration");
+  const Text text(file, ", or pass a calibration with --calibration");
   RigCalibration rig;
   rig.cameras = 2;
   std::array<Vec3, 2> t;
@@ -163,13 +167,13 @@ RigCalibration read_kitti_projections(const std::filesystem::path& file,
 KittiRawRig read_kitti_raw_rig(const KittiRawFolders& folders, const std::array<int, 2>& cameras,
                                ImageSize images) {
   const std::filesystem::path file = folders.calibration / kKittiRawCalibration;
-  const Text text(file, ", or give one with --calibration");
+  const Text text(file, ", or pass one with --calibration");
   const ImageSize raw = text.size(key("S", cameras[0])),
                   rectified = text.size(key("S_rect", cameras[0]));
   if (images != raw && images != rectified)
     text.fail(key("S", cameras[0]),
-              fmt::format("is for images of {}x{} pixels, or {}x{} rectified, but those of the "
-                          "drive have {}x{}; use the calibration of its date",
+              fmt::format("is for images of {}x{} pixels, or {}x{} rectified, but the images have "
+                          "{}x{}; use the calibration of their date",
                           raw.width, raw.height, rectified.width, rectified.height, images.width,
                           images.height));
   const bool are_rectified =
@@ -193,8 +197,7 @@ KittiRawRig read_kitti_raw_rig(const KittiRawFolders& folders, const std::array<
 Transform read_kitti_raw_mount(const KittiRawFolders& folders) {
   const auto rigid = [&](const char* name) {
     return Text(folders.calibration / name,
-                ", or say by `--set ins.lever_arm_m=[…]` where the left camera sits in the INS's "
-                "body")
+                ", or set the left camera's position in the INS body: `--set ins.lever_arm_m=[…]`")
         .rigid("R", "T");
   };
   return rigid("calib_velo_to_cam.txt") * rigid("calib_imu_to_velo.txt");

@@ -155,16 +155,16 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
   const auto add_remark = [ins](std::size_t n, const std::string& what) {
     if (n > 0) ins->remarks.push_back(fmt::format("oxts: {} {}", n, what));
   };
-  add_remark(packets.missing, "packets are missing, the first is " + packets.first_missing);
+  add_remark(packets.missing, "packets are missing; the first is " + packets.first_missing);
   add_remark(packets.broken,
-             fmt::format("packets are not the {} numbers of one and are left out, the first is {}",
-                         kFields, packets.first_broken));
-  add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are left out");
-  add_remark(disordered, "stamps go back or repeat one; their packets are left out");
+             fmt::format("packets do not have {} numbers and are skipped; the first is {}", kFields,
+                         packets.first_broken));
+  add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are skipped");
+  add_remark(disordered, "stamps do not increase; their packets are skipped");
   const auto fixed = [](const InsRecord& r) { return r.sample.fix == FixStatus::fix_3d; };
   add_remark(ins->readings.size() - static_cast<std::size_t>(std::count_if(
                                         ins->readings.begin(), ins->readings.end(), fixed)),
-             fmt::format("of {} packets have no satellites' fix: nothing is compared there",
+             fmt::format("of {} packets have no satellite fix: poses are not compared there",
                          ins->readings.size()));
 }
 
@@ -212,7 +212,7 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
     std::string names;
     for (std::size_t i = 0; i < std::min(kMaxNamed, found.size()); ++i)
       names += (i > 0 ? ", " : "") + found[i].filename().string();
-    refuse(folder, 0, "holds {} drives ({}{}): name one of them", found.size(), names,
+    refuse(folder, 0, "holds {} drives ({}{}); name one of them", found.size(), names,
            found.size() > kMaxNamed ? ", …" : "");
   }
   std::error_code ignored;
@@ -235,15 +235,15 @@ RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
   const fs::path oxts = folders.drive / "oxts", data = oxts / "data";
   std::error_code ignored;
   if (!fs::exists(oxts, ignored)) {
-    ins.remarks.push_back(oxts.string() + ": is not there; there is no INS to compare with");
+    ins.remarks.push_back(oxts.string() + ": does not exist; poses are not compared with an INS");
     return ins;
   }
-  require_folder(data, "the packets of the INS");
+  require_folder(data, "OXTS packets");
   const Packets packets = read_packets(data, read_times_file(oxts / "timestamps.txt").lines);
   if (packets.readings.empty())
     refuse(data / (packets.broken > 0 ? packets.first_broken : packets.first_missing), 0,
-           "{}, and so is every other packet: {} numbers each are expected",
-           packets.broken > 0 ? "is no packet of the INS" : "is missing", kFields);
+           "{}, like every other packet; {} numbers per packet are expected",
+           packets.broken > 0 ? "is not an OXTS packet" : "is missing", kFields);
   const std::vector<std::size_t> kept = ascending(packets.stamps);
   for (const std::size_t i : kept) ins.readings.push_back(packets.readings[i]);
   add_remarks(packets, packets.readings.size() - kept.size(), &ins);

@@ -121,11 +121,11 @@ struct RecordedSession::Reader {
     const auto bytes = detail::first_bytes(m, kMaxDescription);
     RosReader in(bytes, detail::MessageEncoding::cdr);
     const std::string json = in.text();
-    if (!in.ok()) refuse(folder, 0, "has a recording whose description is damaged");
+    if (!in.ok()) refuse(folder, 0, "has a recording with a damaged description; record it again");
     session->description_ = parse_session_description(json, folder.string());
     const auto& topics = session->description_.cameras;
     if (topics.size() < 2 || topics.size() > kMaxCameras)
-      refuse(folder, 0, "has a recording whose description names no cameras");
+      refuse(folder, 0, "has a recording whose description names no cameras; record it again");
     for (std::size_t k = 0; k < topics.size(); ++k) cameras[topics[k]] = k;
     described = true;
   }
@@ -170,7 +170,7 @@ struct RecordedSession::Reader {
       return;
     }
     if (session->readings_.size() == kMaxReadings)
-      refuse(folder, 0, "has a recording of more than {} readings", kMaxReadings);
+      refuse(folder, 0, "has a recording of more than {} INS samples", kMaxReadings);
     session->readings_.push_back(*reading);
   }
 };
@@ -186,7 +186,7 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
           reader.read_message(m, static_cast<std::uint32_t>(i));
         });
     if (!scan) {
-      session.remarks_.push_back(file.name + " does not begin as a recording and was left out");
+      session.remarks_.push_back(file.name + " is not a recording and is skipped");
       session.complete_ = session.complete_ && i + 1 == session.files_.size();
       continue;
     }
@@ -195,22 +195,22 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
   }
   if (!reader.described)
     refuse(folder, 0,
-           "holds no recording of a session: its .mcap files are another program's, which --format "
-           "mcap replays");
+           "holds no recording of a session: its .mcap files are from another program; use "
+           "--format mcap");
   if (session.frames_.empty())
     refuse(folder, 0,
-           "has a recording without a complete frame; the run was too short, or the file is "
-           "truncated");
+           "has a recording without a complete frame: the run was too short, or the file is "
+           "truncated; record again");
   const auto has_image = [](const RecordedFrame& f) {
     return std::any_of(f.images.begin(), f.images.end(),
                        [](const RecordedImage& i) { return i.offset != 0; });
   };
   if (std::none_of(session.frames_.begin(), session.frames_.end(), has_image))
     refuse(folder, 0,
-           "has a recording without images; record: [images] records them (docs/session_files.md)");
+           "has a recording without images; record with record: [images] (docs/session_files.md)");
   if (reader.broken > 0)
     session.remarks_.push_back(fmt::format(
-        "{} frames or readings of the recording are damaged and were left out", reader.broken));
+        "{} frames or samples of the recording are damaged and are skipped", reader.broken));
   if (reader.images_lost > 0)
     session.remarks_.push_back(
         fmt::format("{} images of the run are missing in the recording", reader.images_lost));

@@ -89,8 +89,8 @@ std::string apply_crop(const RosCrop& crop, const std::optional<ImageSize>& imag
   best->apply(c);
   k.width = size.width, k.height = size.height;
   return best == &whole ? ""
-                        : "CameraInfo has binning or a region, but its numbers are taken to be "
-                          "those of the image itself by its principal point";
+                        : "CameraInfo has binning or a region, but its principal point shows that "
+                          "its numbers are of the image itself; they are used unchanged";
 }
 
 std::string set_ros_distortion(std::string_view model, std::span<const double> d,
@@ -98,8 +98,8 @@ std::string set_ros_distortion(std::string_view model, std::span<const double> d
   const auto kind = lens_model(model);
   if (!kind)
     return fmt::format(
-        "is of the model \"{}\"; plumb_bob (radtan), equidistant (fisheye) and "
-        "rational_polynomial are known",
+        "has the unknown model \"{}\"; supported are plumb_bob (radtan), equidistant (fisheye) and "
+        "rational_polynomial",
         model.substr(0, 60));
   const bool equidistant = *kind == CameraModelKind::pinhole_equidistant;
   if (equidistant ? d.size() != 4 && !d.empty() : d.size() > 14)
@@ -107,8 +107,7 @@ std::string set_ros_distortion(std::string_view model, std::span<const double> d
   const auto used = d.first(std::min<std::size_t>(5, d.size()));
   const auto zero = [](double v) { return v == 0; };
   if (const auto rest = d.subspan(used.size()); !std::all_of(rest.begin(), rest.end(), zero))
-    return "has k4 to k6 of a rational polynomial, which this program's radtan has not; calibrate "
-           "as plumb_bob";
+    return "has k4 to k6 of a rational polynomial, which are not supported; calibrate as plumb_bob";
   lens->kind = equidistant ? CameraModelKind::pinhole_equidistant : CameraModelKind::pinhole_radtan;
   std::copy(used.begin(), used.end(), lens->distortion.begin());
   return "";
@@ -121,13 +120,13 @@ std::string set_ros_rig(const RosCamera& left, const RosCamera& right, RigCalibr
   };
   if (differ(0) || differ(1))
     return fmt::format(
-        "has the focal length {}, that of the left camera {}: they are not of one stereo "
+        "has the focal length {}, but that of the left camera is {}, so they are not of one stereo "
         "calibration",
         P_r(0, 0), P_l(0, 0));
   if (P_l(0, 3) == P_r(0, 3) && P_l(1, 3) == P_r(1, 3) && (P_l(0, 3) != 0 || P_l(1, 3) != 0))
     return fmt::format(
-        "has the fourth number {} in its first row, and so has that of the left camera, where it "
-        "is 0 in a stereo calibration: both have the P of one camera",
+        "has the fourth number {} in its first row, like that of the left camera, where a stereo "
+        "calibration has 0: both cameras have the same P",
         P_r(0, 3));
   const Vec3 apart((P_r(0, 3) - P_l(0, 3)) / P_r(0, 0), (P_r(1, 3) - P_l(1, 3)) / P_r(1, 1), 0);
   if (!(apart.norm() > 0))

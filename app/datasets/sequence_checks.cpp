@@ -40,8 +40,8 @@ void check_times(const StereoSequence& sequence) {
   for (const StereoPair& pair : sequence.pairs)
     if (pair.stamp.ns() > kFarthest || pair.stamp.ns() < -kFarthest)
       refuse(file, 0,
-             "has the stamp {} ns, {} s from 1970; those of a drive are between the years 1824 and "
-             "2116: are these other units, or is the line broken?",
+             "has the stamp {} ns, {} s from 1970, outside the years 1824 to 2116; check its unit "
+             "and that the line is complete",
              pair.stamp.ns(), format_seconds(pair.stamp.ns()));
   if (sequence.pairs.size() < 3) return;
   // Forward steps in s.
@@ -58,14 +58,13 @@ void check_times(const StereoSequence& sequence) {
   }
   const std::size_t all = sequence.pairs.size() - 1, still = all - backward - steps.size();
   if (2 * steps.size() < all && still > backward)
-    refuse(
-        file, 0,
-        "has times of which {} of {} repeat the one before: they were written with too few digits",
-        still, all);
+    refuse(file, 0,
+           "has times of which {} of {} repeat the one before; write them with more digits", still,
+           all);
   if (2 * steps.size() < all)
     refuse(file, 0,
-           "has times that do not go forward: of {} steps from pair to pair {} go back and {} "
-           "stand still; are the lines in the order of the images, the oldest first?",
+           "has times that do not increase: of {} steps from pair to pair {} go back and {} are "
+           "zero; sort the lines like the images, oldest first",
            all, backward, still);
   // The lower middle is used, because a gap does not indicate the unit.
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
@@ -73,11 +72,11 @@ void check_times(const StereoSequence& sequence) {
   if (*middle >= kShortestStep && *middle <= kLongestStep) return;
   if (*middle == 1e-9 && backward + still == 0)
     refuse(file, 0,
-           "has times that count the pairs (1, 2, 3 …), as numbers of frames do, and no times: "
-           "leave the file out, and pairs are taken to be 0.1 s apart");
+           "has frame numbers (1, 2, 3 …) instead of times; write times, or remove the file so "
+           "that pairs are assumed 0.1 s apart");
   refuse(file, 0,
-         "has pairs that follow one another after {:.4g} s (median); those of a drive do after 1 "
-         "ms to 10 s: are these times in other units?{}",
+         "has a median interval of {:.4g} s between pairs, outside 1 ms to 10 s; check the unit of "
+         "its times.{}",
          *middle,
          // Other formats have a fixed unit.
          file.extension() == ".txt"
@@ -128,8 +127,8 @@ void find_deep_bits(StereoSequence* sequence) {
     if (peak < 1U << static_cast<unsigned>(bits)) {
       sequence->deep_bits = bits;
       sequence->remarks.push_back(
-          fmt::format("the images have 16 bits a sample, of which {} are used (the greatest sample "
-                      "looked at is {}): they are taken as images of {} bits",
+          fmt::format("the images have 16 bits per sample, of which {} are used (largest sample: "
+                      "{}): they are read as images of {} bits",
                       bits, peak, bits));
       return;
     }

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw InputError(folder.string() + ": cannot be made (" + error.message() + ")");
+  if (error) throw InputError(folder.string() + ": cannot be created (" + error.message() + ")");
 }
 
 std::string rows(const Transform& T) {
@@ -193,7 +193,7 @@ class Writer {
     }
     if (without > 0 && !truth.empty())
       result->remarks.push_back(
-          fmt::format("{}{} of {} frames have no truth",
+          fmt::format("{}{} of {} frames have no ground truth",
                       kitti ? "poses.txt, which has a pose for every frame, is not written: " : "",
                       without, stamps_.size()));
     if (kitti && without == 0) replace_durably(request_.out / "poses.txt", text);
@@ -219,7 +219,9 @@ const RecordedFrame& first_complete_frame(const RecordedSession& session) {
   const auto& frames = session.frames();
   const auto first = std::find_if(frames.begin(), frames.end(), has_pair);
   if (first == frames.end())
-    throw InputError("the recording has no frame with both images; nothing is exported");
+    throw InputError(
+        "the recording has no frame with both images, so nothing is exported; record with record: "
+        "[images]");
   return *first;
 }
 
@@ -279,7 +281,9 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
     ++result.frames;
   }
   if (result.frames == 0)
-    throw InputError("no frame has two images that read back; nothing is exported");
+    throw InputError(
+        "no frame has two readable images, so nothing is exported; check that the recording is "
+        "complete");
   writer.finish(Truth(request.truth), &result);
   return result;
 }

@@ -28,7 +28,7 @@ std::optional<std::filesystem::path> find_log(const std::filesystem::path& folde
     std::sort(found.begin(), found.end());
     refuse(folder, 0,
            "holds " + std::to_string(found.size()) + " files that end in " + std::string(ending) +
-               " (" + found[0].filename().string() + ", …): one drive a folder is expected");
+               " (" + found[0].filename().string() + ", …); use one directory per sequence");
   }
   return found[0];
 }
@@ -76,9 +76,9 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
   constexpr std::size_t kFields = 12;
   std::array<std::string_view, kFields> f;
   if (split(line, ' ', f) != kFields)
-    refuse(
-        log, line_number,
-        "is not `seconds microseconds width height format` of both cameras and their two images");
+    refuse(log, line_number,
+           "is not a line `seconds microseconds width height format` for both cameras with two "
+           "image names; check that this is the log of the cameras");
   const auto stamp = parse_stamp(f[0], f[1]);
   if (!stamp || !parse_stamp(f[5], f[6]))
     refuse(log, line_number, "does not begin with seconds and microseconds below a million");
@@ -183,10 +183,10 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   }
   if (out.empty() || broken > 1 + out.size() / kMaxBroken)
     refuse(log, first_broken,
-           "and {} more lines are not twelve numbers; this is not the log of the INS",
+           "and {} more lines are not twelve numbers; check that this is the log of the INS",
            broken > 0 ? broken - 1 : 0);
   if (broken > 0)
-    remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers were left out",
+    remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers are skipped",
                                    log.filename().string(), broken));
   const bool ordered = std::is_sorted(
       out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
@@ -194,10 +194,10 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
                    [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
   const auto twice = std::unique(out.begin(), out.end(),
                                  [](const Line& a, const Line& b) { return a.stamp == b.stamp; });
-  if (!ordered) remarks->push_back("the samples of the INS were not in the order of their stamps");
+  if (!ordered) remarks->push_back("the samples of the INS are sorted by their stamps");
   if (twice != out.end())
-    remarks->push_back(fmt::format(
-        "{} samples of the INS had the stamp of another and were left out", out.end() - twice));
+    remarks->push_back(
+        fmt::format("{} samples of the INS repeat a stamp and are skipped", out.end() - twice));
   out.erase(twice, out.end());
   return out;
 }
@@ -211,7 +211,7 @@ void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
   for (Line& line : *lines) {
     if (exchanged) std::swap(line.place.latitude_deg, line.place.longitude_deg);
     if (!line.place.plausible())
-      refuse(log, 0, "has a place that is none: {} {} {}", line.place.latitude_deg,
+      refuse(log, 0, "has an invalid position: {} {} {}; check the line", line.place.latitude_deg,
              line.place.longitude_deg, line.place.height_m);
   }
   if (exchanged) remarks->push_back("longitude stands before latitude in the log of the INS");
@@ -293,8 +293,8 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
     if (m.motion.head<2>().norm() > kFast) fast.push_back(m);
   if (fast.size() < kEnough) {
     remarks->push_back(
-        "the drive is too slow or too short to show the INS's axes: north, west, up and yaw from "
-        "north counter-clockwise are taken");
+        "the sequence is too slow or too short to determine the INS's axes: north, west, up and "
+        "yaw from north counter-clockwise are assumed");
     return c;
   }
   decide_axes(moving, fast, &c);
@@ -302,7 +302,7 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
   remarks->push_back(fmt::format(
       "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
       c.axes, c.yaw.phrase, c.pitch_first ? 10 : 11, c.nose_up_positive ? "positive" : "negative",
-      slope ? "" : " (assumed: the path is too level to show it)"));
+      slope ? "" : " (assumed, because the path is too level)"));
   return c;
 }
 
@@ -332,7 +332,7 @@ StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
   if (!found)
     refuse(folder, 0,
            "holds no file that ends in " + std::string(kImageLog) +
-               ": it is not a folder of this data set");
+               "; check that this is a directory of this data set");
   const std::filesystem::path& log = *found;
   const std::string images = log.stem().string();
   require_folder(folder / images, "the images that its log names");
@@ -345,7 +345,7 @@ StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
     // The header names no image.
     if (line.find(".bmp") != std::string_view::npos)
       sequence.pairs.push_back(read_pair(log, lines.number(), line, images));
-  if (sequence.pairs.empty()) refuse(log, 0, "names no images");
+  if (sequence.pairs.empty()) refuse(log, 0, "names no images; check that this is the right file");
   if (given) return sequence;
   sequence.calibration = published_calibration();
   sequence.calibration_source = "the calibration published with the data set";
@@ -358,7 +358,7 @@ RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
   if (!found) {
     ins.remarks.push_back(
         folder.string() +
-        ": holds no file that ends in _Ins0.log; there is no INS to compare with");
+        ": holds no file that ends in _Ins0.log; poses are not compared with an INS");
     return ins;
   }
   std::vector<Line> lines = read_lines(*found, &ins.remarks);

@@ -82,14 +82,14 @@ void check(const std::filesystem::path& source, const CalibrationUse& use, Stere
   if (sequence.calibration.cameras != 2)
     refuse(source, 0,
            "describes " + std::to_string(sequence.calibration.cameras) +
-               " cameras; a stereo drive has two");
+               " cameras; use a calibration with two");
   const Intrinsics &left = sequence.calibration.intrinsics[0],
                    &right = sequence.calibration.intrinsics[1];
   if (left.width != right.width || left.height != right.height)
     refuse(source, 0,
            "gives the left camera " + text({left.width, left.height}) +
                " pixels and the right one " + text({right.width, right.height}) +
-               "; both have to be of one size");
+               "; both must have one size");
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
   find_deep_bits(&sequence);
   // The messages contain names and text from files.
@@ -135,8 +135,8 @@ std::string unpack_advice(const std::filesystem::path& file) {
   const auto packed = std::find_if(kPacked.begin(), kPacked.end(),
                                    [&](const Packed& p) { return name.ends_with(p.ending); });
   if (packed == kPacked.end()) return "";
-  return "is packed (" + std::string(packed->ending.substr(1)) + "); unpack it with `" +
-         std::string(packed->command) + " " + name + "` and give what comes out";
+  return "is compressed (" + std::string(packed->ending.substr(1)) + "); unpack it with `" +
+         std::string(packed->command) + " " + name + "` and pass the result";
 }
 
 namespace {
@@ -199,9 +199,9 @@ ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
     if (!pair.file[camera].empty() &&
         image_size(sequence, pair.file[camera], &size) == ImageFileStatus::ok)
       return {sequence.side_by_side ? size.width / 2 : size.width, size.height};
-  refuse(
-      sequence.root, 0,
-      std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
+  refuse(sequence.root, 0,
+         std::string("has no readable image (PNG, JPEG, BMP or PGM) of the ") +
+             (camera == 0 ? "left" : "right") + " camera");
 }
 
 namespace detail {
@@ -209,11 +209,12 @@ namespace detail {
 void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold) {
   std::error_code error;
   if (std::filesystem::is_directory(folder, error)) return;
-  refuse(
-      folder, 0,
-      std::filesystem::exists(folder, error)
-          ? std::string("is not a folder; a folder with ") + what_it_should_hold + " is expected"
-          : std::string("does not exist; a folder with ") + what_it_should_hold + " is expected");
+  refuse(folder, 0,
+         std::filesystem::exists(folder, error)
+             ? std::string("is not a directory; a directory with ") + what_it_should_hold +
+                   " is expected"
+             : std::string("does not exist; a directory with ") + what_it_should_hold +
+                   " is expected");
 }
 
 }  // namespace detail

@@ -42,17 +42,16 @@ void refuse(const std::filesystem::path& file, std::size_t line, std::string_vie
 std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   std::error_code ignored;
   const auto status = std::filesystem::status(file, ignored);
-  if (std::filesystem::is_directory(status))
-    refuse(file, 0, "is a folder where a file is expected");
+  if (std::filesystem::is_directory(status)) refuse(file, 0, "is a directory; name a file");
   // Reading a pipe would block indefinitely.
   if (std::filesystem::is_other(status))
-    refuse(file, 0, "is a pipe or a device where a file is expected");
+    refuse(file, 0, "is a pipe or a device; name a regular file");
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     const int e = errno;
     refuse(file, 0,
            std::string("cannot be opened (") + std::strerror(e) +
-               "): check the path and its permissions");
+               "); check the path and its permissions");
   }
   std::string text;
   std::array<char, 1U << 16U> block;
@@ -62,11 +61,10 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   while (in.read(block.data(), block.size()) || in.gcount() > 0) {
     text.append(block.data(), static_cast<std::size_t>(in.gcount()));
     if (text.size() > limit)
-      refuse(
-          file, 0,
-          "is longer than " + std::to_string(limit) + " bytes: this is not the file that is meant");
+      refuse(file, 0,
+             "is longer than " + std::to_string(limit) + " bytes; check that it is the right file");
   }
-  if (in.bad()) refuse(file, 0, "reading it failed half way");
+  if (in.bad()) refuse(file, 0, "could not be read to its end; check the disk");
   const bool min_first = text.starts_with("\xFF\xFE");
   return min_first || text.starts_with("\xFE\xFF") ? narrowed(text, min_first) : text;
 }

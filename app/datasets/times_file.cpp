@@ -20,7 +20,7 @@ bool is_number(std::string_view field) {
 std::string name_in(const std::filesystem::path& file, std::size_t line, std::string_view field) {
   const std::string_view name = field.substr(field.rfind('/') + 1);
   if (name.empty() || field.find("..") != std::string_view::npos || name == ".")
-    refuse(file, line, "`{}` is no name of an image in its folder", field.substr(0, 40));
+    refuse(file, line, "`{}` is not the name of an image in its directory", field.substr(0, 40));
   return std::string(name);
 }
 
@@ -82,14 +82,14 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
   std::vector<std::size_t> lines;
   TextTable table(text);
   while (table.next()) rows.push_back(table.fields()), lines.push_back(table.line());
-  if (rows.empty()) refuse(file, 0, "holds no times; one line a frame is expected");
+  if (rows.empty()) refuse(file, 0, "holds no times; write one line per frame");
 
   const TimeColumns columns = find_time_columns(rows);
   std::vector<std::string_view> times;
   bool whole = true;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows[i].size() <= columns.last())
-      refuse(file, lines[i], "has fewer columns than the lines before");
+      refuse(file, lines[i], "has fewer columns than the lines before; complete or remove it");
     times.push_back(rows[i][columns.time]);
     whole = whole && times.back().find_first_of(".eE") == std::string_view::npos;
   }
@@ -105,7 +105,10 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Fields& fields = rows[i];
     const auto stamp = read_time(fields, columns, form);
-    if (!stamp) refuse(file, lines[i], "`{}` is not a time", times[i].substr(0, 40));
+    if (!stamp)
+      refuse(file, lines[i],
+             "`{}` is not a time; write nanoseconds, or seconds with a decimal point",
+             times[i].substr(0, 40));
     // Names may precede or follow the time; each may have its own time (`time left time right`).
     Fields names(fields.begin() + (columns.counted ? 1 : 0),
                  fields.begin() + static_cast<std::ptrdiff_t>(columns.time));
@@ -113,15 +116,15 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
     if (names.size() == 3 && is_number(names[1])) names.erase(names.begin() + 1);
     if (names.size() > 2)
       refuse(file, lines[i],
-             "has {} columns; a time, and one name of an image or two, are expected",
+             "has {} columns; write a time, optionally followed by one or two image names",
              fields.size());
     TimesLine entry{*stamp, {}};
     for (std::size_t k = 0; k < 2 && !names.empty(); ++k)
       entry.name[k] = name_in(file, lines[i], names[std::min(k, names.size() - 1)]);
     if (!out.lines.empty() && out.lines.front().name[0].empty() != entry.name[0].empty())
-      refuse(file, lines[i],
-             "names an image where other lines do not, or the other way round; every line is of "
-             "the same kind");
+      refuse(
+          file, lines[i],
+          "differs from the other lines in naming an image; name images in every line or in none");
     out.lines.push_back(std::move(entry));
   }
   return out;

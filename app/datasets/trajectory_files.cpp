@@ -235,8 +235,8 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
     for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = 1 + k;
   } else {
     refuse(file, first_line,
-           "has {} columns where a pose has 8, stamp tx ty tz qx qy qz qw, or the 12 of a 3x4 "
-           "matrix row by row",
+           "has {} columns; a pose has 8 (stamp tx ty tz qx qy qz qw) or 12 (a 3x4 matrix, row by "
+           "row)",
            n);
   }
   return c;
@@ -264,7 +264,9 @@ class Reader {
   Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
       : file_(file), text_(text), options_(options), sample_(read_sample(text)) {
     TextTable table(text);
-    if (!table.next()) refuse(file, 0, "has no pose in it: there is no row of numbers");
+    if (!table.next())
+      refuse(file, 0,
+             "has no pose: no row consists of numbers; pass a TUM, KITTI or EuRoC trajectory");
     columns_ = find_columns(file, sample_, table.line());
     euroc_ = is_euroc_truth(file, sample_);
     find_times();
@@ -280,9 +282,10 @@ class Reader {
       if (!read_row(table)) break;
     if (out_.poses.empty())
       refuse(file_, 0,
-             skipped_ > 0
-                 ? fmt::format("has no pose in it: {} rows have numbers that are none", skipped_)
-                 : "has no pose in it");
+             skipped_ > 0 ? fmt::format("has no pose: {} rows have only NaN or zero quaternions; "
+                                        "check the program that wrote it",
+                                        skipped_)
+                          : "has no pose; check that it is the right file");
     out_.timed = columns_.time && !columns_.counted;
     out_.numbered = columns_.counted;
     out_.rows = columns_.counted ? max_number_ + 1 : rows_;
@@ -337,11 +340,11 @@ class Reader {
     const auto& fields = table.fields();
     if (fields.size() < columns_.needed()) {
       if (table.unfinished() && !out_.poses.empty()) {
-        out_.remarks.emplace_back("the last row is unfinished and left out");
+        out_.remarks.emplace_back("the last row is incomplete and is skipped");
         return false;
       }
-      refuse(file_, table.line(), "has {} columns where the other rows have {}", fields.size(),
-             columns_.needed());
+      refuse(file_, table.line(), "has {} columns, the other rows {}; complete or remove it",
+             fields.size(), columns_.needed());
     }
     StampedPose pose;
     if (!read_stamp(fields, table.line(), &pose.stamp) ||
@@ -370,14 +373,16 @@ class Reader {
     if (columns_.counted) {
       const auto number = parse_integer(field);
       if (!number || *number < 0 || *number > kMaxPoses)
-        refuse(file_, line, "`{}` is not the number of a pose", field.substr(0, 40));
+        refuse(file_, line, "`{}` is not the number of a pose; the first column counts from 0",
+               field.substr(0, 40));
       max_number_ = std::max(max_number_, static_cast<std::size_t>(*number));
       *stamp = Stamp(*number * kRowStep);
       return true;
     }
     const auto read = read_time(fields, *columns_.time, form_);
     if (!read)
-      refuse(file_, line, "`{}` is not a stamp in {}", field.substr(0, 40), to_string(form_.unit));
+      refuse(file_, line, "`{}` is not a stamp in {}; check --time-unit", field.substr(0, 40),
+             to_string(form_.unit));
     *stamp = *read;
     return true;
   }
@@ -398,7 +403,7 @@ class Reader {
       if (q.norm() == 0) return false;
       if (!(std::abs(q.norm() - 1.0) <= kQuaternionLength))
         refuse(file_, line,
-               "the quaternion has length {:.6f} and not 1: check the order of the columns",
+               "the quaternion has the length {:.6f} instead of 1; check the order of the columns",
                q.norm());
       *T = {q.normalized().toRotationMatrix(), {v[0], v[1], v[2]}};
       return true;
@@ -407,8 +412,8 @@ class Reader {
     const double off = off_rotation(written);
     if (!(off <= kNearRotation))
       refuse(file_, line,
-             "the matrix is not a rotation: it is off orthonormal by more than {:g}, or it is a "
-             "reflection",
+             "the matrix is not a rotation: it is a reflection, or its rows deviate from "
+             "orthonormal by more than {:g}; check the order of the columns",
              kNearRotation);
     roughest_ = std::max(roughest_, off);
     *T = {normalised(written), {v[3], v[7], v[11]}};
@@ -425,12 +430,11 @@ class Reader {
     repeated_ = all - poses.size();
     if (all > 2 && poses.size() == 1)
       refuse(file_, 0,
-             "has the same stamp in all of its {} rows: times were written with too few digits, or "
-             "this column is no time",
+             "has the same stamp in all of its {} rows; write times with more digits, or check "
+             "which column is the time",
              all);
     if (2 * repeated_ > all)
-      refuse(file_, 0,
-             "has only {} different stamps in {} rows: times were written with too few digits",
+      refuse(file_, 0, "has only {} different stamps in {} rows: write times with more digits",
              poses.size(), all);
     if (options_.unit || options_.unit_option.empty() || !out_.timed || poses.size() < 3) return;
     std::vector<std::int64_t> steps(poses.size() - 1);
@@ -441,24 +445,22 @@ class Reader {
     constexpr double kLongest = 10;
     if (const double step = 2e-9 * static_cast<double>(median(std::span(steps))); step > kLongest)
       refuse(file_, 0,
-             "has poses that follow one another after {:.6g} (median), read as seconds: say the "
-             "unit of its times with {}",
+             "has a median interval of {:.6g} when its times are read as seconds; set their unit "
+             "with {}",
              step, options_.unit_option);
   }
 
   void add_remarks() {
     auto& remarks = out_.remarks;
     if (skipped_ > 0)
-      remarks.push_back(fmt::format(
-          "{} rows without numbers (NaN, or a quaternion of zeros) are skipped", skipped_));
+      remarks.push_back(fmt::format("{} rows with NaN or a zero quaternion are skipped", skipped_));
     if (repeated_ > 0)
       remarks.push_back(fmt::format("{} rows that repeat a stamp are dropped", repeated_));
     if (moved_ > 0)
-      remarks.push_back(
-          fmt::format("the order of the times is restored, {} rows went back", moved_));
+      remarks.push_back(fmt::format("rows are sorted by time, because {} rows went back", moved_));
     if (roughest_ > kRounded)
       remarks.push_back(fmt::format(
-          "rotations have few decimals, they are up to {:.1g} off orthonormal", roughest_));
+          "rotations have few decimals: they deviate from orthonormal by up to {:.1g}", roughest_));
   }
 
   /// True for NaN and infinity in all spellings, and for an empty field.
@@ -534,8 +536,8 @@ TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options)
     bring_to_camera(*sensor, &out.poses);
   else
     out.remarks.emplace_back(
-        "this is the truth of the body and not of the left camera: put cam0/sensor.yaml of the "
-        "data set beside it, or use --estimate-ins-extrinsics");
+        "this is the ground truth of the body, not of the left camera; put cam0/sensor.yaml of the "
+        "data set next to it, or use --estimate-ins-extrinsics");
   return out;
 }
 

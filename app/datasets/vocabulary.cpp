@@ -276,10 +276,10 @@ std::string find_program(const YamlFile& file, bool* never) {
           (entry.first.Scalar() == program.key ||
            (program.key.ends_with('_') && entry.first.Scalar().starts_with(program.key)))) {
         *never = program.needs.empty();
-        return fmt::format(
-            "is of {}{}{}", program.name,
-            *never ? ", which is not read; files of Kalibr, ROS and OpenCV are" : ": it needs ",
-            program.needs);
+        return fmt::format("is of {}{}{}", program.name,
+                           *never ? ", which is not supported; convert it to Kalibr, ROS or OpenCV"
+                                  : ": it needs ",
+                           program.needs);
       }
   return "";
 }

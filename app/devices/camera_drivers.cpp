@@ -25,7 +25,7 @@ const CameraDriverRow& find_row(const std::string& driver) {
 }
 
 std::string format_list(const std::vector<DeviceInfo>& found) {
-  if (found.empty()) return "none was found";
+  if (found.empty()) return "none found";
   std::string text = "found:";
   for (const DeviceInfo& d : found)
     text += fmt::format("{} {} ({}, {})", &d == found.data() ? "" : ",",
@@ -41,13 +41,13 @@ std::string refusal(const std::string& key, const std::string& serial, const Cam
   std::string error = driver.last_error();
   switch (status) {
     case DeviceStatus::not_found:
-      return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who,
+      return fmt::format("{}was not found ({}); check cable, power and {}.serial{}", who,
                          format_list(driver.enumerate()), key, error.empty() ? "" : ": " + error);
     case DeviceStatus::busy:
-      return fmt::format("{}is in use by another program; end that one{}", who,
+      return fmt::format("{}is in use by another program; end that program{}", who,
                          error.empty() ? "" : ": " + error);
     case DeviceStatus::no_permission:
-      return fmt::format("{}cannot be opened without permission; {}", who,
+      return fmt::format("{}cannot be opened: permission denied; {}", who,
                          error.empty() ? row.permission : error);
     default:
       return fmt::format("{}cannot be opened: {}", who,
@@ -70,8 +70,8 @@ void check_half(const Configuration& c, std::size_t k) {
   const bool left = camera.half == ImageHalf::left;
   if (other == c.cameras.end())
     throw InputError(fmt::format(
-        "{}.image_half is {}, and no other entry is the {} half of the same image: give one the "
-        "same driver and serial, and image_half: {}",
+        "{}.image_half is {}, but no other entry is the {} half of the same frame; add one with "
+        "the same driver and serial, and image_half: {}",
         camera_key(k), left ? "left" : "right", left ? "right" : "left", left ? "right" : "left"));
   const auto j = static_cast<std::size_t>(other - c.cameras.begin());
   const CameraConfiguration a = camera_configuration(c, k), b = camera_configuration(c, j);
@@ -79,8 +79,8 @@ void check_half(const Configuration& c, std::size_t k) {
       a.offset_x != b.offset_x || a.offset_y != b.offset_y ||
       options_text(a.options) != options_text(b.options))
     throw InputError(
-        fmt::format("{} and {} are halves of one camera's image and differ: set exposure_us, "
-                    "gain_db, pixel_format, offset and options equally",
+        fmt::format("{} and {} are halves of one camera's frame, but their settings differ; set "
+                    "exposure_us, gain_db, pixel_format, offset and options equally",
                     camera_key(k), camera_key(j)));
 }
 
@@ -99,7 +99,8 @@ class Openings {
     for (const auto& [name, serial] : reserved_)
       if (std::count(reserved_.begin(), reserved_.end(), std::pair(name, serial)) > 1)
         throw InputError(fmt::format(
-            "two entries of cameras have the serial \"{}\"; each camera can be one only", serial));
+            "two entries of cameras have the serial \"{}\"; set the serial of the second camera",
+            serial));
   }
 
   OpenedCamera open(std::size_t k) {
@@ -155,7 +156,7 @@ class Openings {
       return d.serial;
     }
     const std::string error = driver.last_error();
-    throw DeviceError(fmt::format("{}: no unassigned {} camera ({}); check cable and power{}",
+    throw DeviceError(fmt::format("{}: no {} camera is available ({}); check cable and power{}",
                                   camera_key(k), name, format_list(found),
                                   error.empty() ? "" : ": " + error));
   }

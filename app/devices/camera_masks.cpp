@@ -43,13 +43,15 @@ std::vector<std::uint8_t> read_mask(const std::string& key, const std::filesyste
   ImageFileStatus status = read_image_file(file, &bytes);
   if (status == ImageFileStatus::ok) status = read_pixels(bytes, requested, &size, pixels.data());
   if (status == ImageFileStatus::not_an_image)
-    fail("is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
+    fail("is not a mask; use a PNG or binary PGM with 0 for pixels that are not used");
   if (status == ImageFileStatus::wrong_size)
-    fail(fmt::format("is {} × {} px, the camera's images are {} × {}; draw it on one of them",
-                     size.width, size.height, requested.width, requested.height));
+    fail(
+        fmt::format("is {} × {} px, but the camera's images are {} × {} px; paint it on one of "
+                    "these images (vergence snap)",
+                    size.width, size.height, requested.width, requested.height));
   if (status != ImageFileStatus::ok) fail(to_phrase(status));
   if (std::all_of(pixels.begin(), pixels.end(), [](std::uint8_t v) { return v == 0; }))
-    fail("is 0 everywhere: nothing of the image is left; 0 hides, any other value shows");
+    fail("is 0 everywhere, so no pixel is used; paint 0 only where the image must not be used");
   return pixels;
 }
 
@@ -60,7 +62,8 @@ CameraMasks::CameraMasks(const Configuration& c, const RigCalibration& rig) {
     if (c.cameras[k].mask.empty()) continue;
     const std::string key = fmt::format("cameras.{}.mask", k);
     if (static_cast<int>(k) >= rig.cameras)
-      throw InputError(fmt::format("{}: the rig has {} cameras, the first is 0", key, rig.cameras));
+      throw InputError(fmt::format("{}: the rig has {} cameras, numbered from 0; remove this mask",
+                                   key, rig.cameras));
     Image& image = images_[k];
     image.width = rig.intrinsics[k].width;
     image.height = rig.intrinsics[k].height;

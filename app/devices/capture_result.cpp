@@ -33,13 +33,15 @@ constexpr double kBlurred = 0.2;
 ImageIssue remark(bool unusable, std::string message) { return {unusable, std::move(message)}; }
 
 std::optional<std::string> why_unusable(const ImageStatistics& f, const std::string& who) {
-  if (f.mean < kBlack) return who + " is black: a cap on the lens, no light, or no exposure";
+  if (f.mean < kBlack) return who + " is black; check the lens cap, the light and exposure_us";
   if (f.saturated > kMuch)
     return fmt::format(
         "{} is overexposed: {:.0f} % of it is white; lower exposure_us, then gain_db", who,
         100 * f.saturated);
   if (f.contrast < kFlat)
-    return who + " shows nothing: one grey all over; a cap, fog on the glass, or no sensor signal";
+    return who +
+           " is one uniform grey; check for a lens cap, fog on the glass, or a missing sensor "
+           "signal";
   return std::nullopt;
 }
 
@@ -87,19 +89,19 @@ std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
       continue;
     }
     if (f.saturated > kSome)
-      remarks.push_back(remark(false, fmt::format("{}: {:.0f} % of it is white, where nothing can "
-                                                  "be tracked; a shorter exposure_us may help",
-                                                  who, 100 * f.saturated)));
+      remarks.push_back(
+          remark(false, fmt::format("{} is partly overexposed: {:.0f} % of it is white, where "
+                                    "nothing can be tracked; a shorter exposure_us may help",
+                                    who, 100 * f.saturated)));
     if (f.mean < kDim)
       remarks.push_back(
           remark(false, fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up "
                                     "to what motion allows, then gain_db",
                                     who, f.mean)));
     if (k != sharpest_at && f.sharpness < kBlurred * sharpest)
-      remarks.push_back(
-          remark(false, fmt::format("{} is much less sharp than {} ({:.0f} against {:.0f}): focus, "
-                                    "dirt, or something near before it",
-                                    who, names[sharpest_at], f.sharpness, sharpest)));
+      remarks.push_back(remark(false, fmt::format("{} is much less sharp than {} ({:.0f} against "
+                                                  "{:.0f}); check focus, dirt and near obstacles",
+                                                  who, names[sharpest_at], f.sharpness, sharpest)));
   }
   return remarks;
 }

@@ -79,10 +79,10 @@ bool means(const Machine& machine, const std::string& requested, const DeviceInf
 std::string format_list(const DriverFindings* d) {
   if (d == nullptr) return "no such driver";
   if (d->cameras.empty())
-    return d->explanation.empty() ? "none is there" : "none is there: " + d->explanation;
+    return d->explanation.empty() ? "none found" : "none found: " + d->explanation;
   std::vector<std::string> names;
   for (const DeviceInfo& c : d->cameras) names.push_back(c.serial.empty() ? c.place : c.serial);
-  return fmt::format("there: {}", fmt::join(names, ", "));
+  return fmt::format("found: {}", fmt::join(names, ", "));
 }
 
 void check_cameras(const CheckContext& p, std::vector<Finding>* findings) {
@@ -105,7 +105,7 @@ void check_cameras(const CheckContext& p, std::vector<Finding>* findings) {
       findings->push_back({"cameras",
                            FindingState::advice,
                            who + ": no camera at " + n.serial +
-                               " answers a broadcast; behind a router that is normal, else check "
+                               " answers a broadcast; this is normal behind a router, else check "
                                "cable, power and address",
                            {"ping -c 3 " + n.serial}});
     else
@@ -136,21 +136,21 @@ void check_nodes(const CheckContext& p, const NodesToOpen& o, std::vector<Findin
                [&](const std::string& node) { return !p.machine.may_use(node); });
   if (o.nodes.empty()) return;
   Finding f{
-      o.check, FindingState::ok, fmt::format("{} may be opened", fmt::join(o.nodes, ", ")), {}};
+      o.check, FindingState::ok, fmt::format("{} can be opened", fmt::join(o.nodes, ", ")), {}};
   if (!closed.empty()) {
     f.state = FindingState::problem;
-    f.message = fmt::format("{} may not be opened: ", fmt::join(closed, ", "));
+    f.message = fmt::format("{} cannot be opened: ", fmt::join(closed, ", "));
     const bool of_group = std::all_of(closed.begin(), closed.end(), [&](const std::string& node) {
       return p.machine.group_of(node) == o.group;
     });
     if (!of_group || p.machine.in_group(o.group)) {
       f.message += fmt::format(
-          "they are not open to group {} (mode 0660); install the udev rules, or end a serial "
-          "console that holds the port (sudo systemctl mask --now serial-getty@NAME)",
+          "group {} has no access (mode 0660); install the udev rules, or stop a serial console "
+          "that uses the port (sudo systemctl mask --now serial-getty@NAME)",
           o.group);
       f.fix = kInstallRules;
     } else {
-      f.message += fmt::format("{} is not in group {}; add, then log out and in again",
+      f.message += fmt::format("{} is not in group {}; add the user, then log out and in again",
                                p.machine.user, o.group);
       f.fix = {fmt::format("sudo usermod -aG {} {}", o.group, p.machine.user)};
     }
@@ -202,8 +202,8 @@ void check_port(const CheckContext& p, const std::string& group, const std::stri
   if (meant == 0 || (meant > 1 && group == "ins"))
     findings->push_back({group,
                          FindingState::problem,
-                         fmt::format("{}.port: {}: {} serial ports match; set one that "
-                                     "`vergence devices` lists",
+                         fmt::format("{}.port: {}: {} serial ports match, one is needed; set one "
+                                     "that `vergence devices` lists",
                                      group, key.empty() ? "empty" : key, meant),
                          {}});
 }
@@ -369,9 +369,8 @@ void check_reach(const std::vector<Reached>& cameras, std::vector<Finding>* find
     findings->push_back(
         {"camera_network",
          r.found ? FindingState::problem : FindingState::advice,
-         fmt::format("the camera at {} is in no network of this host: it {}", r.place,
-                     r.found ? "answers broadcasts and nothing else"
-                             : "is reached through a router, or not"),
+         fmt::format("the camera at {} is not in a network of this host: it {}", r.place,
+                     r.found ? "answers only broadcasts" : "may be reachable through a router"),
          {fmt::format("sudo ip addr add {}/{} dev INTERFACE", dotted(own), link_local ? 16 : 24)}});
   }
   if (!reached.empty())
@@ -384,8 +383,7 @@ void check_mtu(const std::string& name, int mtu, std::vector<Finding>* findings)
   if (mtu < kJumbo) {
     f.state = FindingState::advice;
     f.message += fmt::format(
-        ": with {} (interface, and every switch on the way) a camera takes a quarter of the "
-        "processor's time",
+        "; with {} (on the interface and every switch) a camera needs a quarter of the CPU time",
         kJumbo);
     f.fix = {fmt::format("sudo ip link set dev {} mtu {}", name, kJumbo),
              fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", name, kJumbo)};
@@ -479,11 +477,11 @@ void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
     f.fix = {fmt::format("findmnt -T '{}'", p.out.string())};
   } else if (!room->may_write && p.drive != nullptr) {
     f.state = FindingState::problem;
-    f.message = fmt::format("{} may not write at {}: name a folder of your own by --out",
+    f.message = fmt::format("{} cannot write to {}; use a directory of your own with --out",
                             p.machine.user, where);
   } else if (room->bytes < kComfortable) {
     f.state = room->bytes < kMin ? FindingState::problem : FindingState::advice;
-    f.message += "; an hour's drive writes some 100 MB, recordings of images far more";
+    f.message += "; an hour needs about 100 MB, recordings of images much more";
     f.fix = {"df -h"};
   }
   findings->push_back(std::move(f));

@@ -30,7 +30,7 @@ void check_real_drive(const Configuration& c) {
                        "cannot be mixed");
     if (c.sync.mode != SyncMode::master_strobe && s.trigger != c.cameras[0].trigger)
       throw InputError(fmt::format(
-          "{}.trigger is {}, that of camera 0 is {}; all cameras of a rig are triggered alike",
+          "{}.trigger is {}, but that of camera 0 is {}; set the same trigger for all cameras",
           camera_key(k), to_string(s.trigger), to_string(c.cameras[0].trigger)));
   }
   for (const auto& [key, driver] :
@@ -41,8 +41,8 @@ void check_real_drive(const Configuration& c) {
                        "mixed");
   if (c.trigger.driver == "board" && c.cameras[0].trigger != CameraTrigger::hardware)
     throw InputError(
-        fmt::format("trigger.driver is board and cameras[].trigger {}; the board's pulses are for "
-                    "cameras with trigger: hardware",
+        fmt::format("trigger.driver is board, but cameras.N.trigger is {}; set cameras.N.trigger "
+                    "to hardware, or trigger.driver to none",
                     to_string(c.cameras[0].trigger)));
 }
 

@@ -111,14 +111,16 @@ bool is_mock(const CameraSettings& camera) {
 
 void check_ins_syncout(const Configuration& c) {
   if (c.ins.driver != "xsens")
-    refuse(c, fmt::format("ins.driver is {}, which has no SyncOut; it takes xsens, its SyncOut "
-                          "wired to the cameras",
-                          c.ins.driver));
+    refuse(
+        c,
+        fmt::format(
+            "ins.driver is {}, which has no SyncOut; use xsens with SyncOut wired to the cameras",
+            c.ins.driver));
   if (!(c.ins.sync_out_hz > 0))
     refuse(c, "set ins.sync_out_hz, the pulse rate of the INS, for example to 25");
   if (std::abs(c.ins.sync_out_hz - c.trigger.rate) > 1e-3 * c.trigger.rate)
     refuse(c, fmt::format("trigger.rate is {} and ins.sync_out_hz {}; the INS triggers the "
-                          "cameras, so both are one rate",
+                          "cameras, so set both to one rate",
                           c.trigger.rate, c.ins.sync_out_hz));
 }
 
@@ -127,32 +129,35 @@ std::string misfit(SyncMode mode, int k, const CameraSettings& s) {
   const auto* gige = std::get_if<gige::Options>(&s.options);
   switch (mode) {
     case SyncMode::ins_syncout:
-      return is_mock(s) ? "driver is mock, which no INS triggers; use mode board" : "";
+      return is_mock(s) ? "driver is mock, which no INS triggers; use sync.mode board" : "";
     case SyncMode::master_strobe:
       if (is_mock(s))
-        return "driver is mock, whose cameras are triggered by the mock's board; use mode board";
+        return "driver is mock, whose cameras are triggered by a simulated trigger board; use "
+               "sync.mode board";
       if (k == 0 && s.trigger == CameraTrigger::hardware)
-        return "trigger is hardware; camera 0 triggers the others, so it is free or software";
+        return "trigger is hardware, but camera 0 triggers the others; set it to free or software";
       if (k > 0 && s.trigger != CameraTrigger::hardware)
-        return fmt::format("trigger is {}; camera 0's strobe triggers it, so it is hardware",
-                           to_string(s.trigger));
+        return fmt::format(
+            "trigger is {}, but the strobe of camera 0 triggers this camera; set it to hardware",
+            to_string(s.trigger));
       return "";
     case SyncMode::ieee1394_cycle_time:
       if (s.driver == "iidc-1394") return "";
       return fmt::format(
-          "driver is {}; only cameras on one IEEE 1394 bus (iidc-1394) share its "
-          "cycle timer",
+          "driver is {}, but only cameras on one IEEE 1394 bus share a cycle timer; use iidc-1394 "
+          "or another sync.mode",
           s.driver);
     case SyncMode::ptp:
       if (s.driver != "gige")
-        return fmt::format("driver is {}; PTP clocks are those of gige cameras", s.driver);
+        return fmt::format(
+            "driver is {}, but only gige cameras have PTP clocks; use gige or another sync.mode",
+            s.driver);
       return gige != nullptr && gige->ptp
                  ? ""
-                 : "options does not contain ptp: on, so its clock is not synchronised";
+                 : "options lacks ptp: on, so the camera's clock is not synchronised; add it";
     case SyncMode::side_by_side:
       if (s.half != ImageHalf::whole) return "";
-      return "image_half is whole, so it has its own frames; with both images in one frame it is "
-             "left or right";
+      return "image_half is whole; with both images in one frame set it to left or right";
     case SyncMode::board:
     case SyncMode::frame_counter:
     case SyncMode::approximate_time:
@@ -169,7 +174,7 @@ void check_mode(const Configuration& c, int cameras) {
   if (c.sync.mode == SyncMode::ins_syncout) check_ins_syncout(c);
   if (c.sync.mode == SyncMode::frame_counter && c.cameras[0].trigger == CameraTrigger::free)
     throw InputError(
-        "cameras[].trigger is free: nothing makes the cameras expose together, so their counters "
+        "cameras.N.trigger is free, so the cameras do not expose together and their counters "
         "cannot pair the images; trigger them, or set sync.mode to approximate_time (both in one "
         "frame: side_by_side)");
   for (int k = 0; k < cameras; ++k) {
@@ -186,8 +191,8 @@ void check_exposures(const Configuration& c, int cameras) {
     const double busy_us = s.trigger_delay_us + s.exposure_us;
     if (busy_us > shortest_us)
       throw InputError(fmt::format(
-          "cameras.{}.exposure_us is {}{}, longer than the {:.0f} µs between two "
-          "pulses (trigger.rate {}{}): the camera would miss pulses",
+          "cameras.{}.exposure_us is {}{}, longer than the {:.0f} µs between two pulses "
+          "(trigger.rate {}{}), so the camera would miss pulses; lower exposure_us or trigger.rate",
           k, s.exposure_us,
           s.trigger_delay_us > 0
               ? fmt::format(" after {} µs of trigger_delay_us", s.trigger_delay_us)
@@ -245,17 +250,16 @@ void fit_to_devices(const Configuration& c, const std::vector<DeviceTiming>& cam
 void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
   if (!marks_sync_out(ins))
     refuse(c, fmt::format(
-                  "{} tells which pulses it made by no clock that goes on over a gap, so "
-                  "nothing could prove the pairs; set sync.mode to frame_counter (not verified), "
-                  "or to board with a trigger board",
+                  "{} has no clock that continues across a gap, so pairs cannot be verified; set "
+                  "sync.mode to frame_counter (not verified), or to board with a trigger board",
                   ins_title(ins)));
   // Base frequency in Hz, divided by n.
   constexpr double kBase = 400;
   const double nearest = kBase / std::max(1.0, std::round(kBase / c.trigger.rate));
   if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
   throw InputError(
-      fmt::format("trigger.rate is {}, and {} makes pulses of {:g} Hz / n: set trigger.rate and "
-                  "ins.sync_out_hz to {:.6g}",
+      fmt::format("trigger.rate is {}, but {} generates pulses of {:g} Hz / n; set trigger.rate "
+                  "and ins.sync_out_hz to {:.6g}",
                   c.trigger.rate, ins_title(ins), kBase, nearest));
 }
 
@@ -271,19 +275,20 @@ TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) 
   t.feedback_active_low = static_cast<std::uint8_t>(c.trigger.feedback_active_low);
   if ((t.lines & all) != all)
     throw InputError(
-        fmt::format("trigger.lines is {}, a mask that leaves out the line of a camera; 0 takes one "
-                    "line for each of the {}",
+        fmt::format("trigger.lines is {}, a bit mask without the line of a camera; set it to 0 for "
+                    "one line for each of the {}",
                     c.trigger.lines, cameras));
   const double period_us = 1e6 / c.trigger.rate;
   if (c.trigger.dither_us * 2 > period_us)
-    throw InputError(fmt::format(
-        "trigger.dither_us is {}, more than half of the {:.0f} µs between two pulses; a "
-        "twentieth is plenty",
-        c.trigger.dither_us, period_us));
+    throw InputError(
+        fmt::format("trigger.dither_us is {}, more than half of the {:.0f} µs between two pulses; "
+                    "a twentieth is sufficient",
+                    c.trigger.dither_us, period_us));
   if (c.trigger.width_us + c.trigger.dither_us >= period_us)
-    throw InputError(fmt::format(
-        "trigger.width_us is {}: a pulse would last until the next one, {:.0f} µs later",
-        c.trigger.width_us, period_us - c.trigger.dither_us));
+    throw InputError(
+        fmt::format("trigger.width_us is {}, so a pulse would last until the next one, {:.0f} µs "
+                    "later; lower it",
+                    c.trigger.width_us, period_us - c.trigger.dither_us));
   return t;
 }
 

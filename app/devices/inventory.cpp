@@ -232,7 +232,7 @@ std::future<Search> begin_search(const CameraDriverRow& row) {
       std::vector<DeviceInfo> found = driver->enumerate();
       return {std::move(found), driver->last_error()};
     } catch (const std::exception& e) {
-      return {{}, std::string("it cannot look: ") + e.what()};
+      return {{}, std::string("the search failed: ") + e.what()};
     }
   });
   std::future<Search> search = task.get_future();
@@ -345,7 +345,7 @@ Inventory make_inventory(const Machine& machine, const InventoryOptions& options
       d.explanation = std::move(found.explanation);
     } else {
       d.explanation = fmt::format(
-          "no answer within {:.0f} s: a device or its kernel driver hangs; unplug it, and look at "
+          "no answer within {:.0f} s: a device or its kernel driver hangs; unplug it and check "
           "dmesg",
           options.limit.to_seconds());
     }

@@ -19,7 +19,7 @@ namespace {
 void require_choice(const char* key, const std::string& value,
                     const std::vector<std::string>& words) {
   if (std::find(words.begin(), words.end(), value) == words.end())
-    throw InputError(fmt::format("{} is \"{}\"; with mock cameras it takes {}", key, value,
+    throw InputError(fmt::format("{} is \"{}\"; with mock cameras set it to {}", key, value,
                                  fmt::join(words, ", ")));
 }
 
@@ -40,7 +40,7 @@ std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<st
 
 void configured(DeviceStatus status, const std::string& what) {
   if (status != DeviceStatus::ok)
-    throw InputError(what + " is not possible: " + std::string(to_string(status)));
+    throw InputError(what + " cannot be configured: " + std::string(to_string(status)));
 }
 
 Duration trigger_delay(const Configuration& c, std::size_t k) {

@@ -79,9 +79,10 @@ int camera_count(const Configuration& c) {
   for (std::size_t k = 0; k < c.cameras.size(); ++k) {
     if (c.cameras[k].driver.empty()) continue;
     if (static_cast<int>(k) != n)
-      throw InputError(fmt::format(
-          "cameras.{} has a driver, cameras.{} before it has none; the list has no holes", k,
-          k - 1));
+      throw InputError(
+          fmt::format("cameras.{} has a driver, but cameras.{} before it has none; set its driver, "
+                      "or remove it",
+                      k, k - 1));
     ++n;
   }
   return n;
@@ -91,14 +92,14 @@ void check_cameras(const Configuration& c) {
   const int n = camera_count(c);
   if (n < 2)
     throw InputError(fmt::format(
-        "cameras: {0} configured, two are needed for scale; for example cameras: "
+        "cameras: {0} configured, and two are needed for scale; add them, for example cameras: "
         "[{{driver: {1}}}, {{driver: {1}}}]",
         n == 0 ? "no camera is" : "one camera is", n == 0 ? "mock" : c.cameras[0].driver));
   for (std::size_t k = 1; k < static_cast<std::size_t>(n); ++k)
     if (c.cameras[k].width != c.cameras[0].width || c.cameras[k].height != c.cameras[0].height)
       throw InputError(fmt::format(
-          "cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one "
-          "size",
+          "cameras.{}.size is {} x {}, but that of camera 0 is {} x {}; set the same size for all "
+          "cameras",
           k, c.cameras[k].width, c.cameras[k].height, c.cameras[0].width, c.cameras[0].height));
 }
 
@@ -166,11 +167,12 @@ exposure::ExposureOptions exposure_options(const Configuration& c) {
   o.most = microseconds(c.exposure.max_us);
   o.max_gain_db = c.exposure.max_gain_db;
   o.settle_frames = c.exposure.settle_frames;
-  if (o.most < o.least) throw InputError("exposure.max_us: below exposure.min_us; make it larger");
+  if (o.most < o.least) throw InputError("exposure.max_us is below exposure.min_us; raise it");
   if (c.exposure.max_us * 1e-6 * c.trigger.rate > 1)
-    throw InputError(fmt::format(
-        "exposure.max_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {})",
-        c.exposure.max_us, 1e6 / c.trigger.rate, c.trigger.rate));
+    throw InputError(
+        fmt::format("exposure.max_us is {}, longer than the {:.0f} µs between two pulses "
+                    "(trigger.rate {}); lower it",
+                    c.exposure.max_us, 1e6 / c.trigger.rate, c.trigger.rate));
   return o;
 }
 

@@ -18,10 +18,10 @@ void refuse_device(DeviceStatus status, const std::string& message) {
 
 void require_configured(const std::string& title, DeviceStatus status, const std::string& error) {
   if (status == DeviceStatus::ok) return;
-  refuse_device(status, fmt::format("{}: {}", title,
-                                    error.empty() ? fmt::format("cannot do what is asked: {}",
-                                                                to_string(status))
-                                                  : error));
+  refuse_device(
+      status, fmt::format("{}: {}", title,
+                          error.empty() ? fmt::format("cannot be configured: {}", to_string(status))
+                                        : error));
 }
 
 namespace {
@@ -32,12 +32,12 @@ std::string serial_open_error(const std::string& who, DeviceStatus status,
   switch (status) {
     case DeviceStatus::busy:
       return fmt::format(
-          "{} is in use by another program; end that one (ModemManager opens new ports: tell it "
-          "not to)",
+          "{} is in use by another program; end that program (ModemManager opens new ports: "
+          "vergence devices --write-udev)",
           who);
     case DeviceStatus::no_permission:
       return fmt::format(
-          "{} cannot be opened without permission; add the user to group dialout, and log in again",
+          "{} cannot be opened: permission denied; add the user to group dialout, and log in again",
           who);
     default:
       return fmt::format("{} cannot be used: {}", who,
@@ -100,9 +100,9 @@ std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings&
   std::unique_ptr<trigger_board::Device> board = driver.open_board(settings.port, &status);
   if (board == nullptr)
     refuse_device(status,
-                  serial_open_error(
-                      "trigger: the board" + (settings.port.empty() ? "" : " on " + settings.port),
-                      status, driver.last_error()));
+                  serial_open_error("trigger: the trigger board" +
+                                        (settings.port.empty() ? "" : " on " + settings.port),
+                                    status, driver.last_error()));
   status = board->configure(pulses, nullptr);
   require_configured(board_title(board->info()), status, board->last_error());
   if (const std::string remark = board->remark(); !remark.empty())

@@ -104,11 +104,9 @@ std::vector<ImageIssue> Snap::check(const CapturedSet& set,
   for (std::size_t k = 1; k < set.images.size(); ++k)
     for (std::size_t i = 0; i < k; ++i)
       if (are_identical(set.images[i], set.images[k]))
-        remarks.push_back(
-            {true,
-             fmt::format(
-                 "{} and {} are identical images; set cameras.N.serial if one camera is used twice",
-                 names_[i], names_[k])});
+        remarks.push_back({true, fmt::format("{} and {} are identical images; if one camera is "
+                                             "used twice, set cameras.N.serial",
+                                             names_[i], names_[k])});
   return remarks;
 }
 
@@ -184,7 +182,9 @@ void Snap::write_report() const {
   std::ofstream out(file, std::ios::binary);
   out << all.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
   out.close();
-  if (!out) throw InputError(file.string() + ": cannot be written; is the disk full?");
+  if (!out)
+    throw InputError(file.string() +
+                     ": cannot be written; check the free space and the permissions");
 }
 
 ExitCode Snap::verdict(const CaptureResult& capture) const {
@@ -197,8 +197,7 @@ ExitCode Snap::verdict(const CaptureResult& capture) const {
     if (capture.delivered[k] > 0) continue;
     silent = true;
     warn(fmt::format(
-        "{} {}; check its cable, its power, and what triggers it ({}.trigger; `free` needs no "
-        "pulse)",
+        "{} {}; check its cable, its power and its trigger ({}.trigger; `free` needs no pulse)",
         camera_title(names_[k], devices_->cameras()[k]->info()),
         capture.disconnected[k] ? "is disconnected"
                                 : fmt::format("sent no image within {:g} s", request_.wait_s),
@@ -206,9 +205,9 @@ ExitCode Snap::verdict(const CaptureResult& capture) const {
   }
   if (!silent)
     warn(fmt::format(
-        "images came from every camera, but {}: {} of {} sets were taken; cameras that are not "
-        "triggered together need "
-        "sync.mode: approximate_time and a sync.tolerance_ms of half their period",
+        "every camera sent images, but there are {}: {} of {} sets were captured; cameras that are "
+        "not triggered together need sync.mode: approximate_time and a sync.tolerance_ms of half "
+        "their period",
         sets_.empty() ? "no images within the tolerance" : "too few within the tolerance",
         capture.sets, request_.count));
   return ExitCode::device_failed;

@@ -70,16 +70,16 @@ bool same_origin(const HttpRequest& r) noexcept {
 HttpDecision decide_action(HttpRoute route, const HttpRequest& r,
                            const HttpPolicy& policy) noexcept {
   if (!r.token_in_header || !same_token(r.token, policy.token))
-    return {HttpRoute::refuse, 403, "the token is not that of this session"};
-  if (!same_origin(r)) return {HttpRoute::refuse, 403, "asked for by another site"};
-  if (r.has_body) return {HttpRoute::refuse, 413, "nothing is to be sent"};
+    return {HttpRoute::refuse, 403, "the token is not of this session"};
+  if (!same_origin(r)) return {HttpRoute::refuse, 403, "refused: the request is from another site"};
+  if (r.has_body) return {HttpRoute::refuse, 413, "a GET has no body"};
   return {route, 204, ""};
 }
 
 FileDescriptor listen_at(const HostPort& address) {
   const auto refuse = [&](const char* why, const char* what_to_do) {
-    throw InputError(
-        fmt::format("publish.http: no page at {} ({}); {}", address.text(), why, what_to_do));
+    throw InputError(fmt::format("publish.http: the live page cannot be served at {} ({}); {}",
+                                 address.text(), why, what_to_do));
   };
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;
@@ -87,7 +87,7 @@ FileDescriptor listen_at(const HostPort& address) {
   if (const int error =
           ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
       error != 0)
-    refuse(::gai_strerror(error), "give an address of this machine");
+    refuse(::gai_strerror(error), "use an address of this machine");
   FileDescriptor socket(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   constexpr int kOn = 1;
   (void)::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &kOn, sizeof kOn);
@@ -96,9 +96,9 @@ FileDescriptor listen_at(const HostPort& address) {
   const int error = errno;
   ::freeaddrinfo(found);
   if (!listens)
-    refuse(std::strerror(error), error == EADDRINUSE
-                                     ? "another program has the port: name another one"
-                                     : "give an address of this machine and a port from 1024 on");
+    refuse(std::strerror(error),
+           error == EADDRINUSE ? "another program uses the port; choose another one"
+                               : "use an address of this machine and a port of 1024 or above");
   return socket;
 }
 
@@ -130,17 +130,17 @@ HttpDecision decide(const HttpRequest& r, const HttpPolicy& policy) noexcept {
                                 Action{"/mark", HttpRoute::mark},
                                 Action{"/stop-recording", HttpRoute::stop_recording}};
   if (!policy.token_to_read && !names_this_machine(r.host, policy))
-    return {HttpRoute::refuse, 421, "this page is for this machine: open it by its address"};
+    return {HttpRoute::refuse, 421, "this page is for this machine; open it by its address"};
   if (r.method == "POST") {
     for (const Action& action : kActions)
       if (r.path == action.path) return decide_action(action.route, r, policy);
     return {HttpRoute::refuse, 404, "there is no such action"};
   }
-  if (r.method != "GET") return {HttpRoute::refuse, 405, "only GET and POST are understood"};
+  if (r.method != "GET") return {HttpRoute::refuse, 405, "only GET and POST are supported"};
   if (r.path == "/") return {HttpRoute::page, 200, ""};
   if (r.path != "/state") return {HttpRoute::refuse, 404, "there is no such page"};
   if (policy.token_to_read && !same_token(r.token, policy.token))
-    return {HttpRoute::refuse, 403, "the token is not that of this session"};
+    return {HttpRoute::refuse, 403, "the token is not of this session"};
   return {HttpRoute::state, 200, ""};
 }
 
@@ -200,7 +200,9 @@ HttpServer::HttpServer(const HostPort& address, HttpPolicy policy, std::string_v
       MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_MEMORY_LIMIT, kRequestBytes,
       MHD_OPTION_CONNECTION_TIMEOUT, kPatience, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END));
   if (daemon_ == nullptr)
-    throw InputError("publish.http: the system has no memory or files left for the page");
+    throw InputError(
+        "publish.http: the system has no memory or file descriptors left for the live page; raise "
+        "its limits (ulimit -n)");
   listener.release();
 }
 

@@ -173,19 +173,19 @@ LineResponse LinePublisher::answer(std::string_view request) {
     return refuse(R"(unknown request; send {"request": "recalibrate"} or )"
                   R"({"request": "images", "rate_hz": 5})");
   if (!started_.load(std::memory_order_acquire))
-    return refuse("the session has not begun yet; ask again when poses come");
+    return refuse("the session has not started yet; repeat the request after the first pose");
   if (name == "images") {
     constexpr double kMaxRate = 200;
     const double rate =
         parsed.value("rate_hz", nlohmann::json()).is_number() ? parsed["rate_hz"].get<double>() : 0;
     if (!(rate >= 0.01 && rate <= kMaxRate))
-      return refuse("rate_hz is missing or not between 0.01 and 200");
+      return refuse("rate_hz is missing or outside 0.01 to 200");
     return {response_line(name, true, "images follow"), Duration::seconds(1 / rate)};
   }
   if (!start_.can_recalibrate)
     return refuse(
-        "this session does not recalibrate on request; use a live session with calibration.online: "
-        "on");
+        "this session cannot be recalibrated on request; use a live session with "
+        "calibration.online: on");
   requests_->recalibrate.store(true, std::memory_order_relaxed);
   return {response_line(name, true, "recalibration starts at the next frame"), {}};
 }

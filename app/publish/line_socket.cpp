@@ -59,9 +59,9 @@ HostPort parse_host_port(std::string_view text, std::string_view key) {
   const auto [read, error] = std::from_chars(digits.data(), end, port);
   if (host.empty() || bracketed != (host.find(':') != std::string_view::npos) ||
       error != std::errc() || read != end || port == 0)
-    throw InputError(
-        fmt::format("{}: \"{}\" is no address; give HOST:PORT, e.g. 127.0.0.1:8080 or [::1]:8080",
-                    key, text.substr(0, 120)));
+    throw InputError(fmt::format(
+        "{}: \"{}\" is not an address; write HOST:PORT, e.g. 127.0.0.1:8080 or [::1]:8080", key,
+        text.substr(0, 120)));
   return {std::string(host), port};
 }
 
@@ -75,13 +75,14 @@ LineAddress parse_line_address(std::string_view text, std::string_view key) {
   }
   if (!text.starts_with(kUnix))
     throw InputError(
-        fmt::format("{}: \"{}\" is no place for lines; give unix:///PATH or udp://HOST:PORT", key,
+        fmt::format("{}: \"{}\" is not an address; write unix:///PATH or udp://HOST:PORT", key,
                     text.substr(0, 120)));
   out.path = text.substr(kUnix.size());
   if (!out.path.starts_with('/') || out.path.find('\0') != std::string::npos ||
       out.path.size() >= sizeof(sockaddr_un::sun_path))
-    throw InputError(fmt::format("{}: the path of a socket begins with / and has at most {} bytes",
-                                 key, sizeof(sockaddr_un::sun_path) - 1));
+    throw InputError(
+        fmt::format("{}: the path of the socket must begin with / and have at most {} bytes", key,
+                    sizeof(sockaddr_un::sun_path) - 1));
   return out;
 }
 
@@ -108,19 +109,19 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
   struct stat status {};
   if (::lstat(address.sun_path, &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw InputError(
-        fmt::format("{}: {} is there and is no socket; name another path", key, address.sun_path));
+    throw InputError(fmt::format("{}: {} exists and is not a socket; choose another path", key,
+                                 address.sun_path));
   const FileDescriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
       errno == EAGAIN)
-    throw InputError(fmt::format("{}: another program sends its lines to {}; name another path",
-                                 key, address.sun_path));
+    throw InputError(fmt::format("{}: another program publishes at {}; choose another path", key,
+                                 address.sun_path));
   // Only ECONNREFUSED proves that no program listens. A datagram socket or one of another user may
   // be in use.
   if (errno == ECONNREFUSED)
     (void)::unlink(address.sun_path);
   else if (errno != ENOENT)
-    throw InputError(fmt::format("{}: {} is a socket of another program ({}); name another path",
+    throw InputError(fmt::format("{}: {} is a socket of another program ({}); choose another path",
                                  key, address.sun_path, std::strerror(errno)));
 }
 
@@ -139,8 +140,10 @@ class UnixLineSocket final : public LineSocket {
         // The mode must not depend on the umask.
         ::chmod(address.sun_path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 ||
         ::listen(listener_.get(), kPending) != 0)
-      throw InputError(fmt::format("{}: no socket at {} ({}); does its folder exist?", key, path,
-                                   std::strerror(errno)));
+      throw InputError(
+          fmt::format("{}: the socket {} cannot be created ({}); check that its directory exists "
+                      "and is writable",
+                      key, path, std::strerror(errno)));
     bound_ = true;
   }
   ~UnixLineSocket() override {
@@ -334,8 +337,9 @@ class UdpLineSocket final : public LineSocket {
     const int error =
         ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
     if (error != 0)
-      throw InputError(fmt::format("{}: {} is not known ({}); give its number, e.g. 127.0.0.1:{}",
-                                   key, address.host, ::gai_strerror(error), address.port));
+      throw InputError(
+          fmt::format("{}: the host {} is unknown ({}); write its IP address, e.g. 127.0.0.1:{}",
+                      key, address.host, ::gai_strerror(error), address.port));
     socket_ =
         FileDescriptor(::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     const bool connected =
@@ -343,8 +347,8 @@ class UdpLineSocket final : public LineSocket {
     const int reason = errno;
     ::freeaddrinfo(found);
     if (!connected)
-      throw InputError(fmt::format("{}: no way to {} ({}); is its network up?", key, address.text(),
-                                   std::strerror(reason)));
+      throw InputError(fmt::format("{}: {} cannot be reached ({}); check the network", key,
+                                   address.text(), std::strerror(reason)));
   }
 
   void greet(std::string lines) noexcept override {

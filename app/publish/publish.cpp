@@ -23,7 +23,8 @@ constexpr std::size_t kMinToken = 16, kMaxToken = 128;
 std::string new_token() {
   std::array<std::uint8_t, 16> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
-    throw InputError("publish.http: the system gives no random numbers; set publish.token_file");
+    throw InputError(
+        "publish.http: the system has no random numbers for a token; set publish.token_file");
   std::string token;
   for (const std::uint8_t byte : bytes) token += fmt::format("{:02x}", byte);
   return token;
@@ -34,7 +35,7 @@ std::string read_token(const std::filesystem::path& file) {
   std::string line(kMaxToken + 2, '\0');
   if (!in)
     throw InputError(fmt::format(
-        "publish.token_file: {} cannot be read; write a line of letters and digits into it",
+        "publish.token_file: {} cannot be read; create it with one line of letters and digits",
         file.string()));
   in.getline(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(std::strlen(line.c_str()));
@@ -43,9 +44,10 @@ std::string read_token(const std::filesystem::path& file) {
            c == '_';
   });
   if (line.size() < kMinToken || line.size() > kMaxToken || !plain)
-    throw InputError(fmt::format(
-        "publish.token_file: the first line of {} is no token: {} to {} letters, digits, - and _",
-        file.string(), kMinToken, kMaxToken));
+    throw InputError(
+        fmt::format("publish.token_file: the first line of {} is not a token; write {} to {} "
+                    "letters, digits, - and _",
+                    file.string(), kMinToken, kMaxToken));
   return line;
 }
 

@@ -44,7 +44,7 @@ RecordingFiles::RecordingFiles(const std::filesystem::path& folder, const Option
       path_(PATH_MAX),
       other_path_(PATH_MAX) {
   if (folder_.size() + 32 > PATH_MAX)
-    throw InputError(folder_ + ": the name is too long for a recording in it");
+    throw InputError(folder_ + ": the path is too long for a recording; use a shorter one");
   for (const RecordingPreamble& p : options.preamble) {
     std::array<std::uint8_t, McapMessageHead::kSize> head{};
     McapMessageHead{static_cast<std::uint16_t>(p.topic + 1), 0, 0, p.message.size()}.write(head);
@@ -52,8 +52,8 @@ RecordingFiles::RecordingFiles(const std::filesystem::path& folder, const Option
     preamble_.insert(preamble_.end(), p.message.begin(), p.message.end());
   }
   if (const int error = open(); error != 0)
-    throw InputError(folder_ + ": nothing can be recorded there (" + std::strerror(error) +
-                     "): check that disk and the folder's permissions");
+    throw InputError(folder_ + ": the recording cannot be created (" + std::strerror(error) +
+                     "); check the disk and the directory's permissions");
 }
 
 // ---- the writer
@@ -164,23 +164,22 @@ std::string RecordingFiles::message(const Notice& n) const {
   const std::string what = std::strerror(n.error);
   switch (n.kind) {
     case Notice::Kind::good_again:
-      return fmt::format("{}: the disk takes the recording again; {} messages were lost", folder_,
+      return fmt::format("{}: the recording is written again; {} messages were lost", folder_,
                          n.lost);
     case Notice::Kind::failed:
       return fmt::format(
-          "{}: the recording cannot be written ({}); the session goes on and writing is tried "
-          "again "
-          "every {:.0f} s, what finds no room in memory is lost: check that disk",
+          "{}: the recording cannot be written ({}); the session continues, writing is retried "
+          "every {:.0f} s, and messages that do not fit into memory are lost: check the disk",
           folder_, what, kRetry.to_seconds());
     case Notice::Kind::unfinished:
       return fmt::format(
-          "{}: file {} of the recording has no summary ({}); it reads back without, up to its "
+          "{}: file {} of the recording has no summary ({}); it can be read without one, up to its "
           "last chunk",
           folder_, n.file, what);
     case Notice::Kind::unwritten:
       return fmt::format(
-          "{}: the disk did not keep what it had taken ({}): {} messages of file {} of the "
-          "recording are lost; look after that disk",
+          "{}: the disk lost data that it had accepted ({}): {} messages of file {} of the "
+          "recording are lost; check the disk",
           folder_, what, n.lost, n.file);
   }
   return {};

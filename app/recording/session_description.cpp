@@ -18,8 +18,8 @@ Enum to_enum(const std::array<const char*, N>& words, const std::string& word,
              const std::string& name) {
   for (std::size_t i = 0; i < N; ++i)
     if (word == words[i]) return static_cast<Enum>(i);
-  throw InputError(name + ": the description of the recorded session says \"" + word.substr(0, 40) +
-                   "\", which no version of this program writes there");
+  throw InputError(name + ": the description of the recorded session has \"" + word.substr(0, 40) +
+                   "\", which is not a known value; the file is damaged");
 }
 
 /// Calls each(key, value) for all members that JSON has in the same form.
@@ -49,7 +49,7 @@ SessionDescription parse_session_description(std::string_view json, const std::s
           fmt::format("{}: is a recording of version {}; this program reads version {}; replay it "
                       "with the program that made it ({})",
                       name, version, SessionDescription::kVersion,
-                      j.value("program", "of which it says nothing")));
+                      j.value("program", "of an unknown version")));
     SessionDescription d;
     for_each_member(d, [&](const char* key, auto& value) { j.at(key).get_to(value); });
     d.trust = to_enum<CalibrationTrust>(kTrust, j.at("trust"), name);

@@ -343,9 +343,11 @@ std::string map_section(const Session& s, const Analysis& a) {
                           a.map_is_enu ? "INS" : "reference");
   if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>estimate, degraded</span>";
   if (a.lost > 0) legend += "<span>× lost from here</span>";
-  legend += a.map_is_enu
-                ? "<br/>View from above, north up. The estimate starts at the ENU alignment"
-                : "<br/>View from above; the bar is the scale.";
+  legend +=
+      a.map_is_enu
+          ? "<br/>View from above, north up; the bar is the scale. The estimate starts at the ENU "
+            "alignment"
+          : "<br/>View from above; the bar is the scale. Gaps between the lines are errors.";
   if (a.map_is_enu) legend += a.placed_s.size() > 1 ? " and again at each later one." : ".";
   return section("tall", "Map", map + legend + "</p>");
 }
@@ -359,7 +361,8 @@ std::string curve_figure(const CurvePlot& plot, const char* note, const Session&
 
 std::string error_plots(const Session& s, const Analysis& a) {
   return curve_figure({"Horizontal error, m", a.horizontal_m, "curve s-ours", true},
-                      "Distance in the ground plane; a steady rise is drift.", s, a) +
+                      "Distance to the reference in the ground plane; a steady rise is drift.", s,
+                      a) +
          curve_figure({"Vertical error, m", a.vertical_m, "curve s-theirs", false},
                       "Positive where the estimate is above the reference.", s, a) +
          curve_figure({"Heading error, degrees", a.heading_deg, "curve s-third", false},
@@ -390,9 +393,11 @@ std::string running_plots(const Session& s, const Analysis& a) {
          curve_figure({"Inliers, points", inliers, "curve s-ours", true},
                       "Points that constrain the pose; few of them make a pose degraded or lost.",
                       s, a) +
-         curve_figure({"Processing time per frame, ms", times, "curve s-ours", true},
-                      "From the decoded images to the pose; it must stay below the frame interval.",
-                      s, a);
+         curve_figure(
+             {"Processing time per frame, ms", times, "curve s-ours", true},
+             "Time of the estimator, from the decoded images to the pose; it must stay below the "
+             "frame interval.",
+             s, a);
 }
 
 /// A single one that the drive began with is no curve.
@@ -412,7 +417,8 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
     // Rotation and translation are shown side by side.
     for (const int component : {0, 3, 1, 4, 2, 5})
       plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]),
-                      calibration_plot(s, a, camera, component));
+                      calibration_plot(s, a, camera, component),
+                      "Value in use with ± 2 σ; a step is a change of the calibration.");
   }
   std::string body = health_table(s);
   if (s.calibrations.empty())

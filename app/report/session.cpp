@@ -41,7 +41,7 @@ class FileLines {
     const auto status = fs::status(file, ignored);
     if (fs::exists(status) && !fs::is_regular_file(status))
       // Reading a pipe would block indefinitely.
-      refuse(file, 0, "is no file: a folder, a pipe or a device");
+      refuse(file, 0, "is not a file, but a directory, a pipe or a device");
     in_.open(file, std::ios::binary);
     if (!in_) refuse(file, 0, std::string("cannot be opened (") + std::strerror(errno) + ")");
   }
@@ -170,17 +170,17 @@ void report_damage(const char* file, const FileLines& lines, std::size_t rows,
                    std::size_t disordered, Session* session) {
   if (rows > 0)
     session->missing.push_back(
-        fmt::format("{}: {} damaged line{} left out", file, rows, rows == 1 ? "" : "s"));
+        fmt::format("{}: {} damaged line{} skipped", file, rows, rows == 1 ? "" : "s"));
   if (lines.failed())
     session->missing.push_back(
-        fmt::format("{}: reading it failed half way; the rest is left out", file));
+        fmt::format("{}: it could not be read to its end; the rest is missing", file));
   else if (lines.truncated())
     session->missing.push_back(fmt::format(
-        "{}: the last line is truncated and was left out; the session was not closed", file));
+        "{}: the last line is incomplete and is skipped; the session was not closed", file));
   if (disordered > 0)
     session->missing.push_back(
-        fmt::format("{}: {} line{} left out whose stamp is not later than the one before", file,
-                    disordered, disordered == 1 ? "" : "s"));
+        fmt::format("{}: {} line{} skipped because the stamp does not increase", file, disordered,
+                    disordered == 1 ? "" : "s"));
 }
 
 /// Reads up to `most` rows of a file. `next` gives a row, nothing for a damaged one; false: the
@@ -193,7 +193,7 @@ void read_rows(const char* file, std::size_t most, FileLines* lines, const Parse
   for (std::string_view line; lines->next(&line);) {
     if (rows->size() == most) {
       session->left_out.push_back(
-          fmt::format("{} has more than {} lines; the rest is left out", file, most));
+          fmt::format("{} has more than {} lines; the rest is not shown", file, most));
       break;
     }
     std::optional<Row> row = parse(line);
@@ -317,8 +317,7 @@ void read_poses(const fs::path& folder, Session* session) {
   if (!lines) return;
   CsvRows rows(&*lines);
   if (!rows.column("stamp_ns")) {
-    session->missing.emplace_back(
-        "poses.csv has no head that names its columns: there are no poses");
+    session->missing.emplace_back("poses.csv has no line with column names: there are no poses");
     return;
   }
   const PoseColumns columns(rows);
@@ -335,8 +334,7 @@ void read_poses(const fs::path& folder, Session* session) {
 }
 
 void read_reference(const fs::path& folder, Session* session) {
-  auto lines = open_part(folder / "reference.tum",
-                         "there is nothing to compare the trajectory with", session);
+  auto lines = open_part(folder / "reference.tum", "the trajectory has no reference", session);
   if (!lines) return;
   read_rows("reference.tum", kMaxFrames, &*lines, tum_pose, &session->reference, session);
 }
@@ -381,7 +379,7 @@ std::optional<CalibrationRow> read_calibration_row(const CsvRows& rows) {
 
 void read_calibrations(const fs::path& folder, Session* session) {
   auto lines =
-      open_part(folder / "calibrations.csv", "how the calibration changed is not known", session);
+      open_part(folder / "calibrations.csv", "changes of the calibration are unknown", session);
   if (!lines) return;
   CsvRows rows(&*lines);
   const auto parse = [&rows](std::string_view line) {
@@ -410,15 +408,14 @@ void read_events(const fs::path& folder, Session* session) {
 }
 
 void read_summary(const fs::path& folder, Session* session) {
-  const auto text = read_part(folder / "summary.json", kLargestSummary,
-                              "the session was not closed (killed, or the power went); its figures "
-                              "are not known",
-                              session);
+  const auto text = read_part(
+      folder / "summary.json", kLargestSummary,
+      "the session was not closed (killed, or power lost); its metrics are unknown", session);
   if (!text) return;
   session->summary = nlohmann::json::parse(*text, nullptr, false);
   if (session->summary.is_object()) return;
   session->summary = nullptr;
-  session->missing.emplace_back("summary.json is truncated; its figures are not known");
+  session->missing.emplace_back("summary.json is damaged; its metrics are unknown");
 }
 
 /// A drive that never found a calibration has none to write; its calibrations.csv and its summary
@@ -433,13 +430,13 @@ void read_calibration_file(const fs::path& folder, Session* session) {
   std::error_code error;
   if (!fs::exists(folder / "calibration.yaml", error) && without_calibration(*session)) return;
   const auto text = read_part(folder / "calibration.yaml", std::size_t{1} << 20U,
-                              "the calibration in use at the end is not known", session);
+                              "the calibration in use at the end is unknown", session);
   if (!text) return;
   try {
     session->calibration = parse_calibration(*text, "calibration.yaml");
   } catch (const InputError& e) {
     session->missing.push_back(
-        fmt::format("{}; the calibration in use at the end is not known", e.what()));
+        fmt::format("{}; the calibration in use at the end is unknown", e.what()));
   }
 }
 

@@ -53,18 +53,18 @@ void replace_durably(const std::filesystem::path& file, std::string_view text) {
   if (error != 0) {
     (void)::unlink(fresh.c_str());
     throw InputError(file.string() + ": cannot be written (" + std::strerror(error) +
-                     "): check the directory's permissions and the free space");
+                     "); check the directory's permissions and the free space");
   }
   if (std::rename(fresh.c_str(), file.c_str()) != 0) {
     error = errno;
     (void)::unlink(fresh.c_str());
     throw InputError(file.string() + ": cannot be replaced (" + std::strerror(error) +
-                     "): check the folder's permissions");
+                     "); check the directory's permissions");
   }
   error = synchronise_folder(file.parent_path());
   if (error != 0)
-    throw InputError(file.string() + ": is written, but may not outlast a power cut (" +
-                     std::strerror(error) + "): check the disk");
+    throw InputError(file.string() + ": is written, but may be lost in a power cut (" +
+                     std::strerror(error) + "); check the disk");
 }
 
 bool check_session_folder(const std::filesystem::path& folder) {
@@ -77,7 +77,7 @@ bool check_session_folder(const std::filesystem::path& folder) {
     throw InputError(name + ": is not a directory; name a new or empty one with --out");
   const bool empty = fs::is_empty(folder, error);
   if (error)
-    throw InputError(name + ": cannot be read (" + error.message() + "): check its permissions");
+    throw InputError(name + ": cannot be read (" + error.message() + "); check its permissions");
   if (!empty)
     throw InputError(name +
                      ": is not empty, and sessions are never overwritten; name a new or empty "
@@ -91,7 +91,7 @@ bool make_session_folder(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder, error);
   if (error)
     throw InputError(folder.string() + ": cannot be created (" + error.message() +
-                     "): check that disk and the parent directory");
+                     "); check the disk and the parent directory");
   return true;
 }
 

@@ -38,7 +38,8 @@ std::optional<std::string> nearest(std::string_view word, const std::vector<std:
   std::size_t best_distance = 0;
   for (const std::string& k : known) {
     const std::size_t d = edit_distance(word, k);
-    if (2 * d > std::max(word.size(), k.size())) continue;
+    // One change for every three bytes is a slip; more of them make another word.
+    if (3 * d > std::max(word.size(), k.size())) continue;
     if (best == nullptr || d < best_distance) {
       best = &k;
       best_distance = d;

@@ -26,17 +26,12 @@ namespace vergence::app {
 }
 
 /// Number of insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`, in
-/// bytes and case-insensitively (optimal string alignment). O(
-/// a
-/// ·
-/// b
-/// ) time, O(
-/// b
-/// ) memory; uses only the first 256 bytes of each.
+/// bytes and case-insensitively (optimal string alignment). Its time grows with the product of both
+/// lengths; uses only the first 256 bytes of each.
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
 
 /// Known word closest to a mistyped one, the first of several. Empty if every word would need
-/// changes to more than half.
+/// changes to more than a third.
 [[nodiscard]] std::optional<std::string> nearest(std::string_view word,
                                                  const std::vector<std::string>& known);
 

@@ -96,14 +96,13 @@ std::vector<std::string> RealtimeThreads::lock_memory() {
   RealtimeSystem::Locked locked = RealtimeSystem::Locked::everything;
   if (const int error = system_.lock_memory(&locked); error != 0)
     return {
-        fmt::format("realtime.lock_memory is refused ({}), the run continues without it: allow it "
-                    "with `ulimit -l "
-                    "unlimited`, in a service with LimitMEMLOCK=infinity",
+        fmt::format("realtime.lock_memory is refused ({}); the run continues without it; allow it "
+                    "with `ulimit -l unlimited`, in a service with LimitMEMLOCK=infinity",
                     reason(error))};
   if (locked == RealtimeSystem::Locked::present)
     return {
-        "realtime.lock_memory: what there is now is locked, memory taken later is not, under "
-        "the limit that is set: lift it with `ulimit -l unlimited`, in a service with "
+        "realtime.lock_memory: present memory is locked, but the limit prevents locking later "
+        "allocations; raise it with `ulimit -l unlimited`, in a service with "
         "LimitMEMLOCK=infinity"};
   return {};
 }
@@ -139,12 +138,11 @@ void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string
   if (priority == 0) return;
   const int error = system_.set_fifo(thread.id, priority);
   if (error == 0 || error == ESRCH || std::exchange(priority_refused_, true)) return;
-  messages->push_back(fmt::format(
-      "realtime.priority: {} does not get priority {} ({}), the run continues without it: allow it "
-      "with "
-      "`sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v vergence)`, in a service with "
-      "LimitRTPRIO={}",
-      thread.name, priority, reason(error), request_.priority));
+  messages->push_back(
+      fmt::format("realtime.priority: {} is refused priority {} ({}); the run continues without "
+                  "it; allow it with `sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v "
+                  "vergence)`, in a service with LimitRTPRIO={}",
+                  thread.name, priority, reason(error), request_.priority));
 }
 
 void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
@@ -153,8 +151,8 @@ void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool sol
   bool& refused = solver ? solver_affinity_refused_ : affinity_refused_;
   if (error == 0 || error == ESRCH || std::exchange(refused, true)) return;
   messages->push_back(
-      fmt::format("realtime.{}: none of these processors is available ({}), the run continues "
-                  "on all of them: `taskset -pc $$` lists those that there are",
+      fmt::format("realtime.{}: none of these processors is available ({}); the run continues on "
+                  "all; `taskset -pc $$` lists the available ones",
                   solver ? "solver_affinity" : "affinity", reason(error)));
 }
 

@@ -115,7 +115,7 @@ void CalibrationWriter::close(const RigCalibration* in_use, std::vector<std::str
   faults->push_back(lines_.path().string() + ": is not complete (" +
                     (good ? std::to_string(lines_.lost_lines()) + " lines are lost"
                           : std::strerror(lines_.fault())) +
-                    "); check that disk and make room on it");
+                    "); check the disk and free space on it");
 }
 
 }  // namespace vergence::app

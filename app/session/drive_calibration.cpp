@@ -115,8 +115,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
     result.why =
         pass.stopped && pass.stopped()
             ? kInterrupted
-            : "none was found from scratch; replay with --from-scratch and read the reasons in "
-              "calibrations.csv";
+            : "none was found; replay with --from-scratch, and see the reasons in calibrations.csv";
     return result;
   }
   StartingCalibration found = given;
@@ -264,8 +263,8 @@ ExitCode calibrate_from_drive(ReplayRequest r, const std::filesystem::path& out)
   std::cout << describe(found);
   if (!found.verified)
     progress.print(
-        "vergence: the depth is not known well enough: a longer drive with turns, past things near "
-        "the road, would help");
+        "vergence: the depth is not known well enough: use a longer sequence with turns and near "
+        "objects");
   progress.print(out.string() + ": written");
   return found.verified ? ExitCode::done : ExitCode::not_usable;
 }

@@ -147,10 +147,10 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
 void DriveRecorder::close(std::vector<std::string>* faults) {
   recording_.close();
   if (const std::uint64_t lost = recording_.counters().lost; lost > 0)
-    faults->push_back(fmt::format(
-        "{}: the recording is not complete ({} messages are lost); check that disk and make room "
-        "on it",
-        folder_, lost));
+    faults->push_back(
+        fmt::format("{}: the recording is not complete ({} messages are lost); check the disk and "
+                    "free space on it",
+                    folder_, lost));
 }
 
 /// True if it is in the queue.

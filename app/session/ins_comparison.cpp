@@ -77,7 +77,7 @@ void InsEvents::update(const InsSample& sample, std::uint64_t jumps, bool contra
   if (contradicted && !std::exchange(contradiction_reported_, true))
     event_log_.log(sample.stamp, "ins_attitude",
                    "the INS heading differs from the direction of travel by more than 30 deg and "
-                   "is not used meanwhile: check its filter and ins.boresight_deg",
+                   "is not used until it agrees: check its filter and ins.boresight_deg",
                    true);
   if (jumps == jumps_) return;
   jumps_ = jumps;

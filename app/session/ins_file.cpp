@@ -94,12 +94,13 @@ InsRecord parse(Columns columns) {
   InsSample& s = r.sample;
   s.stamp = Stamp(columns.integer("a stamp in whole nanoseconds", 0, kMax));
   s.stamp_error = Duration::nanoseconds(columns.integer("a bound in whole nanoseconds", 0, kMax));
-  s.number = static_cast<std::uint64_t>(columns.integer("a reading's number", 0, kMax));
+  s.number = static_cast<std::uint64_t>(columns.integer("a sample number", 0, kMax));
   s.fix = columns.fix();
   std::array<double, 3> place{};
   if (columns.numbers("a coordinate", &place)) {
     s.position = {place[0], place[1], place[2]};
-    if (!s.position.plausible()) columns.refuse("the position is no place on the earth");
+    if (!s.position.plausible())
+      columns.refuse("the position is not a valid latitude and longitude");
   } else {
     s.fix = FixStatus::none;
   }
@@ -108,7 +109,7 @@ InsRecord parse(Columns columns) {
   const auto& q = s.q_enu_ins;
   const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
   if (!(std::abs(length - 1) <= kQuaternionLength))
-    columns.refuse(fmt::format("the quaternion has length {:.3g} and not 1", length));
+    columns.refuse(fmt::format("the quaternion has the length {:.3g} instead of 1", length));
   s.position_sigma = columns.sigma();
   s.height_sigma = columns.sigma();
   s.velocity_sigma = columns.sigma();
@@ -173,19 +174,19 @@ std::vector<InsRecord> read_ins_file(const fs::path& file) {
   Lines lines(text);
   std::string_view line;
   if (!lines.next(&line) || line != kInsHeader)
-    refuse(file, 1, "is not the head of an ins.csv as `vergence run` writes it");
+    refuse(file, 1, "is not the first line of an ins.csv; pass a file that `vergence run` wrote");
   std::vector<InsRecord> records;
   while (lines.next(&line)) {
     std::array<std::string_view, kColumns> fields;
     const std::size_t count = split(line, ',', fields);
     if (count != kColumns)
       refuse(file, lines.number(),
-             fmt::format("has {} columns where a reading has {}", count, kColumns));
+             fmt::format("has {} columns instead of {}; the line is damaged", count, kColumns));
     const InsRecord record = parse(Columns(file, lines.number(), fields));
     if (records.empty() || records.back().sample.stamp < record.sample.stamp)
       records.push_back(record);
   }
-  if (records.empty()) refuse(file, 0, "has no reading in it");
+  if (records.empty()) refuse(file, 0, "has no sample; check that the INS was connected");
   return records;
 }
 

@@ -129,10 +129,10 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
     out.mount_source = recorded.mount_source;
   }
   if (const std::size_t dropped = drop_contradicted(out.options, &out.readings); dropped > 0)
-    out.remarks.push_back(
-        fmt::format("the attitude of {} INS samples is not used: it differs from the course over "
-                    "ground by more than 30 deg for 50 m or more; the course is used instead",
-                    dropped));
+    out.remarks.push_back(fmt::format(
+        "the attitude of {} INS samples is not used, because it differs from the course over "
+        "ground by more than 30° for 50 m or more; the course is used instead",
+        dropped));
   out.remarks.push_back(mount_message(out.options.T_ins_left, out.mount_source));
   return out;
 }

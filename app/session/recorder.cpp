@@ -159,13 +159,13 @@ void Recorder::record_disk(const LineFile* failed, int fault) {
     const char* words = ::strerrordesc_np(fault);
     if (words == nullptr) words = "unknown error";
     report_error(
-        "{}: cannot be written ({}); the session goes on and writing is tried again every "
-        "{} s: check that disk",
+        "{}: cannot be written ({}); the session continues and writing is retried every {} s; "
+        "check the disk",
         failed->path().native(), words, kRetry.count());
     (void)fmt::format_to_n(out, text.size() - 1, "the session's files cannot be written ({})",
                            words);
   } else {
-    (void)fmt::format_to_n(out, text.size() - 1, "the disk takes lines again; {} were lost",
+    (void)fmt::format_to_n(out, text.size() - 1, "lines are written again; {} were lost",
                            lost_lines());
   }
   event.set_message(text.data());
@@ -201,11 +201,11 @@ void Recorder::read_back() {
     try {
       *out = read_tum(file.path());
     } catch (const InputError& e) {
-      errors_.push_back(std::string(e.what()) + "; the summary lacks what is made from it");
+      errors_.push_back(std::string(e.what()) + "; summary.json lacks the metrics of this file");
     } catch (const std::bad_alloc&) {
-      errors_.push_back(file.path().string() +
-                        ": is too long for this machine's memory; the summary lacks what is made "
-                        "from it");
+      errors_.push_back(
+          file.path().string() +
+          ": is too long for this machine's memory; summary.json lacks the metrics of this file");
     }
   };
   if (totals.ok + totals.degraded > 0) read(files_->trajectory, &totals.trajectory);
@@ -222,7 +222,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
     const std::string why = good ? std::to_string(file->lost_lines()) + " lines are lost"
                                  : std::strerror(file->fault());
     totals.faults.push_back(file->path().string() + ": is not complete (" + why +
-                            "); check that disk and make room on it");
+                            "); check the disk and free space on it");
   }
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;

@@ -26,7 +26,7 @@ LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
       fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
   if (fd_ < 0)
     throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
-                     "): check that disk and the folder's permissions");
+                     "); check the disk and the directory's permissions");
   waiting_.reserve(pending_);
 }
 

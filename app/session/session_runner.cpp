@@ -153,7 +153,7 @@ std::thread SessionRunner::start_estimating() {
     halt_source();
     leave_no_folder();
     throw InputError(
-        fmt::format("the estimator thread cannot be started ({}): raise the limit of processes "
+        fmt::format("the estimator thread cannot be started ({}); raise the limit of processes "
                     "(ulimit -u; in a service TasksMax) or of memory",
                     e.code().message()));
   }
@@ -298,8 +298,8 @@ void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput&
 void SessionRunner::print_metrics(const SessionTotals& totals, const SummaryInput& input,
                                   Progress* progress) const {
   progress->print(
-      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; {:.1f} "
-                  "ms per frame, p99 {:.1f} ms",
+      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; "
+                  "estimator {:.1f} ms per frame, p99 {:.1f} ms",
                   request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded,
                   totals.lost, input.skipped, facts_.skipped_label, totals.path_m,
                   totals.estimate.mean(), totals.estimate.percentile(0.99)));
@@ -323,7 +323,8 @@ ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<s
   if (of_source) return *of_source;
   if (loop_.comparison() != nullptr && loop_.comparison()->matches() == 0) {
     progress->print(
-        "vergence: the INS never had a position, so no pose is compared; the poses are written");
+        "vergence: the INS never had a position, so no pose is compared; the poses are written; "
+        "check its antenna");
     return ExitCode::not_usable;
   }
   return faults.empty() ? ExitCode::done : ExitCode::not_written;

@@ -110,17 +110,17 @@ void check_same_rig(const std::string& name, const CalibrationFile& file,
                       name, in_file.width, in_file.height, k, expected.width, expected.height));
     if (!file.serials[k].empty() && !configured.serials[k].empty() &&
         file.serials[k] != configured.serials[k])
-      remarks->push_back(fmt::format(
-          "{}: is of a camera {} with the serial \"{}\"; the one that is there has \"{}\"", name, k,
-          file.serials[k], configured.serials[k]));
+      remarks->push_back(
+          fmt::format("{}: is of a camera {} with the serial \"{}\", but the connected one has "
+                      "\"{}\"; check that it is the right calibration",
+                      name, k, file.serials[k], configured.serials[k]));
   }
   // Images show no length.
   const double found_m = file.rig.baseline, expected_m = configured.rig.baseline;
   if (std::abs(found_m - expected_m) >= kOtherLength * expected_m)
-    remarks->push_back(
-        fmt::format("{}: has a baseline of {:g} m, but the configuration {:g} m; the file is used "
-                    "for all lengths",
-                    name, found_m, expected_m));
+    remarks->push_back(fmt::format(
+        "{}: has a baseline of {:g} m, but the configuration {:g} m; the file's baseline is used",
+        name, found_m, expected_m));
 }
 
 double angle_between(const Vec3& a, const Vec3& b) {

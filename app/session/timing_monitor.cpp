@@ -133,10 +133,10 @@ TimingMonitor::Message TimingMonitor::of_utc(const InsRecord& reading) noexcept 
   if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
-  return message("utc_offset", false,
-                 "the session's stamps are %.4f s %s the INS's UTC; they follow the host clock as "
-                 "set at the start",
-                 std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
+  return message(
+      "utc_offset", false,
+      "the session's stamps are %.4f s %s the INS's UTC; they follow the host clock at the start",
+      std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
 }
 
 void TimingMonitor::record_pose(const AcquiredFrame& frame, float estimate_ms,

@@ -154,7 +154,9 @@ ExitCode run_experiment(const Experiment& given) {
   // The file is opened before the work, so that a bad path fails early.
   if (!a.json.empty()) {
     json.open(a.json);
-    if (!json) throw InputError("--json: " + a.json + " cannot be written; is the folder there?");
+    if (!json)
+      throw InputError("--json: " + a.json +
+                       " cannot be written; check that its directory exists and is writable");
   }
   Arena arena;
   BundleAdjuster adjuster(capacities_for(a.simulation), arena);
@@ -184,8 +186,7 @@ ExitCode run_experiment(const Experiment& given) {
   if (json.is_open()) {
     json << levels_json(levels).dump(1) << '\n';
     json.close();
-    if (!json)
-      throw InputError("--json: " + a.json + " could not be written to its end; is the disk full?");
+    if (!json) throw InputError("--json: " + a.json + " is incomplete; check the free space");
   }
   return ExitCode::done;
 }

@@ -102,7 +102,7 @@ Transform draw_pose(const SimulatedRig& rig, const SimulationOptions& o, Random&
       if (sees_all(rig, T)) return T;
     }
   }
-  throw std::runtime_error("simulation: no view of the whole cloud; make the radius smaller");
+  throw std::runtime_error("simulation: no pose has the whole cloud in view; lower --radius");
 }
 
 /// The point nearest to all rays of a track, least squares, from the start's cameras.

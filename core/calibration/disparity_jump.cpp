@@ -10,12 +10,8 @@ namespace {
 
 // Usual rms shift of undisturbed frames at least, in pixels (build/bench/margin_bench).
 constexpr double kUsualShift = 0.12;
-// Minimum jump, as a multiple of the usual shift and of the frame's own sigma.
-constexpr double kJumpSigmas = 5.0;
-// Number of measured frames until the usual shift is known, and over which it is averaged.
-constexpr int kFirstFrames = 5, kScatterFrames = 20;
-// Share of a shift that the next frame must revert for it not to be a change.
-constexpr double kGoesBack = 0.5;
+// Number of measured frames over which the usual shift is averaged.
+constexpr int kScatterFrames = 20;
 // Maximum number of frames without a measurement between two that are compared.
 constexpr int kMaxSkipped = 2;
 
@@ -111,7 +107,7 @@ bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObs
 DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
   DisparityJump jump;
   jump.tracks = static_cast<int>(rows.size());
-  if (rows.size() < kMinCommonTracks) return jump;
+  if (rows.size() < kMinTracksOfFrame) return jump;
   double s = 0, along = 0, scale = 0, variance = 0;
   const auto median_by = [&](auto value) noexcept {
     for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
@@ -152,7 +148,7 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
       return;
     }
     jump->confirmed =
-        !jump->measured || std::abs(jump->px + pending_.px) > kGoesBack * std::abs(pending_.px);
+        !jump->measured || std::abs(jump->px + pending_.px) > kMajority * std::abs(pending_.px);
     if (jump->confirmed) {
       jump->onset_frame = pending_.frame;
       jump->px = pending_.px;
@@ -162,9 +158,10 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
     return;
   }
   if (!jump->measured) return;
-  const double limit = kJumpSigmas * std::sqrt(std::max(kUsualShift * kUsualShift, mean_square_) +
-                                               jump->sigma_px * jump->sigma_px);
-  if (measured_ >= kFirstFrames) jump->over_limit = std::abs(jump->px) / limit;
+  const double limit =
+      kOutlierSigmas * std::sqrt(std::max(kUsualShift * kUsualShift, mean_square_) +
+                                 jump->sigma_px * jump->sigma_px);
+  if (measured_ >= kMinForMean) jump->over_limit = std::abs(jump->px) / limit;
   if (jump->over_limit > 1) {
     jump->suspected = true;
     pending_ = Pending{true, frame, jump->px, jump->sigma_px, 0};

@@ -8,9 +8,6 @@
 
 namespace vergence::calibration {
 
-/// Minimum number of tracks whose median shows a common change of two frames: the median of 25 has
-/// a quarter of a single track's sigma.
-inline constexpr std::size_t kMinCommonTracks = 25;
 
 /// Change of one frame's disparities against their prediction from the previous frame.
 struct DisparityJump {

@@ -15,10 +15,6 @@
 namespace vergence::calibration {
 namespace {
 
-// Ratio of the median distance from epipolar lines on held-out frames to that on the frames used
-// above which they contradict a solution. The latter counts as at least a corner's noise and at
-// most kWorstUsed px; on recorded sequences both are 0.08 to 0.25 px.
-constexpr double kTimesUsed = 3.0, kWorstUsed = 0.5;
 // Sigma in rad of the rotation that no epipolar line shows: for a calibration without sigmas that
 // is the rig's, and for one that is not. With the first, every published calibration of the seven
 // recorded sequences is verified (robustness_bench drives); the second is the size of a mounting
@@ -27,9 +23,6 @@ constexpr double kSuppliedYaw = 1e-3, kOtherYaw = 15e-3;
 // Prior probability that a supplied calibration is not the rig's, and rate of wrong decisions about
 // it; both are chosen.
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
-// Ratio of sigmas below which an estimate may replace a supplied calibration: it then has nine
-// times the information.
-constexpr double kShareOfCurrent = 1.0 / 3;
 // Minimum path length of a solve, in baselines.
 constexpr double kMinBaselinesTravelled = 3.0;
 
@@ -98,9 +91,9 @@ HeldOut fit_on_held_out(const TrackLog& log, std::uint64_t after, const RigCalib
 bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
                   std::uint64_t newest, int k, double pixel_sigma) noexcept {
   const HeldOut fit = fit_on_held_out(log, newest, rig, k);
-  if (fit.frames < kMinHeldOut) return false;
+  if (fit.frames < kMinForMean) return false;
   const HeldOut used = fit_on(log, 0, newest, solved, k);
-  return fit.median_px > kTimesUsed * std::min(std::max(used.median_px, pixel_sigma), kWorstUsed);
+  return fit.median_px > kUnusualRatio * std::min(std::max(used.median_px, pixel_sigma), kMaxFitPx);
 }
 
 /// Returns true if contradicted() holds for any camera.
@@ -129,7 +122,7 @@ HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration&
 bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
   int n = 0;
   for_held_out(log, after, [&n](const LoggedFrame&) noexcept { ++n; });
-  return n >= kMinHeldOut;
+  return n >= kMinForMean;
 }
 
 bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
@@ -151,7 +144,7 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
     squares += gain * gain;
     ++n;
   });
-  if (n < kMinHeldOut) return true;
+  if (n < kMinForMean) return true;
   const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
   return mean > chance * std::sqrt(variance / (n - 1));
 }
@@ -203,7 +196,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
     a.verified = a.verified && s > 0 && certainty > 1 && off <= o.max_depth_error_percent;
     const bool contradicted = difference > o.max_depth_error_percent && certainty < -1;
-    const double limit = source == CalibrationOrigin::this_drive ? m : kShareOfCurrent * m;
+    const double limit = source == CalibrationOrigin::this_drive ? m : m / kUnusualRatio;
     sharper = sharper && s < limit;
     a.nearer = a.nearer || (s < limit && difference > kChance * s);
     // Evidence against one camera takes precedence over missing evidence about another.

@@ -11,10 +11,9 @@ enum class CalibrationRating : std::uint8_t { good, can_be_improved, recalibrate
 /// Returns `good`, `fair` or `poor`.
 [[nodiscard]] std::string_view to_string(CalibrationRating) noexcept;
 
-/// Depth of the rating, in metres.
-inline constexpr double kRatingDepth = 20;
-/// Depths at which errors are reported, in metres.
+/// Depths at which errors are reported, in metres, and the one of the rating.
 inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};
+inline constexpr double kRatingDepth = kHealthDepths[3];
 
 /// Sigma of a depth measured with camera 0 and camera `k` that the calibration's uncertainty
 /// causes, percent of the depth.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/calibration/disparity_jump.hpp"
+#include "core/calibration/detail/monitor_evidence.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/robust.hpp"
 
@@ -18,8 +18,6 @@ constexpr double kPointsOfAFrame = 5;
 // Page's reference value: the log ratio by chance of two widths at standstill, each known to a
 // tenth. Without it the sum would drift above any bound.
 constexpr double kReference = 0.25;
-// Update rate of the usual width, per frame.
-constexpr double kFollow = 0.1;
 // Threshold for one wrong decision in a million (Wald 1945); takes at least three frames.
 constexpr double kDecided = 13.8;
 
@@ -65,7 +63,7 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
   std::copy(points.begin(), points.end(), before_.begin());
   count_ = points.size();
   distance_px_ = n > 0 ? static_cast<double>(median(now_.first(n))) : 0;
-  if (both < kMinCommonTracks) return;
+  if (both < kMinTracksOfFrame) return;
   const double now = std::max(distance_px_, kNoise);
   if (usual_px_ == 0) usual_px_ = now;
   const auto add = [&](double usual, double other, double* sum) noexcept {
@@ -82,7 +80,7 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
   }
   if (lag_frames() != 0) question();
   if (cameras_in_sync()) questioned_ = false;
-  if (std::max(shifted_[0], shifted_[1]) < 1) usual_px_ += kFollow * (now - usual_px_);
+  if (std::max(shifted_[0], shifted_[1]) < 1) usual_px_ += detail::kFastUpdate * (now - usual_px_);
 }
 
 double PairingEvidence::lag_margin() const noexcept {

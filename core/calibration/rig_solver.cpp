@@ -20,8 +20,6 @@ constexpr std::size_t kLanesABlock = 2;
 constexpr int kMinTracks = 40;
 // Threshold of both losses, in residual scales.
 constexpr double kLossThreshold = 2.5;
-// Limit above which an observation is left out, in residual scales.
-constexpr double kCut = 5.0;
 // Maximum number of steps of the last adjustment; a focal length with an error of a quarter takes
 // more than a hundred.
 constexpr int kMaxSteps = 200;
@@ -173,7 +171,7 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexc
   for (const bool last : {false, true}) {
     if (!r.usable()) return r;
     const double scale = residual_scale();
-    drop_outliers(kCut * scale);
+    drop_outliers(kOutlierSigmas * scale);
     how.loss = BundleLoss::cauchy;
     how.loss_threshold = kLossThreshold * scale;
     how.max_steps = last ? kMaxSteps : 8;

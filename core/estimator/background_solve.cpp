@@ -28,7 +28,7 @@ void BackgroundSolve::start(const calibration::TrackLog& log, const Request& req
   running_ = true;
   discarded_ = false;
   frames_since_start_ = 0;
-  next_decision_ = std::min(calibration::kMinHeldOut, options_.calibration.adopt_after);
+  next_decision_ = std::min(kMinForMean, options_.calibration.adopt_after);
   runner_.start(TaskRef(task_));
 }
 
@@ -60,8 +60,7 @@ bool BackgroundSolve::must_decide() const noexcept {
 }
 
 void BackgroundSolve::postpone() noexcept {
-  next_decision_ =
-      std::min(next_decision_ + calibration::kMinHeldOut, options_.calibration.adopt_after);
+  next_decision_ = std::min(next_decision_ + kMinForMean, options_.calibration.adopt_after);
 }
 
 void BackgroundSolve::finish() noexcept {

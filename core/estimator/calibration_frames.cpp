@@ -86,11 +86,11 @@ bool CalibrationFrames::enough() const noexcept { return logged_ >= required_ &&
 bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= min_to_solve(); }
 
 bool CalibrationFrames::new_since_solve() const noexcept {
-  return log_.size() >= solved_frames_ + calibration::kMinHeldOut;
+  return log_.size() >= solved_frames_ + kMinForMean;
 }
 
 void CalibrationFrames::require(std::size_t frames) noexcept {
-  required_ = std::max(std::min(max_frames(), frames), logged_ + calibration::kMinHeldOut);
+  required_ = std::max(std::min(max_frames(), frames), logged_ + kMinForMean);
 }
 
 std::size_t CalibrationFrames::max_frames() const noexcept {
@@ -99,7 +99,7 @@ std::size_t CalibrationFrames::max_frames() const noexcept {
 
 std::size_t CalibrationFrames::min_to_solve() const noexcept {
   // With the held-out frames, a supplied calibration is evaluated as soon as a new one is solved.
-  return min_frames() - std::min<std::size_t>(min_frames(), calibration::kMinHeldOut);
+  return min_frames() - std::min<std::size_t>(min_frames(), kMinForMean);
 }
 
 std::size_t CalibrationFrames::min_frames() const noexcept {

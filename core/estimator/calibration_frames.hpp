@@ -43,7 +43,7 @@ class CalibrationFrames {
   /// Number of the segment's frames in the newest solve.
   [[nodiscard]] std::size_t solved_frames() const noexcept { return solved_frames_; }
 
-  /// Makes the next solve wait for this many frames of the segment, and for at least kMinHeldOut
+  /// Makes the next solve wait for this many frames of the segment, and for at least kMinForMean
   /// new ones.
   void require(std::size_t frames) noexcept;
   /// Makes the next solve wait until the log holds `frames` frames.

@@ -7,8 +7,6 @@
 namespace vergence {
 namespace {
 
-// Number of consecutive frames without a pose after which the state is `lost`.
-constexpr int kLostAfter = 3;
 // Number of frames in a window at speed, where each is a keyframe (the default of
 // odometry.window_keyframes). Whatever disturbs a frame is in the window for that long. A rebuilt
 // map and a dynamic scene are marked for as many frames, because a passing vehicle looks static in
@@ -54,7 +52,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   moves = out.posed &&
           !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_covariance(out));
   if (!out.posed) {
-    if (++without_pose == kLostAfter) {
+    if (++without_pose == odometry::kMissesAllowed + 1) {
       transition(Trigger::pose_lost, frame.stamp);
       mark_calibration_unverified(frame.number);
     }

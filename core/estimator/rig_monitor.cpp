@@ -16,17 +16,6 @@ using odometry::MapPoint;
 // solve's own sigmas do not apply, because it determines rotations and principal points only
 // together.
 constexpr std::array kVerifiedSigmas = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
-// Minimum number of frames in which a point was found. A new point's match was searched for in the
-// band of the calibration in use and cannot test it.
-constexpr int kMinFound = 2;
-// Number of frames after a new reference until the spread of matches is known. Until then a result
-// makes poses `degraded` and raises no knock; so does a median distance to the epipolar lines above
-// kFarFromLines px. On recorded sequences it stays below 0.3 px.
-constexpr int kGraceFrames = 5;
-constexpr double kFarFromLines = 0.5;
-// Ratio to the previous frame's distance from which an image counts as distorted; 2.5 rows of skew
-// on `sand_rover` give 28 (1.77 px after 0.06).
-constexpr double kDistortionRatio = 2;
 // Minimum speed of a moving rig, in m/s; below it, consecutive images are nearly the same.
 constexpr double kMovingSpeed = 0.5;
 
@@ -94,7 +83,8 @@ void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
                                        const Mat6& covariance) noexcept {
   CameraMonitors& w = camera(k);
   (void)w.monitor.set_reference(T_camera_left, pinhole(rig_, 0), pinhole(rig_, k), covariance);
-  w.grace = kGraceFrames;
+  // Until the spread of matches is known, a result makes poses `degraded` and raises no knock.
+  w.grace = kMinForMean;
 }
 
 void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
@@ -191,7 +181,7 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
       w.jumps.skip(step);
       continue;
     }
-    (void)collect_stereo(odometry.map(), k, kMinFound);
+    (void)collect_stereo(odometry.map(), k, odometry::kMinFound);
     w.jumps.set_transform(w.T_camera_left_before);
     const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
     if (jump.confirmed && !w.pairing.questioned())
@@ -217,7 +207,7 @@ MonitorResult RigMonitor::update_monitor(int k, const odometry::Odometry& odomet
     // A wrong new reference is not a knock, but no pose based on it is `ok`.
     const bool suspect =
         solved_and_verified_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
-                                 w.pairing.distance_px() > kFarFromLines);
+                                 w.pairing.distance_px() > calibration::kMaxFitPx);
     v = MonitorResult{};
     v.undecided = suspect;
   }
@@ -229,8 +219,8 @@ void RigMonitor::update_pairing(int k, std::uint64_t number, RigAssessment* rig)
   const double before = pairing.distance_px();
   pairing.next(number, stereo_.span(), transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k));
   // A pose biased by a distorted image changes the disparities of the frames before and after it.
-  camera(k).distorted =
-      pairing.distance_px() > kFarFromLines && pairing.distance_px() > kDistortionRatio * before;
+  camera(k).distorted = pairing.distance_px() > calibration::kMaxFitPx &&
+                        pairing.distance_px() > kUnusualRatio * before;
   rig->cameras_in_sync = rig->cameras_in_sync && pairing.cameras_in_sync();
   if (pairing.lag_frames() != 0) rig->lag_frames = pairing.lag_frames();
   rig->margins.lag = std::max(rig->margins.lag, pairing.lag_margin());
@@ -285,7 +275,7 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
   const Transform step = step_to(outcome.T_left_world);
   const bool moving = seconds > 0 && step.t.norm() > kMovingSpeed * seconds;
   for (int k = 1; k < cameras_; ++k) {
-    const int found = collect_stereo(odometry.map(), k, kMinFound);
+    const int found = collect_stereo(odometry.map(), k, odometry::kMinFound);
     update_pairing(k, frame.number, &rig);
     const calibration::DisparityJump jump = update_jumps(k, outcome, frame.number, step);
     MonitorResult v;

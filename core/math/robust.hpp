@@ -18,6 +18,23 @@ inline constexpr double kMinScale = 0.05;
 inline constexpr int kReweightings = 3;
 /// Number of standard errors that a decision needs which is repeated with every frame or solve.
 inline constexpr double kCertainSigmas = 3.0;
+/// Number of sigmas of a single value beyond which it has another cause than noise: not once in a
+/// million values, so in none of those of many frames.
+inline constexpr double kOutlierSigmas = 5.0;
+/// Minimum number of values, or frames, from which a mean and its standard error are known; the
+/// error is then known to a third.
+inline constexpr int kMinForMean = 6;
+/// Ratio of two widths (sigmas, median distances) above which they have different causes: of two
+/// that are known to a third, one in a hundred is three times the other.
+inline constexpr double kUnusualRatio = 3.0;
+/// Minimum number of tracks for a median or a share of one frame; the median then has a quarter of
+/// a track's sigma, the share an error of 0.1.
+inline constexpr std::size_t kMinTracksOfFrame = 25;
+/// Share of what is expected above which evidence counts: a majority.
+inline constexpr double kMajority = 0.5;
+/// Minimum number of inliers that do not agree by chance. Three points determine a pose; five more
+/// of thirty, found within 32 px, agree with it to half a pixel once in 10¹⁰ hypotheses.
+inline constexpr int kMinAgreeing = 8;
 /// χ² of two coordinates at 99 %.
 inline constexpr double kChi2OfPixel = 9.21;
 

@@ -4,13 +4,13 @@ namespace vergence::odometry {
 
 BlobMatcher::BlobMatcher(int max_width, int max_height, Arena& arena)
     : surf_(max_width, max_height, arena),
-      matcher_(kMaxBlobs, arena),
-      found_(arena.make<features::SurfMatch>(kMaxBlobs, "matches of blobs")),
-      matches_(arena.make<RoughMatch>(kMaxBlobs, "rough matches")) {
+      matcher_(kMaxPoints, arena),
+      found_(arena.make<features::SurfMatch>(kMaxPoints, "matches of blobs")),
+      matches_(arena.make<RoughMatch>(kMaxPoints, "rough matches")) {
   for (std::size_t k = 0; k < 2; ++k) {
     points_[k] =
-        BoundedVector<features::SurfPoint>(arena.make<features::SurfPoint>(kMaxBlobs, "blobs"));
-    descriptors_[k] = arena.make<features::SurfDescriptor>(kMaxBlobs, "descriptors of blobs");
+        BoundedVector<features::SurfPoint>(arena.make<features::SurfPoint>(kMaxPoints, "blobs"));
+    descriptors_[k] = arena.make<features::SurfDescriptor>(kMaxPoints, "descriptors of blobs");
   }
 }
 

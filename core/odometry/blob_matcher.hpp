@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/features/surf_match.hpp"
+#include "core/odometry/map.hpp"
 #include "core/types/image.hpp"
 
 namespace vergence::odometry {
@@ -13,14 +14,11 @@ struct RoughMatch {
   Vec2 left = Vec2::Zero(), other = Vec2::Zero();
 };
 
-/// Maximum number of blobs in an image, about what a street shows above the default response.
-inline constexpr std::size_t kMaxBlobs = 1500;
-
 /// Matches upright SURF-64 features between two images of unknown relative pose; matches are
 /// mutually best. docs/benchmarks.md compares it with corners.
 ///
 /// Threads  One caller.
-/// Memory   From the arena at construction. If there are more than kMaxBlobs blobs, the weakest are
+/// Memory   From the arena at construction. If there are more than kMaxPoints blobs, the weakest are
 ///          dropped.
 /// Errors   Images that are empty or too large give no matches.
 class BlobMatcher {

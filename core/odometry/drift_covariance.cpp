@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/math/linear_solve.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::odometry {
 namespace {
@@ -66,12 +67,11 @@ Mat6 correction_covariance(const Transform& T_adjusted_fitted) noexcept {
 }
 
 bool may_be_none(const Transform& T_now_before, const Mat6& motion) noexcept {
-  constexpr double kSigmas = 3;
   Vec6 e;
   e << T_now_before.t, log_so3(T_now_before.R);
   if (e.isZero(0)) return true;
   const Cholesky<6> factor(motion);
-  return factor.ok() && e.dot(factor.solve(e)) < kSigmas * kSigmas;
+  return factor.ok() && e.dot(factor.solve(e)) < kCertainSigmas * kCertainSigmas;
 }
 
 void DriftCovariance::step(const Transform& T_left_world, const Mat6& motion, double length_sigma,

@@ -1,7 +1,10 @@
 #include "core/odometry/front_end.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <functional>
+#include <string_view>
 
 #include "core/features/patch.hpp"
 #include "core/odometry/detail/warp.hpp"
@@ -17,17 +20,17 @@ constexpr int kMaskMargin = features::kWindow / 2 + 1;
 
 /// Fingerprint of a small image, to detect structure and repetition.
 FrontEnd::Fingerprint fingerprint(const ImageView& image) noexcept {
-  // Knuth's multiplier of MMIX; it is odd, so that every pixel affects the result.
-  constexpr std::uint64_t kMultiplier = 6364136223846793005U;
   std::int64_t sum = 0, square = 0;
-  std::uint64_t hash = 0;
+  std::size_t hash = 0;
   for (int y = 0; y < image.height; ++y) {
     const std::uint8_t* row = image.row(y);
     for (int x = 0; x < image.width; ++x) {
       sum += row[x];
       square += row[x] * row[x];
-      hash = hash * kMultiplier + row[x];
     }
+    const std::string_view bytes(reinterpret_cast<const char*>(row),
+                                 static_cast<std::size_t>(image.width));
+    hash = std::rotl(hash, 1) ^ std::hash<std::string_view>{}(bytes);
   }
   return {sum, square, hash};
 }

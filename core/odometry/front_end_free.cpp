@@ -8,9 +8,8 @@
 namespace vergence::odometry {
 namespace {
 
-// Maximum Hamming distance of 256 bits; unrelated patches have 128 ± 8.
-constexpr int kMaxDistance = 64;
-// Maximum ratio to the second best distance.
+// Maximum ratio of the Hamming distance to the second best, of 256 bits. Unrelated patches have
+// distances of 128 ± 8, and so ratios near 1.
 constexpr double kDistinct = 0.8;
 // Standard deviation in px between two independently detected corners.
 constexpr float kRoughSigma = 3.F;
@@ -20,9 +19,7 @@ struct Nearest {
   std::size_t index = 0;
   // Distances of the most similar and the second.
   int bits = 257, second = 257;
-  [[nodiscard]] bool distinct() const noexcept {
-    return bits <= kMaxDistance && bits <= kDistinct * second;
-  }
+  [[nodiscard]] bool distinct() const noexcept { return bits <= kDistinct * second; }
 };
 
 Nearest find_nearest(const features::Descriptor& d,

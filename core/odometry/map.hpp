@@ -14,6 +14,12 @@ inline constexpr std::size_t kMaxWindow = 20;
 /// Maximum number of points in the map: tracked ones and those that the window still observes.
 inline constexpr std::size_t kMaxPoints = 2048;
 
+/// Maximum number of consecutive frames for which a point may be hidden, or all of them lost.
+inline constexpr int kMissesAllowed = 2;
+/// Minimum number of frames in which a point was found before it constrains poses or tests the
+/// rig: a new point's match was searched for in the band of the calibration in use.
+inline constexpr std::uint16_t kMinFound = 2;
+
 /// Minimum disparity of a near point relative to infinity, in px: ten times the noise of a match.
 /// Near points determine the scale.
 inline constexpr double kNearDisparity = 3.0;

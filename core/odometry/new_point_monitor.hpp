@@ -1,10 +1,8 @@
 #pragma once
+#include "core/math/robust.hpp"
+#include "core/odometry/pose_estimator.hpp"
 
 namespace vergence::odometry {
-
-/// Minimum share of points that are seen where pose and rig expect them: in a static scene it is
-/// 0.5 to 0.9, and 0.05 if the pose follows a moving object.
-inline constexpr double kMinSeenAgain = 0.3;
 
 /// Detects that most new points do not fit the pose: if the pose follows an object that moves in
 /// front of the scene, new points are lost immediately. Not thread-safe. Does not allocate.
@@ -15,8 +13,8 @@ class NewPointMonitor {
   void add(int tried, int kept) noexcept {
     tried_ += tried;
     kept_ += kept;
-    if (tried_ < kEnough) return;
-    lost_ = kept_ < kMinSeenAgain * tried_;
+    if (tried_ < static_cast<int>(kMinTracksOfFrame)) return;
+    lost_ = kept_ < kChanceShare * tried_;
     tried_ = kept_ = 0;
   }
   /// True if the last evaluated points were mostly lost.
@@ -25,9 +23,6 @@ class NewPointMonitor {
   void reset() noexcept { *this = {}; }
 
  private:
-  // Minimum number of points for an evaluation.
-  static constexpr int kEnough = 30;
-
   // Numbers of points since the last evaluation.
   int tried_ = 0, kept_ = 0;
   bool lost_ = false;

@@ -117,7 +117,7 @@ void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
-  else if (fit.near < kNearEnough)
+  else if (fit.near < kMinAgreeing)
     out->reason = Reason::weak_geometry;
   else if (link_ == Link::unlinked)
     out->reason = Reason::uncalibrated;
@@ -183,7 +183,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
   // A map with far points only continues but must not be rebuilt.
-  const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kNearEnough;
+  const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kMinAgreeing;
   if (next_rig_ && out.images_good) {
     out.relink_due = true;
   } else if (gaps_.rebuild_due() && out.images_good && fit.confirmed_stereo() && !all_far) {

@@ -14,8 +14,6 @@ namespace {
 
 // Maximum sigma of the direction of t for a start, in rad.
 constexpr double kWorstDirection = 0.1;
-// Maximum sigma of the rotation for a start, in rad.
-constexpr double kWorstRotation = 0.01;
 
 }  // namespace
 
@@ -28,7 +26,7 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   out->reason = n < options_.min_inliers ? Reason::needs_texture : Reason::uncalibrated;
   if (!e.found || e.inliers < options_.min_inliers || e.inliers < kRigidShare * n) return false;
   // If all points are far away, the direction of t is not determined and depths would be arbitrary.
-  if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
+  if (!(e.direction_sigma < kWorstDirection)) {
     out->reason = Reason::needs_near_structure;
     return false;
   }
@@ -51,7 +49,7 @@ bool Odometry::start_map(const Transform& T_left_world, Stamp stamp, FrameOutcom
     out->reason = Reason::cameras_swapped;
   else if (!stereo.evidence.fits() || stereo.matched < options_.min_inliers)
     out->reason = Reason::no_stereo_matches;
-  else if (stereo.near < kNearEnough)
+  else if (stereo.near < kMinAgreeing)
     out->reason = Reason::weak_geometry;
   else {
     map_.clear();

@@ -12,12 +12,8 @@ namespace vergence::odometry {
 
 namespace {
 
-// Minimum share if no attempt does better; a wrong calibration leaves a quarter of the far points.
-constexpr double kMinSampleShare = 0.2;
 // Maximum rms residual in px, however many points agree; on a motorway wrong poses have such ones.
 constexpr double kSampleResidual = 3.0;
-// Number of rig frames, so four images, before a point constrains poses.
-constexpr std::uint16_t kFoundEnough = 2;
 
 /// True if the pose of the sample is accurate enough to follow all points from it.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
@@ -52,13 +48,13 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     clock.mark(Stage::track);
     fit = this->fit(*a.start, true);
     clock.mark(Stage::pose);
-    if (sample_agrees(fit, kMinSampleShare) && fit.inliers > best.inliers) best = fit;
+    if (sample_agrees(fit, kChanceShare) && fit.inliers > best.inliers) best = fit;
     if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
   bool unreliable = frames_lost_ > 0 || out->gap_s > 0;
   std::bitset<kMaxPoints> revived;
-  if (!sample_agrees(fit, kMinSampleShare)) {
+  if (!sample_agrees(fit, kChanceShare)) {
     fit = relocalise(out, &revived);
     if (!fit.found) return fit;
     unreliable = true;
@@ -138,7 +134,7 @@ void Odometry::count_across(const PoseFit& fit) noexcept {
     seen += p.across && now ? 1 : 0;
     p.across = p.across || now;
   }
-  stereo_fails_ = link_ == Link::linked && seen < kMinSeenAgain * expected;
+  stereo_fails_ = link_ == Link::linked && seen < kChanceShare * expected;
 }
 
 void Odometry::settle_points(const PoseFit& fit) noexcept {
@@ -171,7 +167,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     if (p.now.cameras != 0) {
       p.missed = 0;
       if (p.found < std::numeric_limits<std::uint16_t>::max()) ++p.found;
-      if (p.stage == PointStage::candidate && p.found >= kFoundEnough) p.stage = PointStage::active;
+      if (p.stage == PointStage::candidate && p.found >= kMinFound) p.stage = PointStage::active;
       continue;
     }
     ++p.missed;

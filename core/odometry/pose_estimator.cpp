@@ -10,12 +10,7 @@
 #include "core/math/robust.hpp"
 
 namespace vergence::odometry {
-namespace {
-
-// Maximum ratio of matches to inliers; wrong matches agree by chance.
-constexpr int kByChance = 4;
-
-}  // namespace
+namespace {}  // namespace
 
 bool PoseFit::confirmed_stereo() const noexcept {
   return std::popcount(cameras) >= 2 && stereo >= kMajority * stereo_found;
@@ -171,7 +166,8 @@ PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
 }
 
 bool PoseEstimator::supports_camera(const Solved& s) const noexcept {
-  return s.inliers >= kCameraAlone && kByChance * s.inliers >= static_cast<int>(owner_.size());
+  return s.inliers >= kCameraAlone &&
+         s.inliers >= kChanceShare * static_cast<double>(owner_.size());
 }
 
 bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start,

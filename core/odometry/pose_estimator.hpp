@@ -6,11 +6,13 @@
 
 namespace vergence::odometry {
 
-/// Share of what is expected above which evidence counts: a majority.
-inline constexpr double kMajority = 0.5;
-/// Minimum number of inliers that do not agree by chance. Three points determine a pose; five more
-/// of thirty, found within 32 px, agree with it to half a pixel once in 10¹⁰ hypotheses.
-inline constexpr int kMinAgreeing = 8;
+/// Share of the found points that may agree with a wrong pose: 0.05 if it follows a moving object,
+/// and a quarter of the far points with a wrong calibration. With the right pose and rig it is 0.5
+/// to 0.9.
+inline constexpr double kChanceShare = 0.25;
+/// Minimum share of found points that agree with the pose; below it something else moves. A half
+/// loses three frames of `sand_rover` in a mirror.
+inline constexpr double kRigidShare = 0.4;
 /// Minimum number of inliers of a pose that only one camera's observations, or rough matches,
 /// support; a few more than agree by chance.
 inline constexpr int kCameraAlone = 12;

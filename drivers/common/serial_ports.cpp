@@ -17,9 +17,8 @@ std::string only_usb_serial_port(std::string_view port, DeviceStatus* status, st
   const std::vector<DeviceInfo> ports = usb_serial_ports("");
   if (ports.size() == 1) return ports.front().place;
   *status = ports.empty() ? DeviceStatus::not_found : DeviceStatus::bad_configuration;
-  *error = ports.empty()
-               ? "there is no serial port on USB; plug the INS in, or name its port in ins.port"
-               : "there is more than one serial port on USB; name the INS's in ins.port";
+  *error = ports.empty() ? "no USB serial port is connected; connect the INS, or set ins.port"
+                         : "several USB serial ports are connected; set ins.port to the INS's";
   return {};
 }
 

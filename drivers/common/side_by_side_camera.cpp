@@ -26,8 +26,9 @@ class Whole final : public Notifier {
     const std::optional<Size>& other = sizes_[1 - half];
     const Size size{requested.width, requested.height};
     if (other && size != *other) {
-      *error = "both images are of one camera, and the other is " + std::to_string(other->width) +
-               " x " + std::to_string(other->height) + ": give both one size";
+      *error = "both images come in one frame, and the other image is " +
+               std::to_string(other->width) + " x " + std::to_string(other->height) +
+               "; set one size for both";
       return DeviceStatus::bad_configuration;
     }
     if (held_ > 0) return DeviceStatus::busy;

@@ -75,16 +75,15 @@ std::string Device::received_instead(std::uint64_t sentences, std::uint64_t fram
   const bool nmea = options_.protocol == Protocol::nmea;
   if (nmea && sentences > 0)
     return "it sends NMEA 0183, but neither GGA nor RMC; enable GGA and RMC on this port";
-  if (nmea && frames > 0)
-    return "it speaks UBX; set ins.driver to ubx, or enable NMEA on this port";
+  if (nmea && frames > 0) return "it sends UBX; set ins.driver to ubx, or enable NMEA on this port";
   if (!nmea && frames > 0)
-    return "it speaks UBX, but sends no NAV-PVT; enable UBX-NAV-PVT on this port (u-center)";
+    return "it sends UBX, but no NAV-PVT; enable UBX-NAV-PVT on this port (u-center)";
   if (!nmea && sentences > 0)
     return "it sends NMEA 0183; set ins.driver to nmea, or enable UBX-NAV-PVT on this port "
            "(u-center)";
   return options_.baud != 0
              ? "nothing is received at " + std::to_string(options_.baud) +
-                   " baud; set ins.baud to its rate, or to 0 to look for it"
+                   " baud; set ins.baud to its rate, or to 0 to detect it"
              : "nothing is received at any usual baud rate; check power, cable and port";
 }
 
@@ -134,14 +133,14 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
     std::array<char, 160> text{};
     if (rate_hz_ > 0 && std::abs(rate_hz_ - rate_hz) > kOtherRate * rate_hz_) {
       (void)std::snprintf(text.data(), text.size(),
-                          "the receiver sends %.3g readings a second, ins.rate is %.4g: set "
-                          "ins.rate to %.3g, or the receiver by its own tool",
+                          "the receiver sends at %.3g Hz, but ins.rate is %.4g; set ins.rate to "
+                          "%.3g, or change the rate of the receiver with its own tool",
                           rate_hz_, rate_hz, rate_hz_);
       last_error_ = text.data();
       return DeviceStatus::unsupported;
     }
     const HeadingSource heading = decoder_.best_heading();
-    remark_ = "it sends no attitude: the comparison is of position and ";
+    remark_ = "it sends no attitude, so position is compared, and ";
     remark_ += heading == HeadingSource::heading ? "measured heading"
                                                  : "course, as heading, once the vehicle moves";
     if (rate_hz_ <= 0) remark_ += "; it has no fix yet";

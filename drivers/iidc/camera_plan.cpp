@@ -108,7 +108,7 @@ class Planner {
   void check_numbers() {
     constexpr int kMax = 65535;
     if (const std::string invalid = find_invalid(requested_); !invalid.empty())
-      refuse(invalid + " is no configuration", DeviceStatus::bad_configuration);
+      refuse(invalid + " is not a valid configuration", DeviceStatus::bad_configuration);
     if (requested_.width > kMax || requested_.height > kMax || requested_.offset_x > kMax ||
         requested_.offset_y > kMax)
       refuse(
@@ -169,9 +169,7 @@ class Planner {
     const AbsoluteRange shutter = r_.absolute_range(Feature::shutter);
     const double s = requested_.exposure.to_seconds();
     if (!shutter.present)
-      refuse(
-          "this camera does not take its exposure in seconds, which version 1.31 of IIDC and later "
-          "do");
+      refuse("this camera does not support absolute exposure (IIDC 1.31 and later do)");
     if (s < shutter.least * (1 - kFloat) || s > shutter.most * (1 + kFloat))
       refuse(
           format_text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us",
@@ -184,7 +182,7 @@ class Planner {
       refuse(gain.present
                  ? format_text("a gain of %g dB is not possible; this camera offers %g to %g dB",
                                requested_.gain_db, gain.least, gain.most)
-                 : "this camera does not take its gain in dB; gain_db must be 0");
+                 : "this camera does not support absolute gain; set gain_db to 0");
     plan_.exposure = requested_.exposure;
     plan_.gain_db = requested_.gain_db;
     frame_rate_ = r_.absolute_range(Feature::frame_rate);
@@ -348,7 +346,7 @@ class Planner {
         (!plan_.grey.mosaic || (requested_.width > 1 && requested_.height > 1)))
       return true;
     explain_refusal(std::string(to_string(plan_.coding)) +
-                    " of this camera is not turned to grey here");
+                    " of this camera is not supported; choose another pixel_format");
     return false;
   }
 
@@ -381,7 +379,7 @@ class Planner {
         if ((codings & bit(31 - c)) != 0)
           out += " " + std::string(to_string(static_cast<ColorCoding>(c)));
     }
-    return out.empty() ? "nothing that its registers name" : out;
+    return out.empty() ? "no format in its registers" : out;
   }
 
   CameraRegisters& r_;
@@ -426,7 +424,7 @@ bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* erro
   if (limits.height != 0 &&
       (packet > limits.height || (limits.width != 0 && packet % limits.width != 0))) {
     *error = format_text(
-        "the camera takes packets of at most %d bytes in steps of %d at this size, not %zu",
+        "the camera supports packets of at most %d bytes in steps of %d at this size, not %zu",
         limits.height, limits.width, packet);
     return false;
   }

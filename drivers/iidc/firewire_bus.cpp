@@ -23,7 +23,7 @@ namespace {
 // A register access that takes longer has met the kernel's split timeout.
 constexpr Duration kSlow = Duration::milliseconds(90);
 
-constexpr const char* kNoStack = "this kernel has no FireWire stack: modprobe firewire-ohci";
+constexpr const char* kNoStack = "this kernel has no FireWire stack; run modprobe firewire-ohci";
 
 DeviceInfo to_device_info(const FirewireNode& node) {
   return {"iidc-1394", guid_text(node.rom.guid),
@@ -127,14 +127,15 @@ DeviceStatus FirewireBus::reopen() noexcept {
     end_capture();
     ring_.drop_orphans();
     if (!ring_.has_room()) {
-      last_error_ = "images of before it was unplugged are still in use";
+      last_error_ = "images from before it was disconnected are still in use";
       return DeviceStatus::disconnected;
     }
     close_node();
     const std::string mine = info_.serial;
     const DeviceStatus status = open_node(mine);
     if (status != DeviceStatus::ok) {
-      if (last_error_.empty()) last_error_ = "the camera is not on the bus";
+      if (last_error_.empty())
+        last_error_ = "the camera is not on the bus; check its cable and power";
       return status == DeviceStatus::no_permission || status == DeviceStatus::busy
                  ? status
                  : DeviceStatus::disconnected;

@@ -25,10 +25,10 @@ DeviceStatus FirewireRing::set_up(dc1394camera_t* camera, const std::string& dev
   const dc1394error_t result = dc1394_capture_setup(
       camera_, static_cast<std::uint32_t>(shape_.buffers), DC1394_CAPTURE_FLAGS_DEFAULT);
   if (result == DC1394_NO_BANDWIDTH || result == DC1394_NO_ISO_CHANNEL) {
-    *error = "the bus has no room left for its " +
+    *error = "the bus has no bandwidth left for its " +
              std::to_string(bandwidth_units(shape_.packet_bytes, shape_.speed)) +
-             " of 4915 bandwidth units, or no channel: lower the rate or the image size, use S800 "
-             "or a second bus; or another program streams on it";
+             " of 4915 bandwidth units, or no channel; lower the rate or the image size, use S800 "
+             "or a second bus, or end other programs that stream on it";
     return DeviceStatus::no_bandwidth;
   }
   if (result != DC1394_SUCCESS) {
@@ -37,7 +37,7 @@ DeviceStatus FirewireRing::set_up(dc1394camera_t* camera, const std::string& dev
   }
   captured_ = true;
   if (!find_map(device)) {
-    *error = "the capture's memory is not where libdc1394 2.2 puts it";
+    *error = "the capture buffers do not match libdc1394 2.2; install that version";
     end();
     return DeviceStatus::failed;
   }

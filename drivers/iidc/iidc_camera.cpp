@@ -35,7 +35,8 @@ DeviceStatus IidcCamera::configure(const CameraConfiguration& requested,
 DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& requested,
                                             CameraConfiguration* actual) {
   if (queue_.started()) return refused(DeviceStatus::busy, "it is streaming; stop it first");
-  if (queue_.held() != 0) return refused(DeviceStatus::busy, "images of it are still in use");
+  if (queue_.held() != 0)
+    return refused(DeviceStatus::busy, "its images are still in use; release them first");
   drain();
   CameraPlan plan;
   std::string why;
@@ -232,7 +233,7 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
 
 std::string IidcCamera::remark() const {
   if (!configured_ || plan_.info.has(FrameInfoItem::counter)) return {};
-  return "it embeds no counter and no stamp: lost images are noticed by their times only";
+  return "it embeds no counter and no stamp, so lost images are detected by their times only";
 }
 
 // ---- the stream's thread

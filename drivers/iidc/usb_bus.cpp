@@ -150,7 +150,7 @@ FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, con
     who.access = usb_status(error);
     if (who.access == DeviceStatus::no_permission)
       *message = "no permission to open " + node_of(device) +
-                 ": install the udev rules (vergence devices --write-udev) and plug it in again";
+                 "; install the udev rules (vergence devices --write-udev) and reconnect it";
     return found;
   }
   std::array<unsigned char, 64> text{};
@@ -297,13 +297,13 @@ DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
   libusb_free_config_descriptor(config);
   if (interface_ < 0) {
     last_error_ =
-        "it has no bulk endpoint 0x81 for images: not an IIDC camera, or a USB3 Vision one (driver "
-        "gige's library reads those)";
+        "it has no bulk endpoint 0x81 for images, so it is not an IIDC camera (USB3 Vision is not "
+        "supported)";
     return DeviceStatus::failed;
   }
   const int error = libusb_claim_interface(handle, interface_);
   if (error == LIBUSB_SUCCESS) return DeviceStatus::ok;
-  last_error_ = error == LIBUSB_ERROR_BUSY ? "another program has claimed it"
+  last_error_ = error == LIBUSB_ERROR_BUSY ? "another program uses it; end that program"
                                            : libusb_strerror(static_cast<libusb_error>(error));
   return usb_status(error);
 }
@@ -339,7 +339,7 @@ DeviceStatus UsbBus::reopen() noexcept {
     let_go();
     const DeviceStatus status = open_device(mine);
     if (status != DeviceStatus::ok) {
-      if (last_error_.empty()) last_error_ = "the camera is not plugged in";
+      if (last_error_.empty()) last_error_ = "the camera is not connected; check its cable";
       info_.serial = mine;
       return status == DeviceStatus::no_permission || status == DeviceStatus::busy
                  ? status
@@ -383,7 +383,7 @@ DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
     shape_ = shape;
     return DeviceStatus::ok;
   } catch (const std::bad_alloc&) {
-    last_error_ = "there is no memory for its images";
+    last_error_ = "there is not enough memory for its images";
     return DeviceStatus::failed;
   }
 }
@@ -435,12 +435,10 @@ DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
   }
   stop();
   if (error == LIBUSB_ERROR_NO_DEVICE) return DeviceStatus::disconnected;
-  last_error_ =
-      error == LIBUSB_ERROR_OTHER
-          ? "no thread for its stream"
-          : "the kernel takes no more USB memory, or its images are all in use: raise the "
-            "limit, which is 16 MB for all devices, "
-            "with echo 256 > /sys/module/usbcore/parameters/usbfs_memory_mb";
+  last_error_ = error == LIBUSB_ERROR_OTHER
+                    ? "the thread of its stream cannot be started"
+                    : "the kernel's USB memory is exhausted; raise its limit (16 MB for all "
+                      "devices) with echo 256 > /sys/module/usbcore/parameters/usbfs_memory_mb";
   return error == LIBUSB_ERROR_OTHER ? DeviceStatus::failed : DeviceStatus::no_bandwidth;
 }
 

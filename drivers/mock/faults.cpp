@@ -159,7 +159,7 @@ Fault make_fault(const std::string& kind, double at_s,
                  const std::vector<std::pair<std::string, double>>& parameters) {
   const FaultRow& row = find_row(kind);
   if (!(at_s >= 0 && at_s <= kLongest))
-    throw std::invalid_argument(kind + " must be at 0 … 86400 s of the drive");
+    throw std::invalid_argument(kind + " must be at 0 … 86400 s");
   Fault fault;
   fault.kind = row.kind;
   fault.at = Duration::seconds(at_s);

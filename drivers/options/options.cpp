@@ -12,16 +12,16 @@ OptionTable<Options> make_table() {
   using O = Options;
   OptionTable<O> t;
   t.number("packet_size", &O::packet_size, {576, 65000}, "bytes", "computed",
-           "Size of the stream's packets with their headers: the interface's MTU, at most 9000.");
+           "Packet size including headers, at most 9000; default: the MTU of the interface.");
   t.number("packet_delay_us", &O::packet_delay, {0, 10000}, "µs", "computed",
            "Pause after each packet, so that the cameras of one link interleave.");
   t.number("link_mbps", &O::link_mbps, {1, 400000}, "Mbit/s", "the interface's",
-           "Speed of the slowest link that the cameras share, where a switch is in between.");
+           "Speed of the slowest link that the cameras share, if there is a switch.");
   t.number("link_cameras", &O::link_cameras, {1, 16}, "", "all GigE cameras",
            "Cameras that share that link.");
   t.choice<Resend, Resend>(
       "resend", &O::resend, {{"auto", Resend::automatic}, {"on", Resend::on}, {"off", Resend::off}},
-      nullptr, "Asks again for lost packets; auto: if the camera supports it.");
+      nullptr, "Requests lost packets again; auto: if the camera supports it.");
   t.number("socket_buffer_kb", &O::socket_buffer_kb, {64, 500000}, "KiB", "eight frames",
            "Receive buffer of the socket; needs net.core.rmem_max of that size.");
   t.number("buffers", &O::buffers, {4, 48}, "", nullptr, "Frames that may be in use at once.");
@@ -30,10 +30,10 @@ OptionTable<Options> make_table() {
   t.choice<TriggerEdge, TriggerEdge>(
       "trigger_edge", &O::edge,
       {{"rising", TriggerEdge::rising}, {"falling", TriggerEdge::falling}}, nullptr,
-      "Edge of the pulse that begins the exposure.");
+      "Edge of the pulse that starts the exposure.");
   t.choice<bool, bool>("stamp_at", &O::stamp_at_end, {{"start", false}, {"end", true}}, nullptr,
-                       "What the camera's time stamp is of: the exposure's start or its end.");
-  t.on_off("ptp", &O::ptp, nullptr, "The camera's clock follows the network's (IEEE 1588).");
+                       "Instant of the camera's time stamp: start or end of the exposure.");
+  t.on_off("ptp", &O::ptp, nullptr, "The camera's clock is synchronised by PTP (IEEE 1588).");
   t.others("feature.", &O::features, "a value",
            "Any feature of the camera by its own name, set after everything else.");
   return t;
@@ -59,27 +59,29 @@ OptionTable<Options> make_table() {
   t.number("trigger_source", &O::trigger_source, {0, 3}, "", nullptr,
            "Input of the hardware trigger.");
   t.choice<bool, bool>("trigger_edge", &O::trigger_rising, {{"rising", true}, {"falling", false}},
-                       nullptr, "Edge of the pulse that begins the exposure.");
+                       nullptr, "Edge of the pulse that starts the exposure.");
   t.choice<std::optional<unsigned>, unsigned>(
-      "trigger_mode", &O::trigger_mode, {{"0", 0U}, {"14", 14U}}, "14 where the camera has it",
-      "Trigger mode; 14: a pulse is taken while the frame before is read out.");
-  t.number("strobe_pin", &O::strobe_pin, {0, 3}, "", "none", "Output that shows the exposure.");
+      "trigger_mode", &O::trigger_mode, {{"0", 0U}, {"14", 14U}}, "14 if the camera supports it",
+      "Trigger mode; 14: a pulse is accepted during the read-out of the previous frame.");
+  t.number("strobe_pin", &O::strobe_pin, {0, 3}, "", "none",
+           "Output that is active during the exposure.");
   t.choice<bool, bool>("strobe_level", &O::strobe_high, {{"high", true}, {"low", false}}, nullptr,
                        "Level of that output during the exposure.");
   t.number("strobe_delay_us", &O::strobe_delay, {0, kMaxStrobeUs}, "µs", nullptr,
-           "From the exposure's start to the strobe's.");
+           "From the start of the exposure to the start of the strobe.");
   t.number("strobe_duration_us", &O::strobe_duration, {0, kMaxStrobeUs}, "µs", nullptr,
            "Length of the strobe; 0: as long as the exposure.");
   t.on_off("format7", &O::format7, "where needed",
            "on: only regions (Format 7), off: only fixed modes.");
   t.number("packet_bytes", &O::packet_bytes, {4, 16384, 4}, "bytes", "its share of the bus",
-           "Packets of Format 7; smaller ones leave room for others, and take longer.");
+           "Packet size of Format 7; smaller packets leave bandwidth for other cameras and take "
+           "longer.");
   t.choice<std::optional<BusSpeed>, BusSpeed>("speed", &O::speed,
                                               {{"100", BusSpeed::s100},
                                                {"200", BusSpeed::s200},
                                                {"400", BusSpeed::s400},
                                                {"800", BusSpeed::s800}},
-                                              "800 where the camera has it, else 400",
+                                              "800 if the camera supports it, else 400",
                                               "Highest speed on IEEE 1394, in Mbit/s.");
   t.number("buffers", &O::buffers, {4, kMaxBuffers}, "", nullptr,
            "Images; all but four of them can be in use at once.");
@@ -89,7 +91,7 @@ OptionTable<Options> make_table() {
                                             {"middle", StampedInstant::middle},
                                             {"end", StampedInstant::end}},
                                            nullptr,
-                                           "What the camera's stamp is of, in the exposure.");
+                                           "Instant of the camera's stamp within the exposure.");
   return t;
 }
 
@@ -111,22 +113,23 @@ OptionTable<Options> make_table() {
   t.number("readout_us", &O::readout, {0, 1000000}, "µs", "the sensor's own figures, else 0",
            "From the end of the exposure to the last pixel.");
   t.number("thin", &O::thin, {1, 60}, "", nullptr,
-           "The camera runs at so many times the rate, one image in each interval is kept.");
+           "The camera runs at this multiple of the rate; one image per interval is kept.");
   // 32 is the kernel's limit.
   t.number("buffers", &O::buffers, {4, 32}, "", nullptr,
            "Images; all but two of them can be in use at once.");
   t.number("shift", &O::shift, {0, 8}, "bits", "by the format",
-           "Bits below the eight that are kept, of `Y10` to `Y16`.");
+           "Lower bits of `Y10` to `Y16` that are dropped.");
   t.text("subdevice", &O::subdevice, "/dev/v4l-subdevN", "none",
-         "A sensor behind a media controller, whose controls are then used as well.");
+         "Sensor behind a media controller; its controls are also used.");
   t.text("trigger_control", &O::trigger_control, "key of a control, external",
          "the first with \"trigger\"",
-         "Switches the hardware trigger on; external: something outside does.");
+         "Control that enables the hardware trigger; external: it is enabled elsewhere.");
   t.text("trigger_value", &O::trigger_value, "a number, a menu item's key",
-         "external, hardware, on or 1", "What that control is set to.");
+         "external, hardware, on or 1", "Value of that control.");
   t.number("gain_step_db", &O::gain_step_db, {0.001, 20}, "dB", "not known",
            "One step of the gain control.");
-  t.others("control_", &O::controls, "a number, a menu item's key", "Any control by its key.");
+  t.others("control_", &O::controls, "a number, a menu item's key",
+           "Any control by its key (see below).");
   return t;
 }
 

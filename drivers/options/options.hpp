@@ -45,7 +45,8 @@ template <class Options>
   }
   const auto* own = std::get_if<Options>(&given);
   if (own == nullptr) {
-    *error = std::string("these options are of another kind of camera; these are ") + cameras;
+    *error =
+        std::string("these options are for another kind of camera; these cameras are ") + cameras;
     return false;
   }
   if (const OptionRow* row = table.find_impossible(*own); row != nullptr) {

@@ -24,7 +24,7 @@ const char* SyncOptions::validate() const noexcept {
     return "sync.tolerance_ms must be positive and at most half of the frame interval (1000 / "
            "trigger.rate)";
   if (mode == SyncMode::master_strobe && cameras < 2)
-    return "camera 0 triggers the others, but no other camera is configured";
+    return "camera 0 triggers the others, but no other camera is configured; add one";
   for (std::size_t k = 0; verifies_numbers(mode) && k < static_cast<std::size_t>(cameras); ++k) {
     const SyncCameraOptions& c = camera[k];
     if (c.resolution < Duration{} || c.jitter < Duration{})

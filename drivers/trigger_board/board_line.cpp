@@ -87,10 +87,10 @@ std::string BoardLine::received_instead() const {
   const std::string_view received(first_bytes_.data(), first_size_);
   if (received.empty() || frames_received_ > 0) return {};
   if (received.find("\xFA\xFF") != std::string_view::npos)
-    return "it speaks Xbus, as an XSens INS does";
+    return "it sends Xbus messages, like an XSens INS";
   if (received.find("$G") != std::string_view::npos)
-    return "it speaks NMEA 0183, as a GNSS receiver does";
-  return "its bytes are no frames of the trigger protocol";
+    return "it sends NMEA 0183, like a GNSS receiver";
+  return "its bytes are not frames of the trigger protocol";
 }
 
 void PauseRequest::restart() noexcept {

@@ -74,8 +74,8 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   // Another trigger board may be wired differently, which the user has to check.
   if (connected_ && serial != info_.serial)
     return last_error_.refuse(DeviceStatus::not_found,
-                              place().name() + ": another trigger board is there now (" + serial +
-                                  " instead of " + info_.serial + ")");
+                              place().name() + ": another trigger board is connected now (" +
+                                  serial + " instead of " + info_.serial + ")");
   if (!connected_) {
     info_.serial = serial;
     info_.model = "trigger board, firmware " + std::to_string(who.firmware_major) + "." +

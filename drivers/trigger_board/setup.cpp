@@ -43,34 +43,34 @@ DeviceStatus wire_configuration(const TriggerConfiguration& requested, const Opt
   };
 
   if (!(requested.rate_hz >= 0.001 && requested.rate_hz <= kFastest))
-    return bad(format_text("a trigger.rate of %g Hz is none; choose 0.001 to %g", requested.rate_hz,
-                           kFastest));
+    return bad(
+        format_text("trigger.rate is %g Hz; it must be 0.001 to %g", requested.rate_hz, kFastest));
   const auto millihertz = static_cast<std::uint32_t>(std::llround(requested.rate_hz * 1000));
   const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = requested.width.ns() / 1000,
                      dither_us = requested.vary.ns() / 1000;
-  if (width_us < 1) return bad("a pulse needs a width: set trigger.width_us to 1 or more");
+  if (width_us < 1) return bad("trigger.width_us must be 1 or more");
   if (width_us > kWidest)
-    return bad(format_text("a pulse of %lld µs is longer than a second; lower trigger.width_us",
+    return bad(format_text("trigger.width_us is %lld, longer than a second; lower it",
                            static_cast<long long>(width_us)));
   if (dither_us < 0 || dither_us >= period_us)
-    return bad(format_text(
-        "trigger.dither_us is %lld and the period %lld µs; it must lie between 0 and that",
-        static_cast<long long>(dither_us), static_cast<long long>(period_us)));
+    return bad(
+        format_text("trigger.dither_us is %lld; it must be between 0 and the period of %lld µs",
+                    static_cast<long long>(dither_us), static_cast<long long>(period_us)));
   if (width_us >= period_us - dither_us)
     return bad(format_text(
-        "a pulse of %lld µs does not fit into %lld µs from pulse to pulse; lower trigger.width_us",
+        "trigger.width_us is %lld, but the shortest interval is %lld µs; lower it",
         static_cast<long long>(width_us), static_cast<long long>(period_us - dither_us)));
   if (requested.lines == 0)
-    return bad("no line is to be pulsed; name the cameras' lines in trigger.lines");
+    return bad("no line is pulsed; set the cameras' lines in trigger.lines");
   if (beyond(requested.lines, board.lines) || beyond(requested.active_low, board.lines))
     return cannot(
-        format_text("the trigger board has %u lines, numbered from 0; trigger.lines names more",
+        format_text("the trigger board has %u lines, numbered from 0; change trigger.lines",
                     static_cast<unsigned>(board.lines)));
   if (beyond(requested.feedback, board.feedback_inputs) ||
       beyond(requested.feedback_active_low, board.feedback_inputs))
     return cannot(
         format_text("the trigger board has %u inputs for exposure feedback, numbered from 0; "
-                    "trigger.feedback names more",
+                    "change trigger.feedback",
                     static_cast<unsigned>(board.feedback_inputs)));
   if (options.pps != Edge::none && board.has_pps == 0)
     return cannot("the trigger board has no input for PPS; set trigger.pps to none");
@@ -106,7 +106,7 @@ TriggerConfiguration to_configuration(const TriggerConfig& config) noexcept {
 std::string remark_about(const TriggerConfiguration& requested, const TriggerConfig& config) {
   const double rate = static_cast<double>(config.rate_millihertz) / 1000;
   if (std::abs(rate - requested.rate_hz) < 1e-6 * requested.rate_hz) return {};
-  return format_text("it pulses at %.3f Hz: rates are whole thousandths", rate);
+  return format_text("it pulses at %.3f Hz, because its rates are multiples of 0.001 Hz", rate);
 }
 
 namespace {
@@ -126,9 +126,9 @@ int steps(std::uint8_t from, std::uint8_t to) noexcept {
 const char* request_name(std::uint8_t type) noexcept {
   switch (type) {
     case trigger_hello:
-      return "who it is";
+      return "its identity";
     case trigger_config:
-      return "to take its configuration";
+      return "its configuration";
     case trigger_start:
       return "to start";
     case trigger_stop:
@@ -146,16 +146,15 @@ std::string error_text(std::uint8_t code) {
       return "the pulse is not shorter than its period, or has no width; change trigger.width_us "
              "or trigger.dither_us";
     case trigger_error_line:
-      return "it does not have all of these lines and inputs; change trigger.lines, "
-             "trigger.feedback, trigger.pps or trigger.ins";
+      return "it lacks some of these lines and inputs; change trigger.lines, trigger.feedback, "
+             "trigger.pps or trigger.ins";
     case trigger_error_version:
       return format_text(
-          "it does not speak version %d of the trigger protocol, as this program does; flash this "
-          "release's firmware",
+          "it does not support version %d of the trigger protocol; flash this release's firmware",
           static_cast<int>(trigger_protocol_version));
     case trigger_error_unknown_type:
     case trigger_error_wrong_size:
-      return "it does not know the message; flash this release's firmware";
+      return "it does not support the message; flash this release's firmware";
     case trigger_error_not_running:
       return "it makes no pulses";
     case trigger_error_not_stopped:
@@ -163,7 +162,7 @@ std::string error_text(std::uint8_t code) {
     case trigger_error_not_configured:
       return "it has lost its configuration";
     default:
-      return format_text("it gives error %u, which is none of this protocol version",
+      return format_text("it reports error %u, which is unknown in this protocol version",
                          static_cast<unsigned>(code));
   }
 }
@@ -237,7 +236,7 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
       break;
   }
   last_error_ =
-      format_text("the trigger board did not answer when asked %s; check its cable and supply",
+      format_text("the trigger board did not respond (requested: %s); check its cable and supply",
                   request_name(type));
   return DeviceStatus::disconnected;
 }
@@ -252,7 +251,7 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
   if (theirs != trigger_protocol_version) return other_version(theirs);
   if (trigger_get_info(frame_.payload, frame_.size, info)) return DeviceStatus::ok;
   last_error_ = format_text(
-      "the trigger board answered %u bytes, which are no INFO; flash this release's "
+      "the trigger board answered %u bytes, which are not an INFO message; flash this release's "
       "firmware",
       static_cast<unsigned>(frame_.size));
   return DeviceStatus::unsupported;
@@ -285,11 +284,10 @@ DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
       if (baud != 0) break;
     }
   }
-  last_error_ = received.empty() ? std::string(
-                                       "nothing there answers as a trigger board does; check its "
-                                       "cable, supply and firmware")
-                                 : "what is there is no trigger board: " + received +
-                                       "; name the board's port in trigger.port";
+  last_error_ = received.empty()
+                    ? std::string("no trigger board responds; check its cable, supply and firmware")
+                    : "the device is not a trigger board: " + received +
+                          "; set trigger.port to the trigger board's port";
   return DeviceStatus::not_found;
 }
 
@@ -306,7 +304,8 @@ DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> 
     return DeviceStatus::ok;
   }
   last_error_ = format_text(
-      "the trigger board answers when asked %s, and does not do it; switch it off and on",
+      "the trigger board responds, but does not execute the command (requested: %s); switch it off "
+      "and on",
       request_name(type));
   return DeviceStatus::failed;
 }

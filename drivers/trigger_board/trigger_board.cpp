@@ -60,20 +60,20 @@ std::unique_ptr<Device> Driver::find_board(std::string_view serial, DeviceStatus
     if (!serial.empty() && board->info().serial != serial) continue;
     if (chosen != nullptr) {
       last_error_ =
-          "there is more than one trigger board; name one's port or serial number in trigger.port";
+          "several trigger boards are connected; set trigger.port to the port or serial number of "
+          "one";
       *status = DeviceStatus::bad_configuration;
       return nullptr;
     }
     chosen = std::move(board);
   }
   *status = chosen != nullptr ? DeviceStatus::ok : worst_status;
-  last_error_ =
-      chosen != nullptr ? ""
-      : !others.empty() ? others
-      : serial.empty()
-          ? "no trigger board answers on any USB port; plug it in, or name its port in trigger.port"
-          : "no trigger board with serial number " + std::string(serial) +
-                " answers; check trigger.port and its cable";
+  last_error_ = chosen != nullptr ? ""
+                : !others.empty() ? others
+                : serial.empty()
+                    ? "no trigger board responds on any USB port; connect it, or set trigger.port"
+                    : "no trigger board with serial number " + std::string(serial) +
+                          " responds; check trigger.port and its cable";
   return chosen;
 }
 

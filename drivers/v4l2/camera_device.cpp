@@ -192,7 +192,7 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
   if (exchange_.busy()) return DeviceStatus::busy;
   try {
     if (std::string invalid = find_invalid(requested); !invalid.empty())
-      return refuse(DeviceStatus::bad_configuration, invalid + " is no configuration");
+      return refuse(DeviceStatus::bad_configuration, invalid + " is not a valid configuration");
     if (lost_node_)
       if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
     const DeviceStatus status = bring_to(requested, false);
@@ -209,7 +209,7 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
   } catch (const std::exception& e) {
     lost_node_ = true;
     return refuse(DeviceStatus::failed,
-                  std::string("there is no memory for its images: ") + e.what());
+                  std::string("there is not enough memory for its images: ") + e.what());
   }
 }
 
@@ -245,14 +245,15 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool kee
     return s;
   const bool in_place = settings.format.layout == Layout::luma_plane;
   if (keep_slots && !exchange_.slots().fit(in_place, settings.stride))
-    return refuse(DeviceStatus::failed, "the camera came back with images of another layout");
+    return refuse(DeviceStatus::failed,
+                  "the camera reconnected with images of another layout; configure it again");
   CaptureQueue queue(fd_.get(), node_.type);
   std::vector<Mapping> mappings;
   if (const int error = queue.request(static_cast<std::uint32_t>(options.buffers), &mappings);
       error != 0) {
     if (error == ENODEV) return refuse(DeviceStatus::disconnected, {});
     if (error == EBUSY)
-      return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
+      return refuse(DeviceStatus::busy, "another program streams from this camera; end it first");
     return refuse(DeviceStatus::failed,
                   std::string("the kernel gives no buffers: ") + std::strerror(error));
   }
@@ -290,7 +291,7 @@ DeviceStatus V4l2Camera::open_again() {
     return refuse(found, node_.path + ": no permission; add the user to the group video");
   if (found != DeviceStatus::ok)
     return refuse(DeviceStatus::disconnected,
-                  "there is no camera " + node_.found_by + " any more: check its cable");
+                  "there is no camera " + node_.found_by + " any more; check its cable");
   node_ = std::move(node);
   info_.place = node_.path;
   lost_node_ = false;
@@ -346,13 +347,13 @@ DeviceStatus V4l2Camera::start_streaming() {
   if (error == ENODEV) return DeviceStatus::disconnected;
   if (error == ENOSPC)
     return refuse(DeviceStatus::no_bandwidth,
-                  "its bus has no room for another stream: a lower rate, a smaller size, or a port "
-                  "of another USB controller");
+                  "its bus has no bandwidth for another stream; use a lower rate, a smaller size, "
+                  "or a port of another USB controller");
   // EPIPE and ENOLINK mean that links or formats of the sensor's media controller do not match.
   const bool pipeline = error == EPIPE || error == ENOLINK;
   return refuse(DeviceStatus::failed,
-                std::string("it does not begin to stream: ") + std::strerror(error) +
-                    (pipeline ? "; look at the chain behind it with media-ctl -p" : ""));
+                std::string("it does not start to stream: ") + std::strerror(error) +
+                    (pipeline ? "; check the media pipeline with media-ctl -p" : ""));
 }
 
 /// Ends the thread; afterwards only the owner accesses the camera.

@@ -74,7 +74,7 @@ class Applier {
   }
   [[noreturn]] void system(int error, const std::string& what) {
     if (error == EBUSY)
-      refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
+      refuse(DeviceStatus::busy, "another program streams from this camera; end it first");
     refuse(to_status(error), what + " failed: " + std::strerror(error));
   }
   void remark(const std::string& message) {
@@ -127,7 +127,7 @@ class Applier {
       return;
     refuse(DeviceStatus::unsupported,
            "this camera cannot read out a region at " + std::to_string(requested_.offset_x) + ", " +
-               std::to_string(requested_.offset_y) + ": leave offset_x and offset_y at 0");
+               std::to_string(requested_.offset_y) + "; set offset to [0, 0]");
   }
 
   [[nodiscard]] std::vector<std::uint32_t> offered() const {
@@ -160,7 +160,7 @@ class Applier {
       std::string names;
       for (const std::uint32_t f : list) names += (names.empty() ? "" : ", ") + name_of(f);
       refuse(DeviceStatus::unsupported,
-             (requested_.pixel_format.empty() ? "no pixel format that gives grey"
+             (requested_.pixel_format.empty() ? "no pixel format with grey values"
                                               : "no pixel format " + requested_.pixel_format) +
                  "; this camera offers " + (names.empty() ? "none" : names));
     }
@@ -201,12 +201,13 @@ class Applier {
                                             " was requested: name another pixel_format");
     if (field != V4L2_FIELD_NONE && field != V4L2_FIELD_ANY)
       refuse(DeviceStatus::unsupported,
-             "the camera gives interlaced images, of which two halves are of two moments");
+             "the camera sends interlaced images, whose halves are exposed at different times; "
+             "choose another format");
     out_.stride = planes ? f.fmt.pix_mp.plane_fmt[0].bytesperline : f.fmt.pix.bytesperline;
     out_.image_size = planes ? f.fmt.pix_mp.plane_fmt[0].sizeimage : f.fmt.pix.sizeimage;
     out_.format = *chosen;
     if (chosen->layout == Layout::mosaic && (requested_.width < 2 || requested_.height < 2))
-      refuse(DeviceStatus::unsupported, "a mosaic of colours needs at least two rows and columns");
+      refuse(DeviceStatus::unsupported, "a Bayer mosaic needs at least two rows and columns");
     if (options_.shift >= 0 && chosen->layout == Layout::words) out_.format.shift = options_.shift;
     out_.stride = std::max(out_.stride, min_row_bytes(out_.format, requested_.width));
     if (out_.image_size <
@@ -235,13 +236,13 @@ class Applier {
     if (requested_.trigger == CameraTrigger::hardware) return;
     const double camera = out_.camera_rate_hz;
     if (!(camera > 0)) {
-      remark("the camera does not say its rate");
+      remark("the camera does not report its rate");
       return;
     }
     if (options_.thin > 1 && camera >= requested_.rate_hz) return;
     if (std::abs(camera - requested_.rate_hz) > kRateTolerance * requested_.rate_hz)
-      remark("the camera runs at " + number_text(camera) + " Hz where " +
-             number_text(requested_.rate_hz) + " was asked for" +
+      remark("the camera runs at " + number_text(camera) + " Hz instead of " +
+             number_text(requested_.rate_hz) + " requested" +
              (camera > 1.5 * requested_.rate_hz
                   ? "; the option thin reduces the rate to the requested one"
                   : ""));
@@ -271,8 +272,8 @@ class Applier {
     if (const Control* c = controls_.find(V4L2_CID_EXPOSURE); c != nullptr && line_seconds() > 0)
       return set_exposure(*c, line_seconds());
     remark(
-        "the camera has no exposure that can be set in microseconds; exposure_us is taken for what "
-        "it does");
+        "the camera has no exposure control in microseconds; exposure_us is assumed to be its "
+        "exposure");
   }
   /// `unit` is the number of seconds per step of the control.
   void set_exposure(const Control& c, double unit) {
@@ -306,7 +307,7 @@ class Applier {
     if (requested_.gain_db != 0 && options_.gain_step_db <= 0)
       refuse(DeviceStatus::unsupported,
              "how many dB a step of " + c->key + " (" + format_range(*c) +
-                 ") is, the camera does not say: set the option gain_step_db, or control_" +
+                 ") is, the camera does not report; set the option gain_step_db, or control_" +
                  c->key);
     const double step = options_.gain_step_db > 0 ? options_.gain_step_db : 1;
     const std::int64_t value = c->least + std::llround(requested_.gain_db / step);
@@ -322,7 +323,8 @@ class Applier {
 
   void trigger() {
     if (requested_.trigger == CameraTrigger::software)
-      refuse(DeviceStatus::unsupported, "V4L2 has no software trigger: trigger hardware or free");
+      refuse(DeviceStatus::unsupported,
+             "V4L2 has no software trigger; set trigger to hardware or free");
     const bool hardware = requested_.trigger == CameraTrigger::hardware;
     if (options_.trigger_control == "external") return;
     const Control* c = options_.trigger_control.empty() ? controls_.trigger()

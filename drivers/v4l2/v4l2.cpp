@@ -30,8 +30,7 @@ class Driver final : public CameraDriver {
         last_error_ = permission(name);
         break;
       case DeviceStatus::unsupported:
-        last_error_ =
-            name + " is no node that captures and streams; vergence devices lists those that do";
+        last_error_ = name + " does not capture and stream; `vergence devices` lists nodes that do";
         break;
       case DeviceStatus::disconnected:
         *status = DeviceStatus::not_found;

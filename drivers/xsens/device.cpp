@@ -55,8 +55,8 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
     last_error_.clear();
     remark_.clear();
     if (!(rate_hz > 0 && rate_hz <= 2000)) {
-      last_error_ =
-          "a rate of " + std::to_string(rate_hz) + " Hz is none; set ins.rate to 100 or 120";
+      last_error_ = "a rate of " + std::to_string(rate_hz) +
+                    " Hz is not possible; set ins.rate to 100 or 120";
       return DeviceStatus::bad_configuration;
     }
     stop();
@@ -89,11 +89,11 @@ std::string Device::remark_about(double rate_hz) const {
   const auto differs = [](double a, double b) { return std::abs(a - b) > 1e-6 * b; };
   std::string all;
   if (differs(set_.rate_hz(), rate_hz))
-    all = format_text("it measures at %.4g Hz: of its rates the nearest to %.4g", set_.rate_hz(),
-                      rate_hz);
+    all = format_text("it measures at %.4g Hz, the nearest rate to %.4g", set_.rate_hz(), rate_hz);
   if (set_.sync_out_hz > 0 && differs(set_.sync_out_hz, options_.sync_out_hz))
-    all += (all.empty() ? "" : "; ") + format_text("its SyncOut makes %.4g Hz: the nearest to %.4g",
-                                                   set_.sync_out_hz, options_.sync_out_hz);
+    all += (all.empty() ? "" : "; ") +
+           format_text("its SyncOut pulses at %.4g Hz, the nearest rate to %.4g", set_.sync_out_hz,
+                       options_.sync_out_hz);
   return all;
 }
 

@@ -85,16 +85,15 @@ std::string RequestReply::received_instead() const {
   if (received.empty() || messages_ > 0) return {};
   if (received.find("$G") != std::string_view::npos &&
       received.find("\r\n") != std::string_view::npos)
-    return "it speaks NMEA 0183";
-  if (received.find("\xB5\x62") != std::string_view::npos) return "it speaks u-blox's protocol";
-  if (received.find("\xAA\x44\x12") != std::string_view::npos)
-    return "it speaks NovAtel's protocol";
+    return "it sends NMEA 0183";
+  if (received.find("\xB5\x62") != std::string_view::npos) return "it sends UBX (u-blox)";
+  if (received.find("\xAA\x44\x12") != std::string_view::npos) return "it sends NovAtel's protocol";
   if (received.find("snp") != std::string_view::npos)
-    return "it speaks the protocol of a Redshift or CH Robotics sensor";
+    return "it sends the protocol of a Redshift or CH Robotics sensor";
   if (received.find("VNYMR") != std::string_view::npos ||
       received.find("$VN") != std::string_view::npos)
-    return "it speaks VectorNav's protocol";
-  return "its bytes are no Xbus";
+    return "it sends VectorNav's protocol";
+  return "its bytes are not Xbus";
 }
 
 namespace {
@@ -144,21 +143,23 @@ DeviceStatus Setup::find() {
     const DeviceStatus status = probe(bauds[i], kProbe);
     if (status == DeviceStatus::ok || status == DeviceStatus::stopped) return status;
     if (status == DeviceStatus::disconnected) {
-      last_error_ = "the line went dead while the device was looked for; check its cable";
+      last_error_ = "the serial link was lost during the search for the device; check its cable";
       return status;
     }
     const std::string received = dialogue_.received_instead();
     // At a wrong rate any device looks like noise, so a recognised protocol takes precedence.
-    if (!received.empty() && (instead.empty() || instead == "its bytes are no Xbus"))
+    if (!received.empty() && (instead.empty() || instead == "its bytes are not Xbus"))
       instead = received;
     if (dialogue_.messages_received() > 0)
       instead = format_text(
-          "it sends Xbus messages at %u baud, but does not answer: check the line towards it",
+          "it sends Xbus messages at %u baud, but does not respond; check the wire that transmits "
+          "to it",
           bauds[i]);
   }
-  last_error_ = instead.empty()
-                    ? "it is silent at every baud rate; check its power, its cable and the port"
-                    : "no XSens INS answers: " + instead + "; check that ins.port is the INS's";
+  last_error_ =
+      instead.empty()
+          ? "it is silent at every baud rate; check its power, its cable and the port"
+          : "no XSens INS responds: " + instead + "; check that ins.port is the port of the INS";
   return DeviceStatus::not_found;
 }
 
@@ -188,7 +189,8 @@ DeviceStatus Setup::identify(Identity* identity) {
 Identity Setup::identified() {
   write(MessageId::device_id_request, {}, "the question for its id");
   if (reply_.size < 4)
-    refuse(DeviceStatus::unsupported, "its id has fewer than four bytes: no XSens INS");
+    refuse(DeviceStatus::unsupported,
+           "its identifier has fewer than four bytes, so it is not an XSens INS");
   Identity found;
   found.device_id = read_u32(reply_.bytes());
   dialogue_.ask(MessageId::product_code_request, &reply_);
@@ -217,14 +219,14 @@ Identity Setup::identified() {
 
 void Setup::check_load(const LineBudget& b, double rate_hz) {
   if (b.fits()) return;
-  refuse(DeviceStatus::no_bandwidth,
-         format_text(
-             "%.0f Hz need %.0f %% of the line at %u baud, more than the %.0f %% that are safe; ",
-             rate_hz, 100 * b.load, baud_to_be(), 100 * kMaxLineLoad) +
-             (b.baud_needed != 0
-                  ? format_text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
-                                std::floor(b.greatest_rate))
-                  : format_text("set ins.rate to %.0f or less", std::floor(b.greatest_rate))));
+  refuse(
+      DeviceStatus::no_bandwidth,
+      format_text("%.0f Hz need %.0f %% of the serial link at %u baud, and %.0f %% is the limit; ",
+                  rate_hz, 100 * b.load, baud_to_be(), 100 * kMaxLineLoad) +
+          (b.baud_needed != 0
+               ? format_text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
+                             std::floor(b.greatest_rate))
+               : format_text("set ins.rate to %.0f or less", std::floor(b.greatest_rate))));
 }
 
 DeviceStatus Setup::set(const Identity& identity, double rate_hz, StreamSettings* stream) {
@@ -244,21 +246,19 @@ void Setup::set_baud(const Identity& identity) {
   if (options_.baud == 0 || options_.baud == line_.baud()) return;
   const auto code = baud_code(options_.baud, identity.generation);
   if (!code)
-    refuse(DeviceStatus::unsupported,
-           format_text("it has no %u baud; set ins.baud to 115200, 230400, 460800 or 921600",
-                       options_.baud));
+    refuse(
+        DeviceStatus::unsupported,
+        format_text("it does not support %u baud; set ins.baud to 115200, 230400, 460800 or 921600",
+                    options_.baud));
   const std::array<std::uint8_t, 1> payload{*code};
   write(MessageId::baudrate, payload, "the baud rate");
   // Takes effect at the next reset; whether that is still acknowledged is irrelevant.
   dialogue_.ask(MessageId::reset, {}, &reply_, Duration::milliseconds(100));
   const DeviceStatus status = probe(options_.baud, kAfterReset);
   if (status == DeviceStatus::timeout)
-    refuse(
-        DeviceStatus::failed,
-        format_text(
-            "it does not answer at %u baud after it was set to it; check that the converter can do "
-            "that rate",
-            options_.baud));
+    refuse(DeviceStatus::failed, format_text("it does not respond at %u baud after the rate was "
+                                             "set; check that the converter supports it",
+                                             options_.baud));
   if (status != DeviceStatus::ok) throw Refused{status};
 }
 
@@ -288,11 +288,10 @@ constexpr std::uint32_t kLegacySettings =
 void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
   const auto period = period_of_rate(rate_hz);
   if (!period)
-    refuse(DeviceStatus::unsupported, format_text("an MTi-G has no %.6g Hz: its rates divide "
-                                                  "115200 Hz, from 10 to 512, without those that "
-                                                  "its receiver cannot correct; "
-                                                  "set ins.rate to 100 or 120",
-                                                  rate_hz));
+    refuse(DeviceStatus::unsupported,
+           format_text("an MTi-G has no %.6g Hz; its rates divide 115200 Hz (10 to 512, with "
+                       "exceptions); set ins.rate to 100 or 120",
+                       rate_hz));
   // Includes the receiver's own fix if the link has room for it.
   MtdataLayout layout{static_cast<std::uint16_t>(kLegacyMode | kModeGnss), kLegacySettings};
   if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.mode = kLegacyMode;
@@ -303,7 +302,7 @@ void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
   DeviceConfiguration has;
   if (!read_configuration(reply_.bytes(), &has))
     refuse(DeviceStatus::unsupported,
-           "its configuration cannot be read: is more than one device on the bus?");
+           "its configuration cannot be read; check that only one device is on the bus");
   std::array<std::uint8_t, 4> bytes{};
   const auto u16 = [&bytes](std::uint16_t v) {
     return write_u16(bytes, v), std::span<const std::uint8_t>(bytes).first(2);
@@ -319,10 +318,10 @@ void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
   write(MessageId::data_length_request, {}, "the question for its message's length");
   if (reply_.size != 2 || read_u16(reply_.bytes()) != layout.payload_size())
     refuse(DeviceStatus::unsupported,
-           format_text(
-               "its messages have %u bytes where its settings mean %zu: this firmware is not known",
-               reply_.size == 2 ? unsigned{read_u16(reply_.bytes())} : 0U,
-               layout.payload_size().value_or(0)));
+           format_text("its messages have %u bytes, but its settings imply %zu; this firmware is "
+                       "not supported",
+                       reply_.size == 2 ? unsigned{read_u16(reply_.bytes())} : 0U,
+                       layout.payload_size().value_or(0)));
   stream->layout = layout;
   stream->period_numerator = *period;
   stream->period_denominator = kPeriodClock;
@@ -427,7 +426,7 @@ void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
   });
   if (applied_hz == 0 || applied_hz == kEveryMessage || !clocked || !placed)
     refuse(DeviceStatus::unsupported,
-           "it does not give position and attitude together with its clock: this is no MTi-G");
+           "it does not send position and attitude with its clock, so it is not an MTi-G");
   stream->outputs = has;
   stream->period_numerator = 1;
   stream->period_denominator = applied_hz;
@@ -440,7 +439,7 @@ void Setup::set_mark4_lines(StreamSettings* stream) {
   SyncSettings has;
   if (!read_sync_settings(reply_.bytes(), &has))
     refuse(DeviceStatus::unsupported,
-           "its synchronisation settings cannot be read: this firmware is not known");
+           "its synchronisation settings cannot be read; this firmware is not supported");
   // The list replaces only its own entries; others, such as the receiver's clock, remain.
   SyncSettings requested;
   for (const SyncEntry& e : has.items())

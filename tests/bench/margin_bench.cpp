@@ -9,7 +9,6 @@
 // kFaultFrames of the fault is the nearest to a miss. A decision ends what is measured, so a
 // sequential test hardly exceeds 1 there: its margin is the number of frames, which is printed,
 // too.
-#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -23,6 +22,7 @@
 #include "app/session/drive_calibration.hpp"
 #include "core/estimator/estimator.hpp"
 #include "tests/bench/integrity_variants.hpp"
+#include "tests/support/quantile.hpp"
 #include "tests/support/recorded_sequence.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -30,6 +30,7 @@ namespace vergence::bench {
 namespace {
 
 using app::StartingCalibration;
+using test::quantile;
 using test::RecordedSequence;
 
 // Frames after a fault within which it must be decided on.
@@ -146,13 +147,6 @@ void add(const Run& r, const Case& of, std::size_t frames, const std::string& na
     if ((of.must_not & bit(static_cast<Decision>(d))) != 0)
       add_quiet(r[d], frames, name, &(*all)[d]);
   add_fault(r, of, frames, name, all);
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
 }
 
 void run_drive(const RecordedSequence& drive, const app::Configuration& c,

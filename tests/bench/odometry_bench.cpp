@@ -28,11 +28,13 @@
 #include "app/runtime/version.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
+#include "tests/support/quantile.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace {
 
 using namespace vergence;
+using test::quantile;
 
 struct Excerpt {
   const char* name;
@@ -74,13 +76,6 @@ struct Measured {
   double mean_ms = 0, p50_ms = 0, p99_ms = 0, max_ms = 0, online_mean_ms = 0, decode_ms = 0;
   std::array<double, kStages> stage_ms{};
 };
-
-double quantile(std::vector<float> values, double q) {
-  if (values.empty()) return 0;
-  const auto i = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(i), values.end());
-  return values[i];
-}
 
 double mean(const std::vector<float>& values) {
   double sum = 0;

@@ -55,11 +55,6 @@ StereoSequence part(const StereoSequence& s, std::size_t first, std::size_t coun
   return out;
 }
 
-DriveOutcome drive(const RecordedSequence& d, const StereoSequence& s, const app::Configuration& c,
-                   const StartingCalibration& begin) {
-  return test::drive_recorded(d, s, c, begin);
-}
-
 StartingCalibration given(const app::Configuration& c, const StereoSequence& s) {
   return app::replayed_calibration(c, s, false);
 }
@@ -99,8 +94,8 @@ double share_kept_ok(const DriveOutcome& online, const DriveOutcome& off) {
 }
 
 void whole(const Bench& b, const RecordedSequence& d) {
-  const DriveOutcome off = drive(d, d.sequence, b.off, given(b.off, d.sequence));
-  const DriveOutcome online = drive(d, d.sequence, b.online, given(b.online, d.sequence));
+  const DriveOutcome off = drive_recorded(d, d.sequence, b.off, given(b.off, d.sequence));
+  const DriveOutcome online = drive_recorded(d, d.sequence, b.online, given(b.online, d.sequence));
   for (const DriveOutcome* r : {&off, &online}) {
     const auto moving =
         std::count_if(r->samples.begin(), r->samples.end(),
@@ -124,7 +119,7 @@ bool cold_starts(const Bench& b, const RecordedSequence& d) {
   std::string failed;
   for (std::size_t first = 0; first + kFrames <= d.sequence.pairs.size(); first += kStep) {
     const StereoSequence s = part(d.sequence, first, kFrames);
-    const DriveOutcome r = drive(d, s, b.off, given(b.off, s));
+    const DriveOutcome r = drive_recorded(d, s, b.off, given(b.off, s));
     ++starts;
     bool any = false;
     for (std::size_t i = 0; i < std::min<std::size_t>(3, r.samples.size()); ++i)
@@ -160,24 +155,25 @@ void windows(const Bench& b, const RecordedSequence& d) {
   if (found.rig) own.file.rig = *found.rig;
   for (std::size_t first = 0; first + kMin <= d.sequence.pairs.size(); first += kStep) {
     const StereoSequence s = part(d.sequence, first, kFrames);
-    const DriveOutcome off = drive(d, s, b.off, initial);
+    const DriveOutcome off = drive_recorded(d, s, b.off, initial);
     window_row(d.name, first, "off", off, off, false);
-    window_row(d.name, first, "given", drive(d, s, b.online, initial), off, false);
-    if (found.rig) window_row(d.name, first, "found", drive(d, s, b.online, own), off, false);
-    window_row(d.name, first, "from scratch", drive(d, s, b.online, test::blank(initial)), off,
-               true);
+    window_row(d.name, first, "given", drive_recorded(d, s, b.online, initial), off, false);
+    if (found.rig)
+      window_row(d.name, first, "found", drive_recorded(d, s, b.online, own), off, false);
+    window_row(d.name, first, "from scratch", drive_recorded(d, s, b.online, test::blank(initial)),
+               off, true);
   }
 }
 
 void variants(const Bench& b, const RecordedSequence& d, std::span<const IntegrityVariant> all) {
-  const DriveOutcome untouched = drive(d, d.sequence, b.off, given(b.off, d.sequence));
+  const DriveOutcome untouched = drive_recorded(d, d.sequence, b.off, given(b.off, d.sequence));
   row(fmt::format("| {} | untouched | {} | {} | | | |", d.name, posed(untouched), untouched.ok));
   for (const IntegrityVariant& v : all) {
     if (v.name.find(b.variant) == std::string_view::npos) continue;
     const test::TemporaryFolder folder;
     const StereoSequence s = spoil(d, v, folder.path());
-    const DriveOutcome off = drive(d, s, b.off, given(b.off, s));
-    const DriveOutcome online = drive(d, s, b.online, given(b.online, s));
+    const DriveOutcome off = drive_recorded(d, s, b.off, given(b.off, s));
+    const DriveOutcome online = drive_recorded(d, s, b.online, given(b.online, s));
     row(fmt::format("| {} | {} | {} | {} | {} | {} | {} |", d.name, v.name, posed(off), off.ok,
                     posed(online), online.ok, online.knocks));
   }
@@ -258,7 +254,7 @@ PlanarFit fit_planar(const DriveOutcome& r, std::size_t first, std::size_t last)
 void planar(const Bench& b, const RecordedSequence& d) {
   for (const bool online : {false, true}) {
     const app::Configuration& c = online ? b.online : b.off;
-    const DriveOutcome r = drive(d, d.sequence, c, given(c, d.sequence));
+    const DriveOutcome r = drive_recorded(d, d.sequence, c, given(c, d.sequence));
     const PlanarFit sunny = fit_planar(r, 0, 329), dim = fit_planar(r, 329, 428);
     row(fmt::format("| {} | {} | {} | {} | {} | {:.0f} | {:.3f} | {} | {:.0f} | {:.3f} | {} |",
                     online ? "online" : "off", r.samples.size(), posed(r), r.ok, sunny.poses,

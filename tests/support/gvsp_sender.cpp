@@ -114,7 +114,6 @@ void GvspSender::packet(const Record& record, std::uint32_t id, bool again) {
 
 void GvspSender::send(GvspFrame frame, Fate fate) {
   std::unique_lock lock(mutex_);
-  const std::uint64_t number = frame.number;
   Record& record = history_[frames_++ % kHistory];
   record.frame = std::move(frame);
   record.data_bytes = packet_size_ - (extended_ ? 48U : 36U);
@@ -122,7 +121,7 @@ void GvspSender::send(GvspFrame frame, Fate fate) {
                                               record.data_bytes) +
                    2;
   record.account = accounts_.size();
-  accounts_.push_back({number, std::vector<bool>(record.packets, false), fate == Fate::incomplete,
+  accounts_.push_back({std::vector<bool>(record.packets, false), fate == Fate::incomplete,
                        1 + (record.packets - 2) / 2});
   if (fate == Fate::unsent) {
     record.packets = 0;
@@ -176,14 +175,6 @@ void GvspSender::add_to(GigeCameraReport* r) const {
   r->dropped += dropped_;
   r->asked += asked_;
   r->resent += resent_;
-}
-
-std::vector<std::uint64_t> GvspSender::whole() const {
-  const std::lock_guard lock(mutex_);
-  std::vector<std::uint64_t> numbers;
-  for (const Account& a : accounts_)
-    if (std::find(a.went.begin(), a.went.end(), false) == a.went.end()) numbers.push_back(a.number);
-  return numbers;
 }
 
 }  // namespace vergence::test

@@ -82,7 +82,6 @@ class GvspSender {
   void set_loss(double share);
 
   void add_to(GigeCameraReport* report) const;
-  [[nodiscard]] std::vector<std::uint64_t> whole() const;
 
  private:
   /// Frames that can be asked for again.
@@ -94,8 +93,6 @@ class GvspSender {
     std::size_t account = 0;
   };
   struct Account {
-    /// Number of the image.
-    std::uint64_t number = 0;
     /// By packet.
     std::vector<bool> went;
     /// Incomplete on purpose: packet `hole` is not sent again either.

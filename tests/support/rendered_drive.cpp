@@ -4,6 +4,7 @@
 
 #include "core/camera/camera.hpp"
 #include "drivers/mock/rig_truth.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::test {
 namespace {
@@ -19,18 +20,11 @@ std::shared_ptr<const mock::World> world() {
 
 RigCalibration paper_rig() {
   RigCalibration rig{.cameras = 2};
-  const std::array<std::array<double, 4>, 2> k = {
-      {{1246.561673900704, 1247.092336797580, 532.287936343425, 383.604069688392},
-       {1244.805048771648, 1245.815687282771, 506.635543659909, 390.704813552426}}};
-  for (std::size_t i = 0; i < 2; ++i) {
-    Intrinsics& c = rig.intrinsics[i];
-    c.width = 1024;
-    c.height = 768;
-    c.fx = k[i][0];
-    c.fy = k[i][1];
-    c.cx = k[i][2];
-    c.cy = k[i][3];
-  }
+  constexpr auto kModel = CameraModelKind::pinhole_radtan;
+  rig.intrinsics[0] = {
+      kModel, 1024, 768, 1246.561673900704, 1247.092336797580, 532.287936343425, 383.604069688392};
+  rig.intrinsics[1] = {
+      kModel, 1024, 768, 1244.805048771648, 1245.815687282771, 506.635543659909, 390.704813552426};
   Transform& T = rig.T_camera_left[1];
   T.R << 0.999985020769994, 0.001356661749366, -0.005302612991045, -0.001329315763428,
       0.999985817981778, 0.005157204176297, 0.005309534370930, -0.005150078078314,
@@ -41,18 +35,9 @@ RigCalibration paper_rig() {
 }
 
 RigCalibration nominal_rig() {
-  RigCalibration rig{.cameras = 2, .baseline = 0.75};
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& lens = rig.intrinsics[k];
-    lens.width = 640;
-    lens.height = 480;
-    lens.fx = lens.fy = 0.72 * lens.width;
-    lens.cx = 0.5 * (lens.width - 1);
-    lens.cy = 0.5 * (lens.height - 1);
-    lens.distortion = {-0.08, 0.02, 0, 0, 0};
-    rig.T_camera_left[k].t = {-rig.baseline * static_cast<double>(k), 0, 0};
-  }
-  return rig;
+  Intrinsics lens = pinhole(640, 480, 0.72 * 640);
+  lens.distortion = {-0.08, 0.02, 0, 0, 0};
+  return parallel_rig(lens, 0.75);
 }
 
 struct RenderedDrive::Parts {

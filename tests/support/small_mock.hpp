@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "drivers/mock/mock_rig.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::test {
 
@@ -21,21 +22,12 @@ namespace vergence::test {
 [[nodiscard]] inline std::shared_ptr<const mock::RigTruth> small_truth(
     const std::vector<std::string>& faults = {}, int cameras = 2,
     mock::DriveKind kind = mock::DriveKind::brief) {
-  RigCalibration calibration{.cameras = cameras};
-  for (Intrinsics& lens : calibration.intrinsics) {
-    lens.width = 64;
-    lens.height = 48;
-    lens.fx = lens.fy = 50;
-    lens.cx = 31.5;
-    lens.cy = 23.5;
-  }
-  calibration.T_camera_left[1].t = {-0.75, 0, 0};
   std::vector<mock::Fault> parsed;
   for (const std::string& f : faults) parsed.push_back(mock::parse_fault(f));
   mock::DriveOptions drive{.kind = kind};
-  return std::make_shared<const mock::RigTruth>(empty_town(), drive, calibration,
-                                                mock::default_T_body_left(), Transform{},
-                                                std::move(parsed));
+  return std::make_shared<const mock::RigTruth>(
+      empty_town(), drive, parallel_rig(pinhole(64, 48, 50), 0.75, cameras),
+      mock::default_T_body_left(), Transform{}, std::move(parsed));
 }
 
 /// Configuration of its cameras: triggered, 8 ms.

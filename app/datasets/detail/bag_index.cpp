@@ -56,16 +56,17 @@ std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
   std::error_code error;
   if (!fs::is_directory(bag, error)) {
     if (!fs::exists(bag, error))
-      refuse(bag, 0, "does not exist; a " + ending + " file or a folder with some is expected");
+      refuse(bag, 0,
+             "does not exist; a " + ending + " file or a directory with such files is expected");
     return {bag};
   }
   std::vector<fs::path> files;
   for (fs::directory_iterator it(bag, error), end; !error && it != end; it.increment(error))
     if (bag_format(it->path()) == container.sequence) files.push_back(it->path());
-  if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "): check its permissions");
+  if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "); check its permissions");
   if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
   if (files.size() > kMaxFiles)
-    refuse(bag, 0, "holds {} {} files; at most {} are read", files.size(), ending, kMaxFiles);
+    refuse(bag, 0, "holds {} {} files; at most {} are supported", files.size(), ending, kMaxFiles);
   // Recorders count without leading zeros: drive_2.mcap precedes drive_10.mcap.
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return in_name_order(a.filename().string(), b.filename().string());
@@ -142,7 +143,7 @@ class Indexer {
         image && !topic.images.empty() && image->size != topic.images.front().image.size;
     if (image && !other_size) {
       if (++images_ > kMaxImages)
-        refuse(path_, 0, "brings more than {} images; cut the bag", kMaxImages);
+        refuse(path_, 0, "has more than {} images; split the bag", kMaxImages);
       topic.images.push_back(
           {*image, message.log_time, message.place, static_cast<std::uint32_t>(file_)});
       return;
@@ -158,9 +159,9 @@ class Indexer {
     constexpr std::array<std::uint8_t, 4> kZstd{0x28, 0xB5, 0x2F, 0xFD};
     if (head.size() >= kZstd.size() && std::equal(kZstd.begin(), kZstd.end(), head.begin()))
       refuse(path_, 0,
-             "has messages that are compressed one by one (compression_mode: MESSAGE), which is "
-             "not read: unpack them with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml has "
-             "`output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
+             "has individually compressed messages (compression_mode: MESSAGE), which are not "
+             "supported; unpack them with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml "
+             "has `output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
   }
 
   void read_info(const BagMessage& message) {
@@ -181,8 +182,8 @@ class Indexer {
     constexpr bool kAttitude = std::is_same_v<Reading, RosAttitude>;
     constexpr std::size_t kMax = kAttitude ? kMaxAttitudes : kMaxReadings;
     if (++(kAttitude ? attitudes_ : readings_) > kMax)
-      refuse(path_, 0, "brings more than {} {}; cut the bag", kMax,
-             kAttitude ? "orientations" : "readings of an INS");
+      refuse(path_, 0, "has more than {} {}; split the bag", kMax,
+             kAttitude ? "orientations" : "INS samples");
     topic->readings.push_back(*reading);
   }
 

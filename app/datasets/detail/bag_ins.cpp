@@ -28,10 +28,9 @@ template <typename Reading>
 void remark_left_out(const std::string& name, const ReadingTopic<Reading>& topic,
                      std::vector<std::string>* remarks) {
   if (topic.unreadable + topic.backwards == 0) return;
-  remarks->push_back(
-      fmt::format("{}: left out were {} messages without numbers that can be used and {} whose "
-                  "stamps do not go forward",
-                  name, topic.unreadable, topic.backwards));
+  remarks->push_back(fmt::format(
+      "{}: skipped are {} messages without usable numbers and {} whose stamps do not increase",
+      name, topic.unreadable, topic.backwards));
 }
 
 Eigen::Quaterniond to_quaternion(const RosAttitude& a) {
@@ -86,7 +85,7 @@ void remark_without_fix(const std::string& name, RecordedIns* ins) {
       });
   if (without > 0)
     ins->remarks.push_back(
-        fmt::format("{}: {} of {} readings have no fix: nothing is compared there", name, without,
+        fmt::format("{}: {} of {} samples have no fix: poses are not compared there", name, without,
                     ins->readings.size()));
 }
 
@@ -102,20 +101,19 @@ RecordedIns combine(const std::string& name, const std::vector<RosFix>& fixes,
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
   remark_without_fix(name, &ins);
   if (without > 0)
-    ins.remarks.push_back(
-        fmt::format("{}: {} fixes have no orientation of {} within {} ms around them: nothing is "
-                    "compared there",
-                    name, without, imu, kMaxGap.ns() / 1'000'000));
+    ins.remarks.push_back(fmt::format(
+        "{}: {} fixes have no orientation of {} within {} ms: poses are not compared there", name,
+        without, imu, kMaxGap.ns() / 1'000'000));
   return ins;
 }
 
 void require(const std::filesystem::path& path, const BagIndex& bag, const std::string& option,
              const std::string& requested, const std::vector<std::string>& there) {
   if (requested.empty() || std::find(there.begin(), there.end(), requested) != there.end()) return;
-  refuse(path, 0,
-         "has no reading on {} that can be used as {} says; of NavSatFix are {}, of Imu with an "
-         "orientation {}",
-         requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes)));
+  refuse(
+      path, 0,
+      "has no usable sample on {} for {}; NavSatFix topics: {}; Imu topics with an orientation: {}",
+      requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes)));
 }
 
 }  // namespace
@@ -136,12 +134,12 @@ RecordedIns bag_ins(const std::filesystem::path& path, const BagIndex& bag,
     remark_left_out(imu, bag.attitudes.at(imu), &ins.remarks);
   } else if (!fix.empty() && imus.empty()) {
     ins.remarks.push_back("the NavSatFix of " + fix +
-                          " has no matching Imu orientation: nothing can be compared");
+                          " has no matching Imu orientation: poses are not compared");
   } else {
-    ins.remarks.push_back(
-        fmt::format("several topics could be the INS, nothing is compared; choose with --ins-topic "
-                    "and --imu-topic; topics of NavSatFix: {}; of Imu with an orientation: {}",
-                    joined(fixes), joined(imus)));
+    ins.remarks.push_back(fmt::format(
+        "several topics could be the INS, so poses are not compared; choose with --ins-topic and "
+        "--imu-topic; NavSatFix topics: {}; Imu topics with an orientation: {}",
+        joined(fixes), joined(imus)));
   }
   if (!fix.empty()) remark_left_out(fix, bag.fixes.at(fix), &ins.remarks);
   return ins;

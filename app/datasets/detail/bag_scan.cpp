@@ -32,15 +32,15 @@ void BagScan::broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std:
 void BagScan::remark(const std::string& name, std::vector<std::string>* remarks) const {
   if (!finished)
     remarks->push_back(fmt::format(
-        "{} is incomplete: it was read up to offset {}, the end of its last complete record", name,
+        "{} is incomplete: it is read up to offset {}, the end of its last complete record", name,
         end));
   if (first_broken)
     remarks->push_back(
-        fmt::format("{}: {} chunks and {} records were left out; the first at offset {} is {}",
-                    name, broken_chunks, broken_records, *first_broken, why_broken));
+        fmt::format("{}: {} chunks and {} records are skipped; the first at offset {} is {}", name,
+                    broken_chunks, broken_records, *first_broken, why_broken));
   if (orphans > 0)
     remarks->push_back(
-        fmt::format("{}: {} messages of no described channel were left out", name, orphans));
+        fmt::format("{}: {} messages of unknown channels are skipped", name, orphans));
 }
 
 std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file, const BagVisitor& each) {

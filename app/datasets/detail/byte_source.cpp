@@ -43,7 +43,7 @@ FileBytes::FileBytes(const std::filesystem::path& file) : path_(file), number_(n
   if (fd < 0) refuse(file, 0, std::string("cannot be opened: ") + std::strerror(errno));
   struct stat about {};
   if (::fstat(fd, &about) != 0 || !S_ISREG(about.st_mode))
-    refuse(file, 0, "is no regular file; a bag is expected");
+    refuse(file, 0, "is not a regular file; pass a bag");
   size_ = static_cast<std::uint64_t>(about.st_size);
 }
 

@@ -110,7 +110,7 @@ std::string pairing_warning(const std::string& left, const std::string& right,
                             const PairOffset& offset, Duration interval) {
   return fmt::format(
       "the stamps of {} and {} differ by {} at an interval of {:.3g} ms: if the cameras do not "
-      "expose together, poses suffer in turns; if they do, one of the stamps is wrong",
+      "expose together, poses are less accurate in turns; if they do, correct the stamps of one",
       left, right, describe(offset), 1e3 * interval.to_seconds());
 }
 

@@ -157,7 +157,7 @@ class RosbagScanner final : RecordScanner<Record> {
     if (record.size == 0 && record.header.size.value_or(0) == 0) return;
     const Chunk chunk = to_chunk(record);
     if (!chunk.compression.empty() && !record.header.size)
-      return scan_.broken(&BagScan::broken_chunks, here, "a chunk that does not say its size");
+      return scan_.broken(&BagScan::broken_chunks, here, "a chunk without its size");
     RecordScanner::read_chunk(chunk, here);
   }
 

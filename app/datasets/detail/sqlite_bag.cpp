@@ -69,7 +69,7 @@ void SqliteBag::Close::operator()(sqlite3_blob* blob) const noexcept { sqlite3_b
 SqliteBag::SqliteBag(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored))
-    refuse(file, 0, "is no regular file; a bag is expected");
+    refuse(file, 0, "is not a regular file; pass a bag");
   sqlite3* database = nullptr;
   const int status = sqlite3_open_v2(to_uri(file).c_str(), &database,
                                      SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
@@ -152,7 +152,7 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
     } else if (row <= 0 || row >= kMaxRow || size > static_cast<std::int64_t>(kMaxChunk) ||
                messages.text(4) != "blob") {
       scan.broken(&BagScan::broken_records, 0,
-                  "a row that is no message, or one longer than 64 MiB");
+                  "a row that is not a message, or is longer than 64 MiB");
     } else {
       ++scan.messages;
       each({&channel->second,
@@ -165,7 +165,7 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
   scan.finished = true;
   if (status != SQLITE_DONE)
     scan.broken(&BagScan::broken_records, 0,
-                std::string("where SQLite says: ") + sqlite3_errstr(status));
+                std::string("where SQLite reports: ") + sqlite3_errstr(status));
   return scan;
 }
 

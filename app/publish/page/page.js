@@ -7,7 +7,7 @@ const number = (v, digits) => v === null || v === undefined ? "–" : Number(v).
 const colour = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 
 const STATES = {initialising: "starting", parallel_monocular: "uncalibrated, cameras tracked independently", calibrating: "calibrating",
-                stereo_odometry: "stereo odometry", recalibrating: "calibrating anew", lost: "lost"};
+                stereo_odometry: "stereo odometry", recalibrating: "recalibrating", lost: "lost"};
 const token = () => location.hash.slice(1).replace(/[^\w-]/g, "");
 const CAUSES = {given: "supplied", state_file: "from the last run", whole_drive: "from the whole sequence", knock: "recalibrated after a knock",
                 collapse: "recalibrated after a hard knock", drift: "recalibrated after a drift"};
@@ -138,7 +138,7 @@ function drawMap() {
   g.clearRect(0, 0, canvas.width, canvas.height);
   const ours = drive.trail.map(onEarth), theirs = drive.enu_alignment ? drive.trail.filter(p => p.length > 4).map(p => [p[4], p[5]]) : [];
   if (drive.now && drive.now.position_m) ours.push(onEarth(drive.now.position_m));  // steps of the trail are long after a long drive
-  show("map_words", drive.enu_alignment ? "north is up" : "the first viewing direction points up; the INS appears after the ENU alignment");
+  show("map_words", drive.enu_alignment ? "View from above, north up; the bar is the scale." : "View from above, the first viewing direction up; the bar is the scale. The INS appears after the ENU alignment.");
   if (!ours.length) return;
   let [l, b, r, t] = [Infinity, Infinity, -Infinity, -Infinity];
   for (const [x, y] of ours.concat(theirs)) { l = Math.min(l, x); r = Math.max(r, x); b = Math.min(b, y); t = Math.max(t, y); }

@@ -11,8 +11,6 @@ namespace {
 // Initial inflation by errors correlated along tracks, as a multiple of the first frame's spread,
 // and the number of frames by which it is weighted.
 constexpr double kFirstLife = 6.5, kGuessFrames = 30;
-// Rate of the fast running mean, per frame; the slow one averages over the longest window.
-constexpr double kFastUpdate = 1.0 / 10;
 // Minimum of the inflation; below, stated sigmas are far too large.
 constexpr double kMinInflation = 0.3;
 // Limit of one frame's spread in units of the running mean; without it a single frame could

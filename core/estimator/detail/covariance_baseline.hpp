@@ -24,17 +24,15 @@ class CovarianceBaseline {
   /// Returns true if the motion is significant against the baseline's sigma. Residuals are smaller
   /// at standstill, so such motions must not enter the baseline.
   [[nodiscard]] bool measurable(double step_m, double sigma_m) const noexcept {
-    // Minimum length of a motion, in sigmas.
-    constexpr double kMoves = 2;
-    return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
+    return step_m > kCertainSigmas * (known() ? median() : sigma_m);
   }
   /// Adds a motion. Returns true if it is unusually uncertain; it does not enter the baseline then.
   [[nodiscard]] bool update(double sigma_m) noexcept {
     recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
-    ratio_ = kept_ >= kMin ? sigma_m / median() : 0;
+    ratio_ = known() ? sigma_m / median() : 0;
     const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
-    unusual_ =
-        ratio_ > kMaxRatio || (unusual_ && std::sqrt(squares / kRecent) > kMaxRatio * median());
+    unusual_ = ratio_ > kUnusualRatio ||
+               (unusual_ && std::sqrt(squares / kRecent) > kUnusualRatio * median());
     if (unusual_) return true;
     sigma_[next_] = sigma_m;
     next_ = (next_ + 1) % kKept;
@@ -43,12 +41,14 @@ class CovarianceBaseline {
   }
 
   /// Sigma of the last motion over the limit of a usual one; 0 while there are too few motions.
-  [[nodiscard]] double margin() const noexcept { return ratio_ / kMaxRatio; }
+  [[nodiscard]] double margin() const noexcept { return ratio_ / kUnusualRatio; }
 
  private:
-  // Numbers of motions in the baseline, before it is used, and in the test for the end.
-  static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 3;
-  static constexpr double kMaxRatio = 3;
+  // Numbers of motions in the baseline and in the test for the end.
+  static constexpr std::size_t kKept = 61, kRecent = 3;
+
+  // A quarter of the motions determines the median well enough.
+  [[nodiscard]] bool known() const noexcept { return kept_ >= kKept / 4; }
 
   [[nodiscard]] double median() const noexcept {
     std::array<double, kKept> sorted = sigma_;

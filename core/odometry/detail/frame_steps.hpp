@@ -6,14 +6,6 @@
 /// Helpers shared by the sources of Odometry.
 namespace vergence::odometry {
 
-/// Minimum number of near points that constrain the scale.
-inline constexpr int kNearEnough = 10;
-/// Minimum share of found points that agree with the pose; below it something else moves.
-inline constexpr double kRigidShare = 0.4;
-
-/// Maximum number of consecutive frames for which a point may be hidden, or all of them lost.
-inline constexpr int kMissesAllowed = 2;
-
 /// Problem of a frame's images; `none` if there is none.
 inline Reason weakness(const ImageCheck& images, int cameras) noexcept {
   const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(cameras)) - 1U);

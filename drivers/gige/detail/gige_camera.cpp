@@ -60,11 +60,12 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   try {
     if (queue_.state() != FrameQueue::State::stopped)
-      return last_error_.refuse(DeviceStatus::busy, "the camera streams; stop it first");
+      return last_error_.refuse(DeviceStatus::busy, "the camera is streaming; stop it first");
     if (queue_.held() != 0)
       return last_error_.refuse(DeviceStatus::busy, "images are still in use; release them first");
     if (const std::string invalid = find_invalid(requested); !invalid.empty())
-      return last_error_.refuse(DeviceStatus::bad_configuration, invalid + " is no configuration");
+      return last_error_.refuse(DeviceStatus::bad_configuration,
+                                invalid + " is not a valid configuration");
     Options options;
     if (std::string why;
         !parse_options(requested.options, option_table(), "GigE cameras", &options, &why))
@@ -132,8 +133,9 @@ DeviceStatus GigeCamera::apply_again() {
   if (const DeviceStatus s = session_->apply(requested_, options_, &again); s != DeviceStatus::ok)
     return last_error_.refuse(s, session_->last_error());
   if (again.payload != applied_.payload || again.format != applied_.format)
-    return last_error_.refuse(DeviceStatus::disconnected,
-                              "the camera came back with frames of another size");
+    return last_error_.refuse(
+        DeviceStatus::disconnected,
+        "the camera reconnected with frames of another size; configure it again");
   applied_ = std::move(again);
   in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
   stale_ = false;
@@ -204,9 +206,9 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
     if (const DeviceStatus s = queue_.standing(); s != DeviceStatus::ok) return s;
     if (requested.exposure <= Duration{} ||
         requested.exposure.to_seconds() * requested_.rate_hz > 1)
-      return last_error_.refuse(
-          DeviceStatus::bad_configuration,
-          "the exposure must be positive, and shorter than the time between two images");
+      return last_error_.refuse(DeviceStatus::bad_configuration,
+                                "the exposure must be positive and shorter than the time between "
+                                "two images; change exposure_us");
     const std::lock_guard lock(device_);
     if (session_ == nullptr || queue_.standing() != DeviceStatus::ok)
       return queue_.standing() == DeviceStatus::stopped ? DeviceStatus::stopped
@@ -295,14 +297,14 @@ void GigeCamera::supervise(Watch* watch) {
 }
 
 GigeCamera::Fault GigeCamera::check(HostStamp at, HostStamp* asked) {
-  static const Fault kSilent{"the camera does not answer any more", false};
+  static const Fault kSilent{"the camera no longer responds; check cable and power", false};
   if (receiver_.wrong_sizes() >= kWrongSizes)
     return {"the camera sends " +
             (receiver_.wrong_width() > 0
                  ? size_text(receiver_.wrong_width(), receiver_.wrong_height())
                  : "images without their size") +
             " where " + size_text(requested_.width, requested_.height) +
-            " was configured; power it off and on"};
+            " was configured; switch it off and on"};
   const std::lock_guard lock(device_);
   if (session_ == nullptr || queue_.state() != FrameQueue::State::streaming) return {};
   if (session_->lost()) return kSilent;
@@ -310,7 +312,8 @@ GigeCamera::Fault GigeCamera::check(HostStamp at, HostStamp* asked) {
   const Duration period = Duration::seconds(1 / requested_.rate_hz);
   if (requested_.trigger == CameraTrigger::free && silence > std::max(kMinSilence, period * 10)) {
     if (!session_->in_control()) return kSilent;
-    return {"the camera answers, but sends no images; check the firewall, and the MTU on the way"};
+    return {
+        "the camera responds, but sends no images; check the firewall and the MTU of every switch"};
   }
   if (requested_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) &&
       at - *asked > kAskEvery) {

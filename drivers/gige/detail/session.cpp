@@ -172,7 +172,7 @@ bool Features::set_text(const std::string& name, const std::string& value) {
     char* end = nullptr;
     const double v = g_ascii_strtod(value.c_str(), &end);
     if (value.empty() || *end != '\0')
-      return refuse(name + " is a number; \"" + value + "\" is none");
+      return refuse(name + " is a number; \"" + value + "\" is not one");
     return set(name, v, "", nullptr);
   }
   Error error;
@@ -242,14 +242,17 @@ std::unique_ptr<Session> Session::open(const std::string& where, DeviceStatus* s
       arv_interface_open_device(arv_gv_interface_get_instance(), where.c_str(), error.out()));
   if (device == nullptr || !ARV_IS_GV_DEVICE(device.get())) {
     *status = DeviceStatus::not_found;
-    *message = error ? where + " does not answer: " + error.text()
-                     : where + " does not answer; is its address in the network of this host?";
+    *message =
+        error ? where + " does not respond: " + error.text()
+              : where + " does not respond; check that its address is in a network of this host";
     return nullptr;
   }
   lock.unlock();
   if (arv_gv_device_is_controller(ARV_GV_DEVICE(device.get())) == FALSE) {
     *status = DeviceStatus::busy;
-    *message = where + " is controlled by another program, or was by one that ended seconds ago";
+    *message = where +
+               " is controlled by another program, or was until seconds ago; end that program, or "
+               "wait and repeat";
     return nullptr;
   }
   *status = DeviceStatus::ok;
@@ -289,7 +292,7 @@ DeviceStatus Session::refuse(DeviceStatus status, std::string message) {
   last_error_ = std::move(message);
   // A disconnected camera refuses everything; the message about the last feature would mislead.
   if (lost() || !in_control()) {
-    last_error_ = "the camera does not answer any more";
+    last_error_ = "the camera no longer responds; check cable and power";
     return DeviceStatus::disconnected;
   }
   return status;
@@ -318,7 +321,7 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
       last_error_ = "another program controls the camera";
       return DeviceStatus::disconnected;
     }
-    return refuse(DeviceStatus::failed, "the stream cannot be made: " + error.text());
+    return refuse(DeviceStatus::failed, "the stream cannot be created: " + error.text());
   }
   // Aravis may have tested the packet size and chosen another one.
   const int size = static_cast<int>(arv_gv_device_get_packet_size(gv, error.out()));
@@ -326,7 +329,7 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
     arv_gv_device_set_packet_size(gv, a.plan.packet_size, error.out());
   if (!error && size < a.plan.packet_size)
     add_remark("packets of " + std::to_string(size) +
-               " bytes: larger ones do not come through; check the MTU of every switch and of " +
+               " bytes, because larger ones do not arrive; check the MTU of every switch and of " +
                a.link.name);
 
   std::uint32_t capabilities = 0;
@@ -334,8 +337,7 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
       arv_device_read_register(device_.get(), kCapabilities, &capabilities, error.out()) != FALSE &&
       (capabilities & kCanResend) != 0;
   const bool resend = o.resend == Resend::on || (o.resend == Resend::automatic && can);
-  if (o.resend == Resend::on && !can)
-    add_remark("the camera says that it cannot send packets again");
+  if (o.resend == Resend::on && !can) add_remark("the camera cannot resend packets");
   const Duration period = Duration::seconds(1 / a.actual.rate_hz);
   const Duration retention =
       std::clamp(period * 3, Duration::milliseconds(60), Duration::milliseconds(100));
@@ -376,7 +378,7 @@ DeviceStatus Session::start_acquisition() {
   if (features_.has("TLParamsLocked"))
     arv_device_set_integer_feature_value(device_.get(), "TLParamsLocked", 1, error.out());
   arv_device_execute_command(device_.get(), "AcquisitionStart", error.out());
-  return error ? refuse(DeviceStatus::disconnected, "the camera does not begin: " + error.text())
+  return error ? refuse(DeviceStatus::disconnected, "the camera does not start: " + error.text())
                : DeviceStatus::ok;
 }
 
@@ -427,14 +429,15 @@ DeviceStatus Session::apply(const CameraConfiguration& requested, const Options&
   const auto payload = features_.number("PayloadSize");
   if (!payload || *payload < 1)
     return refuse(DeviceStatus::unsupported,
-                  "the camera does not say how large a frame is (PayloadSize)");
+                  "the camera does not report the size of a frame (PayloadSize)");
   a.payload = static_cast<std::size_t>(*payload);
   const std::size_t pixels = static_cast<std::size_t>(requested.width) *
                              static_cast<std::size_t>(requested.height) *
                              (a.format->how == GreyFormat::How::words ? 2 : 1);
   if (a.payload < pixels)
-    return refuse(DeviceStatus::unsupported, "the camera's frames of " + std::to_string(a.payload) +
-                                                 " bytes are smaller than the image");
+    return refuse(DeviceStatus::unsupported,
+                  "the camera's frames of " + std::to_string(a.payload) +
+                      " bytes are smaller than the image; check pixel_format and size");
   status = set_packets(requested, options, &a);
   if (status == DeviceStatus::ok) *applied = std::move(a);
   return status;
@@ -449,9 +452,9 @@ DeviceStatus Session::set_format(const CameraConfiguration& requested, Applied* 
       if (choose_format({name}, "") != nullptr) all += (all.empty() ? "" : ", ") + name;
     return refuse(
         DeviceStatus::unsupported,
-        (requested.pixel_format.empty() ? "no pixel format gives grey"
+        (requested.pixel_format.empty() ? "no supported pixel format gives grey values"
                                         : "there is no pixel format " + requested.pixel_format) +
-            "; the camera offers " + (all.empty() ? "none that is known here" : all));
+            "; the camera offers " + (all.empty() ? "none that is supported" : all));
   }
   if (!features_.choose("PixelFormat", a->format->name))
     return refuse(DeviceStatus::unsupported, features_.last_error());
@@ -592,7 +595,8 @@ DeviceStatus Session::set_rate(const CameraConfiguration& requested, Applied* a)
   if (!free) return DeviceStatus::ok;
   const char* rate = features_.find(Purpose::frame_rate);
   if (rate == nullptr)
-    return refuse(DeviceStatus::unsupported, "the camera's frame rate cannot be set; trigger it");
+    return refuse(DeviceStatus::unsupported,
+                  "the camera's frame rate cannot be set; set trigger to hardware or software");
   if (!features_.set(rate, requested.rate_hz, "Hz", &a->actual.rate_hz))
     return refuse(DeviceStatus::unsupported, features_.last_error());
   return DeviceStatus::ok;
@@ -611,7 +615,7 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
     return refuse(DeviceStatus::unsupported, features_.last_error());
   if (!o.ptp) {
     if (a->tick_frequency == 0)
-      add_remark("the camera has no clock: its images are stamped when they arrive");
+      add_remark("the camera has no clock; its images are stamped at arrival");
     return DeviceStatus::ok;
   }
   // PTP stamps are in nanoseconds.
@@ -627,8 +631,8 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   if (word != "Slave")
-    add_remark("the camera's clock does not follow the network's yet (PTP is " +
-               (word.empty() ? "silent" : word) + "); is there a master?");
+    add_remark("the camera's clock is not synchronised by PTP yet (state " +
+               (word.empty() ? "silent" : word) + "); check that there is a PTP master");
   return DeviceStatus::ok;
 }
 
@@ -669,8 +673,7 @@ DeviceStatus Session::set_packets(const CameraConfiguration& requested, const Op
     if (!features_.set("GevSCPD", std::ceil(ticks), "ticks", nullptr))
       return refuse(DeviceStatus::unsupported, features_.last_error());
   } else if (ticks > 0) {
-    add_remark(
-        "the camera has no packet delay: cameras that expose together may overflow the switch");
+    add_remark("the camera has no packet delay; simultaneous images may overflow the switch");
   }
   return DeviceStatus::ok;
 }

@@ -24,7 +24,7 @@ class RecordedExcerpt : public testing::TestWithParam<Excerpt> {};
 
 TEST_P(RecordedExcerpt, suppliedCalibrationIsUsableAndAccurate) {
   const auto d = open_recorded(GetParam().name);
-  if (!d) GTEST_SKIP() << shared_data_missing(GetParam().name);
+  if (!d) GTEST_SKIP() << shared_data_missing("data/" + std::string(GetParam().name));
   const app::Configuration c = app::load_configuration(std::nullopt, {});
   const DriveOutcome o =
       drive_recorded(*d, d->sequence, c, app::replayed_calibration(c, d->sequence, false));

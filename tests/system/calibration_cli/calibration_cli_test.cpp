@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -41,10 +40,7 @@ class CalibrationCli : public ::testing::Test {
   }
   [[nodiscard]] std::vector<std::string> lines(const std::string& name,
                                                const std::string& file) const {
-    std::istringstream in(read_file(session(name) / file));
-    std::vector<std::string> found;
-    for (std::string line; std::getline(in, line);) found.push_back(line);
-    return found;
+    return read_lines(session(name) / file);
   }
   [[nodiscard]] std::vector<std::string> events(const std::string& name,
                                                 const std::string& kind) const {

@@ -1,16 +1,12 @@
 #include "tests/system/faults/fault_drive.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <sstream>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
+#include "app/report/session.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -27,64 +23,14 @@ constexpr double kStarting = 6;
 /// Ground truth of the drive with this first pose: in real time it begins there.
 Stamp start_of(Stamp first) { return first - kStart > kLongestDrive ? first : kStart; }
 
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream in(line);
-  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
-  return cells;
-}
-
-PoseStatus status_of(const std::string& word) {
-  return word == "ok" ? PoseStatus::ok : word == "lost" ? PoseStatus::lost : PoseStatus::degraded;
-}
-
-void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d) {
-  enum Column : std::size_t { stamp_ns = 1, status = 3, reason = 4, x = 5, columns = 12 };
-  std::ifstream in(file);
-  std::string line;
-  // In real time, the run starts at its first pose.
-  Stamp start = kStart;
-  // The first line is the header.
-  std::getline(in, line);
-  while (std::getline(in, line)) {
-    const std::vector<std::string> cells = cells_of(line);
-    if (cells.size() < columns) continue;
-    EvaluatedPose pose{Stamp(std::stoll(cells[stamp_ns])), status_of(cells[status]), {}};
-    if (pose.status != PoseStatus::lost) {
-      std::array<double, 7> n{};
-      for (std::size_t i = 0; i < n.size(); ++i) n[i] = std::stod(cells[x + i]);
-      pose.T_world_left.t = {n[0], n[1], n[2]};
-      pose.T_world_left.R =
-          Eigen::Quaterniond(n[6], n[3], n[4], n[5]).normalized().toRotationMatrix();
-    }
-    if (d->poses.empty()) start = start_of(pose.stamp);
-    const double at = (pose.stamp - start).to_seconds();
-    if (at >= from_s && pose.status != PoseStatus::ok) ++d->reasons[cells[reason]];
-    d->poses.push_back(pose);
-    d->at_s.push_back(at);
-  }
-}
-
-void read_events(const std::filesystem::path& file, double from_s, FaultDrive* d) {
-  std::ifstream in(file);
-  Stamp start = kStart;
-  if (!d->poses.empty()) start = start_of(d->poses.front().stamp);
-  for (std::string line; std::getline(in, line);) {
-    const auto event = nlohmann::json::parse(line);
-    const Stamp stamp(event["stamp_ns"].get<std::int64_t>());
-    if ((stamp - start).to_seconds() >= from_s) ++d->events[event["kind"].get<std::string>()];
-  }
-}
-
 }  // namespace
 
 FaultDrive drive_with_faults(const FaultCase& c) {
   const TemporaryFolder folder;
-  const auto session = folder / "s";
   std::string arguments = fmt::format(
       "run '{}/app/config/mock_board.yaml' {} --quiet --duration {} --out '{}' "
       "--set cameras.0.size=[320,240] --set cameras.1.size=[320,240] {}",
-      VERGENCE_SOURCE_DIR, c.system.empty() ? "--fast" : "", c.duration_s, session.string(),
+      VERGENCE_SOURCE_DIR, c.system.empty() ? "--fast" : "", c.duration_s, (folder / "s").string(),
       c.more);
   for (const std::string& fault : c.faults) arguments += " --fault '" + fault + "'";
   const Outcome outcome = run_vergence(
@@ -93,21 +39,26 @@ FaultDrive drive_with_faults(const FaultCase& c) {
   FaultDrive d;
   d.code = outcome.code;
   d.err = outcome.err;
-  if (!std::filesystem::exists(session / "poses.csv")) return d;
-  d.whole = std::filesystem::exists(session / "summary.json") &&
-            std::filesystem::exists(session / "report.html");
-  read_poses(session / "poses.csv", c.from_s, &d);
-  read_events(session / "events.jsonl", c.from_s, &d);
-  if (std::filesystem::exists(session / "truth.tum"))
-    d.truth = app::read_tum(session / "truth.tum");
+  if (!std::filesystem::exists(folder / "s" / "poses.csv")) return d;
+  const app::report::Session session = app::report::read_session(folder / "s");
+  // In real time, the run starts at its first pose.
+  const Stamp start = session.frames.empty() ? kStart : start_of(session.frames.front().stamp);
+  for (const app::report::Frame& frame : session.frames) {
+    d.poses.push_back({frame.stamp, frame.status, frame.T_world_left});
+    d.at_s.push_back((frame.stamp - start).to_seconds());
+    if (d.at_s.back() >= c.from_s && frame.status != PoseStatus::ok)
+      ++d.reasons[session.reasons[frame.reason]];
+  }
+  for (const app::report::Event& event : session.events)
+    if ((event.stamp - start).to_seconds() >= c.from_s) ++d.events[event.kind];
+  if (std::filesystem::exists(folder / "s" / "truth.tum"))
+    d.truth = app::read_tum(folder / "s" / "truth.tum");
+  d.summary = session.summary;
   // An error without truth beside it would be none.
-  d.whole = d.whole && !d.truth.empty() && !d.poses.empty() &&
+  d.whole = session.not_had().empty() && std::filesystem::exists(folder / "s" / "report.html") &&
+            !d.truth.empty() && !d.poses.empty() &&
             d.truth.back().stamp + Duration::seconds(1) >= d.poses.back().stamp &&
             d.at_s.back() >= c.duration_s - (c.system.empty() ? 1 : kStarting);
-  if (d.whole) {
-    std::ifstream in(session / "summary.json");
-    d.summary.assign(std::istreambuf_iterator<char>(in), {});
-  }
   return d;
 }
 
@@ -164,13 +115,12 @@ std::string unsaid(const FaultCase& c, const FaultDrive& drive, const FaultDrive
         return "";
     return "any difference from the untouched drive";
   }
-  const auto summary = nlohmann::json::parse(drive.summary, nullptr, false);
   std::string missing;
   for (const std::string& what : c.said) {
     const bool seen =
         what.starts_with('/')
-            ? !summary.is_discarded() &&
-                  summary.value(nlohmann::json::json_pointer(what), std::int64_t{0}) > 0
+            ? drive.summary.is_object() &&
+                  drive.summary.value(nlohmann::json::json_pointer(what), std::int64_t{0}) > 0
             : drive.events.count(what) > 0 || drive.reasons.count(what) > 0 ||
                   drive.err.find(what + "\n") != std::string::npos;
     if (!seen) missing += (missing.empty() ? "" : ", ") + what;

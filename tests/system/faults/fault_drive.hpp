@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "tests/support/integrity.hpp"
 
 /// Drives of the mock with faults, by the built program, judged against the truth.
@@ -35,8 +37,8 @@ struct FaultDrive {
   /// Exit code of the program.
   int code = -1;
   std::string err{};
-  /// summary.json and report.html are there, and poses to the end of the drive with the truth
-  /// beside them.
+  /// Every file of the session is there and complete, and poses to the end of the drive with the
+  /// truth beside them.
   bool whole = false;
   std::vector<EvaluatedPose> poses{};
   /// Time of each pose since the start.
@@ -46,8 +48,8 @@ struct FaultDrive {
   std::map<std::string, int> events{};
   /// Number of frames that are not `ok` after the fault's start, by reason.
   std::map<std::string, int> reasons{};
-  /// Content of summary.json.
-  std::string summary{};
+  /// Content of summary.json; null if there is none.
+  nlohmann::json summary{};
 };
 
 struct FaultResult {

@@ -6,12 +6,12 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <map>
-#include <nlohmann/json.hpp>
-#include <sstream>
 #include <thread>
+#include <vector>
 
+#include <nlohmann/json.hpp>
+
+#include "app/report/session.hpp"
 #include "drivers/iidc/iidc.hpp"
 #include "tests/rigs/board_rig.hpp"
 #include "tests/rigs/film.hpp"
@@ -23,57 +23,32 @@
 namespace vergence::test {
 namespace {
 
-/// Position of the left camera and status, by the number of the rig frame.
-struct Pose {
-  Vec3 position = Vec3::Zero();
-  std::string status;
-};
-
-std::map<std::uint64_t, Pose> read_poses(const std::filesystem::path& file) {
-  std::map<std::uint64_t, Pose> out;
-  std::ifstream in(file);
-  std::string line;
-  std::getline(in, line);
-  while (std::getline(in, line)) {
-    std::vector<std::string> cells;
-    std::istringstream row(line);
-    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-    if (cells.size() < 8) continue;
-    Pose p;
-    p.status = cells[3];
-    if (!cells[5].empty())
-      p.position = {std::stod(cells[5]), std::stod(cells[6]), std::stod(cells[7])};
-    out[std::stoull(cells[0])] = p;
-  }
-  return out;
-}
-
 /// Distance of the track from the film's, worst of all poses, as part of the way: the film begins
 /// with the first exposure of any camera, the track with the first pair, a few images later.
-double worst_error(const std::map<std::uint64_t, Pose>& poses, const Film& film) {
+double worst_error(const std::vector<app::report::Frame>& frames, const Film& film) {
   constexpr std::size_t kLatest = 30;
   double best = 1e9;
   for (std::size_t shift = 0; shift < kLatest; ++shift) {
     double worst = 0, way = 0;
     Transform first;
     bool any = false;
-    std::uint64_t begin = 0;
+    std::int64_t begin = 0;
     Vec3 last = Vec3::Zero(), offset = Vec3::Zero();
-    for (const auto& [number, pose] : poses) {
-      if (pose.status == "lost") continue;
+    for (const app::report::Frame& frame : frames) {
+      if (!frame.posed) continue;
       if (!any) {
-        begin = number;
-        offset = pose.position;
+        begin = frame.number;
+        offset = frame.T_world_left.t;
         if (shift >= film.pairs()) break;
         first = film.T_first_left(shift).inverse();
       }
-      const std::size_t n = shift + static_cast<std::size_t>(number - begin);
+      const std::size_t n = shift + static_cast<std::size_t>(frame.number - begin);
       if (n >= film.pairs()) break;
       const Vec3 truth = (first * film.T_first_left(n)).t;
       if (any) way += (truth - last).norm();
       last = truth;
       any = true;
-      worst = std::max(worst, (pose.position - offset - truth).norm());
+      worst = std::max(worst, (frame.T_world_left.t - offset - truth).norm());
     }
     if (way > 5) best = std::min(best, worst / way);
   }
@@ -109,7 +84,7 @@ void expect_a_drive(const std::filesystem::path& session, const nlohmann::json& 
   const std::uint64_t images = 2 * (devices.at("sets_complete").get<std::uint64_t>() +
                                     devices.at("sets_incomplete").get<std::uint64_t>());
   test::expect_no_heap_but_of({"vergence-iidcus", images + 20}, summary);
-  EXPECT_LT(worst_error(read_poses(session / "poses.csv"), film), 0.03);
+  EXPECT_LT(worst_error(app::report::read_session(session).frames, film), 0.03);
 }
 
 struct Bus {

@@ -197,7 +197,7 @@ def second_drive(driver, below, port, problems):
     run = d.Drive(below / "second", 60, "--set", f"publish.http=127.0.0.1:{port}", "--fault", "camera_gone@0 camera=-1 duration_s=0")
     run.wait_for(r"live page: (http://\S+)")
     other = d.Drive(below / "other", 1, "--fast", "--set", f"publish.http=127.0.0.1:{port}")
-    if other.end() != 0 or "another program has the port" not in other.messages() or "continues without the live page" not in other.messages():
+    if other.end() != 0 or "another program uses the port" not in other.messages() or "continues without the live page" not in other.messages():
         problems.append(f"a port in use: {other.messages()}")
     seen = figures_when(driver, lambda seen: "second" in seen["link"], 20)
     if seen["link"] != "waiting for the first frame · second":
@@ -236,7 +236,7 @@ def beyond_this_machine(driver, below, problems):
     page = f"http://127.0.0.1:{port}/"
     open_anew(driver, page)
     seen = figures_when(driver, lambda seen: "refused" in seen["link"], 10)
-    if "the token is not that of this session" not in seen["link"]:
+    if "the token is not of this session" not in seen["link"]:
         problems.append(f"without the token the page says {seen['link']}")
     open_anew(driver, f"{page}#{token}")
     seen = figures_when(driver, lambda seen: "fourth" in seen["link"], 20)

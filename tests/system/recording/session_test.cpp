@@ -22,10 +22,10 @@ namespace {
 
 using test::kSmall;
 using test::Outcome;
+using test::read_file;
 using test::run_vergence;
 using test::summary_of;
 using test::TemporaryFolder;
-using test::text_of;
 
 const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
 const std::string kRecord = " --set record.poses=on --set record.ins=on --set record.images=on";
@@ -46,9 +46,9 @@ Outcome export_to(const std::filesystem::path& data, const std::filesystem::path
 }
 
 void expect_same_poses(const std::filesystem::path& a, const std::filesystem::path& b) {
-  const std::string poses = text_of(a / "trajectory.tum");
+  const std::string poses = read_file(a / "trajectory.tum");
   EXPECT_FALSE(poses.empty());
-  EXPECT_EQ(poses, text_of(b / "trajectory.tum"));
+  EXPECT_EQ(poses, read_file(b / "trajectory.tum"));
 }
 
 /// One drive with a knock, a camera that is disconnected for a while and a calibration asked for:
@@ -83,7 +83,7 @@ TEST_F(RecordedDrive, recordingReplaysBitForBit) {
   const Outcome o = replay(session(), out("again"));
   EXPECT_LE(o.code, 1) << o.err;
   expect_same_poses(session(), out("again"));
-  EXPECT_EQ(text_of(session() / "reference.tum"), text_of(out("again") / "reference.tum"));
+  EXPECT_EQ(read_file(session() / "reference.tum"), read_file(out("again") / "reference.tum"));
   EXPECT_TRUE(test::mentions(o.err, "the same input as in the recorded run"));
   EXPECT_EQ(summary_of(out("again"))["runtime_allocations"], 0);
 }
@@ -138,7 +138,7 @@ TEST_F(RecordedDrive, foreignOrNewerRecordingIsRefused) {
   });
   o = replay(foreign, out("of-foreign"));
   EXPECT_EQ(o.code, 2);
-  EXPECT_TRUE(test::mentions(o.err, "another program's"));
+  EXPECT_TRUE(test::mentions(o.err, "another program"));
   const auto empty = changed("empty", [](std::string* bytes) { bytes->clear(); });
   o = replay(empty, out("of-empty"));
   EXPECT_EQ(o.code, 2) << o.err;

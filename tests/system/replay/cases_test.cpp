@@ -130,11 +130,11 @@ std::vector<Case> trajectories() {
       {"all stamps equal", "1403636584.0 {p}", kTum, "the same stamp in all", 2},
       {"repeated", "{s} {p}\n{s} {p}|{s} {p}", kTum,
        "3 rows that repeat a stamp are dropped|60 poses matched"},
-      {"out of order", "{s} {p}\n1403636584.1 {p}|{s} {p}", kTum, "order of the times is restored"},
-      {"KITTI without times", "{m}", "{m}", "row belongs to row|60 poses matched"},
+      {"out of order", "{s} {p}\n1403636584.1 {p}|{s} {p}", kTum, "rows are sorted by time"},
+      {"KITTI without times", "{m}", "{m}", "row by row|60 poses matched"},
       {"KITTI of other lengths", "{m}", "{m}\n{m}|{m}", "has 60 poses|has 63", 2},
-      {"numbers before matrices", "{i} {m}", "{m}", "row belongs to row|60 poses matched"},
-      {"w first", "{s} {w}", kTum, "rotations do not|--quaternion wxyz"},
+      {"numbers before matrices", "{i} {m}", "{m}", "row by row|60 poses matched"},
+      {"w first", "{s} {w}", kTum, "rotations differ|--quaternion wxyz"},
       {"w first, said", "{s} {w}", kTum, "60 poses matched", 0, "--quaternion wxyz"},
       {"reference of 1 Hz", kTum, kTum + "|#", "--max-gap|1 s apart"},
       {"commas and a header", "{ns},{pc}", kTum, "--quaternion xyzw"},
@@ -502,8 +502,8 @@ std::vector<Case> folders() {
       {"two stamps", {}, "{ns} {ns}"},
       {"ms with a point", {}, "{ms:.3f}", "milliseconds"},
       {"ns with a point", {}, "{ns}.000000"},
-      {"too few digits", {}, "1.403636585e+09", "!too few digits"},
-      {"numbers of frames", {}, "{i}", "!count the pairs"},
+      {"too few digits", {}, "1.403636585e+09", "!with more digits"},
+      {"numbers of frames", {}, "{i}", "!frame numbers"},
       {"lenses only",
        {},
        "{ns}",
@@ -679,7 +679,7 @@ std::vector<Case> bags() {
                        return packed("bayer_rggb8; jpeg compressed ", ".jpg", i, k, ns);
                      },
                      "sensor_msgs/CompressedImage", compressed},
-                    "JPEG mixes"));
+                    "as JPEG, which mixes"));
   all.push_back(bag("stamps of zero", {[](int i, int k, std::int64_t) { return mono(i, k, 0); }},
                     "6 images have no stamp|later by 3 ms"));
   const auto later = [](std::int64_t ms) {
@@ -688,7 +688,7 @@ std::vector<Case> bags() {
   all.push_back(bag("20 ms later", {later(20)}, "differ by 20 ms"));
   for (const std::int64_t ms : {24, 26, 12345})
     all.push_back(bag("stamps that do not tell", {later(ms)},
-                      "time of recording, as their stamps do not tell"));
+                      "recording time, because their stamps are ambiguous"));
   Bag ambiguous{later(24)};
   ambiguous.recorded = [](int k, std::int64_t ns) { return ns + k * 24'000'000; };
   all.push_back(bag("nor do recordings", ambiguous, "24 ms later|ambiguous", 2));
@@ -729,8 +729,8 @@ std::vector<Case> bags() {
       w->message(6, ns, imu_message(Wire::cdr, ns, {0, 0, 0, 1}, 0));
     }
   };
-  all.push_back(
-      bag("constant attitude and a fix without a height", identity, "is not used: it differs"));
+  all.push_back(bag("constant attitude and a fix without a height", identity,
+                    "is not used, because it differs"));
   return all;
 }
 

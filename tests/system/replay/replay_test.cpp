@@ -6,7 +6,6 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 
 #include <fmt/format.h>
@@ -61,7 +60,7 @@ TEST_F(ReplayedFolder, fromScratchNeedsOnlyIntrinsicsAndLength) {
   fs::remove_all(session());
   text.insert(at, "    T_left_camera: [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0]\n");
   write("calibration.yaml", text);
-  expect_refused("give T_camera_left");
+  expect_refused("is the inverse of T_camera_left");
 }
 
 /// → whether a terminal shows it before it closes.
@@ -140,10 +139,9 @@ TEST_F(ReplayedFolder, thousandMissingImagesAreListedOthersCounted) {
   const Outcome o = replay();
   ASSERT_TRUE(fs::exists(session() / "events.jsonl")) << o.err;
   std::size_t listed = 0;
-  std::istringstream events(read_file(session() / "events.jsonl"));
   std::string last;
-  for (std::string line; std::getline(events, line);)
-    if (line.find("image_missing") != std::string::npos) ++listed, last = line;
+  for (const std::string& line : read_lines(session() / "events.jsonl"))
+    if (contains(line, "image_missing")) ++listed, last = line;
   EXPECT_EQ(listed, 1001U);
   EXPECT_TRUE(test::mentions(last, "1000 frames could not be read"));
   EXPECT_EQ(summary()["frames"]["skipped"], kMissing);

@@ -123,8 +123,7 @@ template <class Message>
 class RosReader {
  public:
   RosReader(const RosParticipant& participant, const std::string& topic, bool latched = false)
-      : reader_(dds_create_reader(participant.get(), participant.topic<Message>("rt" + topic),
-                                  RosParticipant::reliable(latched).get(), nullptr)) {}
+      : RosReader(participant, participant.topic<Message>("rt" + topic), latched) {}
   RosReader(const RosParticipant& participant, dds_entity_t topic, bool latched = false)
       : reader_(dds_create_reader(participant.get(), topic, RosParticipant::reliable(latched).get(),
                                   nullptr)) {}
@@ -147,29 +146,21 @@ class RosReader {
   /// GUIDs of the writers that it is matched with.
   [[nodiscard]] std::vector<std::string> writer_guids() const {
     std::vector<std::string> out;
-    std::array<dds_instance_handle_t, 8> writers{};
-    const auto n = dds_get_matched_publications(reader_, writers.data(), writers.size());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(n, 0)); ++i)
-      if (auto* writer = dds_get_matched_publication_data(reader_, writers[i])) {
-        out.emplace_back(reinterpret_cast<const char*>(writer->key.v), sizeof writer->key.v);
-        dds_builtintopic_free_endpoint(writer);
-      }
+    for_each_writer([&out](const dds_builtintopic_endpoint_t& writer) {
+      out.emplace_back(reinterpret_cast<const char*>(writer.key.v), sizeof writer.key.v);
+    });
     return out;
   }
   /// USER_DATA of the writers that it is matched with.
   [[nodiscard]] std::vector<std::string> user_data() const {
     std::vector<std::string> out;
-    std::array<dds_instance_handle_t, 8> writers{};
-    const auto n = dds_get_matched_publications(reader_, writers.data(), writers.size());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(n, 0)); ++i) {
-      dds_builtintopic_endpoint_t* writer = dds_get_matched_publication_data(reader_, writers[i]);
+    for_each_writer([&out](const dds_builtintopic_endpoint_t& writer) {
       void* bytes = nullptr;
       std::size_t size = 0;
-      if (writer != nullptr && dds_qget_userdata(writer->qos, &bytes, &size) && bytes != nullptr)
+      if (dds_qget_userdata(writer.qos, &bytes, &size) && bytes != nullptr)
         out.emplace_back(static_cast<const char*>(bytes), size);
       dds_free(bytes);
-      if (writer != nullptr) dds_builtintopic_free_endpoint(writer);
-    }
+    });
     return out;
   }
   [[nodiscard]] dds_entity_t get() const { return reader_; }
@@ -181,6 +172,16 @@ class RosReader {
   RosReader& operator=(const RosReader&) = delete;
 
  private:
+  template <class Each>
+  void for_each_writer(const Each& each) const {
+    std::array<dds_instance_handle_t, 8> writers{};
+    const auto n = dds_get_matched_publications(reader_, writers.data(), writers.size());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(n, 0)); ++i)
+      if (auto* writer = dds_get_matched_publication_data(reader_, writers[i])) {
+        each(*writer);
+        dds_builtintopic_free_endpoint(writer);
+      }
+  }
   void release() {
     if (sample_ != nullptr) (void)dds_return_loan(reader_, &sample_, 1);
     sample_ = nullptr;

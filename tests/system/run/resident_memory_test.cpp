@@ -4,7 +4,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
@@ -18,6 +17,7 @@
 #include <utility>
 
 #include "tests/support/temporary_folder.hpp"
+#include "tests/system/run/session.hpp"
 
 namespace vergence::test {
 namespace {
@@ -93,12 +93,6 @@ pid_t start(const SlowDrive& drive, const std::filesystem::path& session) {
   ::_exit(127);
 }
 
-/// Frames that a session has written the poses of.
-int frames_written(const std::filesystem::path& session) {
-  std::ifstream file(session / "poses.csv");
-  return static_cast<int>(std::count(std::istreambuf_iterator<char>(file), {}, '\n')) - 1;
-}
-
 /// Resident once the drive has settled, and the last before its end or before `wall` is over.
 struct Growth {
   std::optional<Resident> settled{};
@@ -125,7 +119,7 @@ Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
   Growth growth;
   while (::waitpid(process, &growth.status, WNOHANG) == 0) {
     const auto now = resident_of(process);
-    const int frames = frames_written(folder / "s");
+    const int frames = static_cast<int>(lines_of(folder / "s" / "poses.csv")) - 1;
     if (frames != std::exchange(seen, frames)) last_frame = std::chrono::steady_clock::now();
     if (now && frames >= drive.settled && frames < drive.seconds - kReport) {
       if (!growth.settled) {

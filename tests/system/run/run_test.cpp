@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <utility>
 
@@ -23,11 +22,13 @@ namespace {
 
 using test::events;
 using test::kSmall;
+using test::lines_of;
 using test::Outcome;
+using test::read_file;
+using test::read_lines;
 using test::run_vergence;
 using test::summary_of;
 using test::TemporaryFolder;
-using test::text_of;
 
 const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
 Outcome drive(const std::filesystem::path& session, const std::string& more) {
@@ -72,7 +73,7 @@ TEST(Run, everySuppliedSimulatedConfigurationRuns) {
        std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
     if (entry.path().extension() != ".yaml") continue;
     // Other tests of tests/system run real cameras on their stacks.
-    if (text_of(entry.path()).find("driver: mock") == std::string::npos) continue;
+    if (read_file(entry.path()).find("driver: mock") == std::string::npos) continue;
     ++files;
     const TemporaryFolder folder;
     const Outcome o = run_vergence("run '" + entry.path().string() +
@@ -101,18 +102,15 @@ TEST(Run, realTimeFramesArePosedOrCounted) {
   EXPECT_EQ(devices["camera0_delivered"].get<int>() + devices["camera0_lost"].get<int>() +
                 devices["camera0_underruns"].get<int>(),
             81);
-  const std::string poses = text_of(session / "poses.csv");
   // The header is not counted.
-  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n') - 1,
-            read - summary["drops"]["lines"].get<int>());
+  EXPECT_EQ(lines_of(session / "poses.csv") - 1, read - summary["drops"]["lines"].get<int>());
   EXPECT_EQ(summary["runtime_allocations"], 0);
-  std::ifstream lines(session / "events.jsonl");
-  int count = 0;
-  for (std::string line; std::getline(lines, line); ++count)
+  const auto lines = read_lines(session / "events.jsonl");
+  EXPECT_FALSE(lines.empty());
+  for (const std::string& line : lines)
     EXPECT_GE(nlohmann::json::parse(line)["stamp_ns"].get<std::int64_t>(),
               std::chrono::nanoseconds(before).count())
         << line;
-  EXPECT_GT(count, 0);
 }
 
 TEST(Run, filesAreTheSameForAnyThreadCount) {
@@ -121,7 +119,7 @@ TEST(Run, filesAreTheSameForAnyThreadCount) {
   ASSERT_EQ(drive(folder / "b", "--duration 6 --threads 1 --quiet" + kSmall).code, 0);
   for (const char* name :
        {"trajectory.tum", "reference.tum", "truth.tum", "events.jsonl", "ins.csv"})
-    EXPECT_EQ(text_of(folder / "a" / name), text_of(folder / "b" / name)) << name;
+    EXPECT_EQ(read_file(folder / "a" / name), read_file(folder / "b" / name)) << name;
 }
 
 TEST(Run, idealInsReferenceIsTruthWithinAMillimetre) {
@@ -161,7 +159,7 @@ TEST(Run, autoExposureKeepsPosesAtNight) {
       kSmall;
   ASSERT_EQ(drive(folder / "a", night + " --threads 2").code, 0);
   ASSERT_EQ(drive(folder / "b", night + " --threads 1").code, 0);
-  EXPECT_EQ(text_of(folder / "a" / "trajectory.tum"), text_of(folder / "b" / "trajectory.tum"));
+  EXPECT_EQ(read_file(folder / "a" / "trajectory.tum"), read_file(folder / "b" / "trajectory.tum"));
   const auto summary = summary_of(folder / "a");
   const auto& devices = summary["devices"];
   // A twentieth of the light is 4.3 stops: at a stop a change, six images apart, some of the first
@@ -198,10 +196,10 @@ TEST(Run, fullDiskLeavesNoTruncatedFileAndExitsFour) {
     EXPECT_FALSE(std::filesystem::exists(session / name)) << name;
   EXPECT_TRUE(
       test::mentions(o.err,
-                     "summary.json: cannot be written (File too large): check the directory's "
+                     "summary.json: cannot be written (File too large); check the directory's "
                      "permissions and the free space"));
   EXPECT_TRUE(test::mentions(o.err, "poses.csv"));
-  const std::string poses = text_of(session / "poses.csv");
+  const std::string poses = read_file(session / "poses.csv");
   EXPECT_LE(poses.size(), 2048U);
 }
 
@@ -221,7 +219,7 @@ TEST(Run, insFaultIsReportedAndPosesContinue) {
     const Outcome o =
         drive(session, std::string("--duration 9 --fault '") + c.fault + "'" + kSmall);
     EXPECT_EQ(o.code, c.code) << o.err;
-    EXPECT_GE(events(session, c.event).size(), 1U) << text_of(session / "events.jsonl");
+    EXPECT_GE(events(session, c.event).size(), 1U) << read_file(session / "events.jsonl");
     EXPECT_TRUE(test::mentions(o.err, "INS"));
     const auto summary = summary_of(session);
     EXPECT_EQ(summary["frames"]["posed"], 181);
@@ -233,7 +231,7 @@ TEST(Run, impossibleSettingIsNamedAndExitsTwo) {
   for (const auto& [arguments, named] :
        {std::pair{"--set trigger.rate=0", "trigger.rate is 0"},
         std::pair{"--set ins.rate=0", "ins.rate is 0"},
-        std::pair{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
+        std::pair{"--set cameras.1.size=[800,600]", "set the same size for all cameras"},
         std::pair{"--set cameras.0.exposure_us=60000",
                   "longer than the 50000 µs between two pulses"},
         std::pair{"--set cameras.0.driver=gige", "--fast needs simulated cameras"},
@@ -244,7 +242,7 @@ TEST(Run, impossibleSettingIsNamedAndExitsTwo) {
         std::pair{"--fault knok@3", "unknown fault \"knok\""},
         std::pair{"--fault 'cover@1 camera=3'", "there is no camera 3"},
         std::pair{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
-        std::pair{"--duration=-1", "--duration needs seconds"}}) {
+        std::pair{"--duration=-1", "--duration must be above 0"}}) {
     const TemporaryFolder folder;
     const Outcome o = drive(folder / "s", arguments);
     EXPECT_EQ(o.code, 2) << o.err;

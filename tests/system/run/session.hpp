@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
+
+#include "tests/support/temporary_folder.hpp"
 
 namespace vergence::test {
 
@@ -14,29 +16,21 @@ namespace vergence::test {
 inline const std::string kSmall =
     " --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0";
 
-/// All bytes of a file; empty while there is none.
-[[nodiscard]] inline std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream all;
-  all << in.rdbuf();
-  return all.str();
-}
-
-[[nodiscard]] inline std::size_t lines_of(const std::filesystem::path& file) {
-  const std::string text = text_of(file);
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+/// Number of lines of a file; 0 while there is none.
+[[nodiscard]] inline std::ptrdiff_t lines_of(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return std::count(std::istreambuf_iterator<char>(in), {}, '\n');
 }
 
 [[nodiscard]] inline nlohmann::json summary_of(const std::filesystem::path& session) {
-  return nlohmann::json::parse(text_of(session / "summary.json"));
+  return nlohmann::json::parse(read_file(session / "summary.json"));
 }
 
 /// Sentences of a session's events of one kind.
 [[nodiscard]] inline std::vector<std::string> events(const std::filesystem::path& session,
                                                      const std::string& kind) {
-  std::istringstream in(text_of(session / "events.jsonl"));
   std::vector<std::string> found;
-  for (std::string line; std::getline(in, line);) {
+  for (const std::string& line : read_lines(session / "events.jsonl")) {
     const auto event = nlohmann::json::parse(line);
     if (event["kind"] == kind) found.push_back(event["message"]);
   }

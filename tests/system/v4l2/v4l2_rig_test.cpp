@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -25,11 +24,6 @@ CameraConfiguration webcam() {
   CameraConfiguration c{640, 360, 25, Duration::milliseconds(8)};
   c.trigger = CameraTrigger::free;
   return c;
-}
-
-/// Waits of at most `limit` until something other than a time-out comes.
-DeviceStatus next(CameraDevice* camera, Frame* frame, Duration limit = kSoon) {
-  return camera->wait(limit, frame);
 }
 
 class V4l2Rig : public ::testing::Test {
@@ -109,7 +103,7 @@ TEST_F(V4l2Rig, everyPixelFormatGivesTheSameGrey) {
     EXPECT_EQ(c.pixel_format, name);
     ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << name << camera->last_error();
     Frame frame;
-    ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok) << name;
+    ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok) << name;
     EXPECT_EQ(frame.status, FrameStatus::complete) << name;
     const ImageView view = camera->view(frame.slot);
     std::vector<std::uint8_t> row(view.row(200), view.row(200) + view.width);
@@ -175,7 +169,7 @@ TEST_F(V4l2Rig, controlsAreSetByName) {
   ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok);
   Frame frame;
-  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
   EXPECT_NEAR(camera->view(frame.slot).at(320, 180), 200 - 128, 2) << "black, made brighter";
   camera->release(frame.slot);
   set_control(node(0), "brightness", 128);
@@ -194,7 +188,7 @@ TEST_F(V4l2Rig, startOfExposureStampsAreUnchanged) {
     Frame frame;
     age[source] = Duration::seconds(1);
     for (int i = 0; i < 20; ++i) {
-      ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+      ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
       age[source] = std::min(age[source],
                              Duration::nanoseconds(frame.arrival.ns() - frame.exposure_start.ns()));
       camera->release(frame.slot);
@@ -219,7 +213,7 @@ TEST_F(V4l2Rig, silentCameraDisconnectsAndStreamsAgain) {
   EXPECT_EQ(status, DeviceStatus::disconnected);
   set_control(node(0), "percentage_of_dropped_buffers", 0);
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
-  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
   camera->release(frame.slot);
   EXPECT_EQ(camera->statistics().starts, 2U);
 }
@@ -227,12 +221,12 @@ TEST_F(V4l2Rig, silentCameraDisconnectsAndStreamsAgain) {
 TEST_F(V4l2Rig, bufferWithErrorFlagIsIncomplete) {
   auto camera = streaming(0);
   Frame frame;
-  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
   camera->release(frame.slot);
   set_control(node(0), "inject_v4l2_buf_flag_error", 1);
   int incomplete = 0;
   for (int i = 0; i < 10; ++i) {
-    ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+    ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
     incomplete += frame.status == FrameStatus::incomplete ? 1 : 0;
     camera->release(frame.slot);
   }
@@ -243,16 +237,16 @@ TEST_F(V4l2Rig, bufferWithErrorFlagIsIncomplete) {
 TEST_F(V4l2Rig, queueErrorDisconnectsUntilStart) {
   auto camera = streaming(0);
   Frame frame;
-  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
   const FrameSlot held = frame.slot;
   set_control(node(0), "inject_fatal_streaming_error", 1);
   DeviceStatus status = DeviceStatus::ok;
-  while ((status = next(camera.get(), &frame)) == DeviceStatus::ok) camera->release(frame.slot);
+  while ((status = camera->wait(kSoon, &frame)) == DeviceStatus::ok) camera->release(frame.slot);
   ASSERT_EQ(status, DeviceStatus::disconnected);
   EXPECT_GT(frame.arrival.ns(), 0);
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   for (int i = 0; i < 40; ++i) {
-    ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+    ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
     EXPECT_NE(frame.slot, held);
     camera->release(frame.slot);
   }
@@ -278,7 +272,7 @@ TEST_F(V4l2Rig, repeatedStopAndStartLeaksNoDescriptor) {
       for (auto& camera : cameras) {
         ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
         Frame frame;
-        ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+        ASSERT_EQ(camera->wait(kSoon, &frame), DeviceStatus::ok);
         // Every second image is released only after the stop.
         if (i % 2 == 0) camera->release(frame.slot);
         camera->stop();

@@ -191,7 +191,7 @@ TEST(EvaluateCommand, refusesInvalidArguments) {
   refused({"--lengths", "10,,30"}, "`` is not a length");
   refused({"--lengths", "10,-5"}, "`-5` is not a length");
   refused({"--lengths", "nan"}, "`nan` is not a length");
-  refused({"--step", "0"}, "--step needs");
+  refused({"--step", "0"}, "--step must be");
   refused({"--step", "many"}, "--step");
   refused({"--associate", "guess"}, "guess");
   refused({"--axes", "north"}, "north");

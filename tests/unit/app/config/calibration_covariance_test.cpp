@@ -92,9 +92,9 @@ TEST(CalibrationCovariance, wrongCovarianceIsRefusedWithReason) {
             "c.yaml:7: covariance.parameters has \"rihgt.ry\"", "did you mean \"right.ry\"?"},
            // The left camera has no extrinsics.
            {with_block("[left.rx]", "[1]"), "c.yaml:7: covariance.parameters has \"left.rx\"",
-            "no parameter"},
+            "not a parameter"},
            // An equidistant lens has no p1.
-           {with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters", "no parameter"},
+           {with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters", "not a parameter"},
            {with_block("[right.rx, 1.rx]", "[1, 0, 1]"),
             "c.yaml:7: covariance.parameters has 1.rx twice"},
            {with_block("[]", "[]"), "c.yaml:7: covariance.parameters is not a list of parameters"},

@@ -213,19 +213,6 @@ TEST(CalibrationPlausibility, impossibleValuesAreRefusedWithPlace) {
   EXPECT_EQ(refusal(with(t, "0.001, 0, 1, 0, -0.75")), "") << "one camera above the other";
 }
 
-/// No cut and no changed byte of a good file may do anything but be read or be refused.
-TEST(CalibrationFile, truncatedFilesGiveInputErrorsOnly) {
-  Random random(11);
-  for (std::size_t length = 0; length < kGood.size(); ++length)
-    static_cast<void>(refusal(kGood.substr(0, length)));
-  for (int i = 0; i < 2000; ++i) {
-    std::string text = kGood;
-    const auto at = static_cast<std::size_t>(random.uniform() * static_cast<double>(text.size()));
-    text[at] = static_cast<char>(random.uniform() * 256.0);
-    static_cast<void>(refusal(text));
-  }
-}
-
 constexpr const char* kNewRig =
     "version: 1\nrig: {baseline: 0.5}\ncameras:\n"
     "  - {size: [640, 480], model: pinhole-radtan, intrinsics: [450, 450, 320, 240]}\n"

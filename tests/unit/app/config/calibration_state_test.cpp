@@ -104,13 +104,12 @@ TEST(StateFile, stateOfOtherRigIsRefusedWithReason) {
     void (*of)(CalibrationFile*);
   };
   for (const Change& c : {
-           Change{"serial \"102\", the one that is there \"103\"",
+           Change{"serial \"102\", the connected one \"103\"",
                   [](CalibrationFile* f) { f->serials[1] = "103"; }},
-           Change{"2 cameras, the configuration has 3",
-                  [](CalibrationFile* f) { f->rig.cameras = 3; }},
+           Change{"2 cameras, the configuration 3", [](CalibrationFile* f) { f->rig.cameras = 3; }},
            Change{"640 x 480", [](CalibrationFile* f) { f->rig.intrinsics[0].width = 1280; }},
            Change{
-               "rig.nominal.baseline_m was 0.75, it is 0.7512 now",
+               "rig.nominal.baseline_m was 0.75 when it was saved and is now 0.7512",
                [](CalibrationFile* f) { (*f->configured)["rig.nominal.baseline_m"] = "0.7512"; }},
            Change{"cameras.1.model was pinhole-equidistant, it is its default now",
                   [](CalibrationFile* f) { f->configured->erase("cameras.1.model"); }},

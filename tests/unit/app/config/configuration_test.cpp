@@ -40,6 +40,36 @@ TEST(Configuration, unknownKeyNamesNearestFileAndLine) {
             "--set thread=1: unknown key \"thread\"; did you mean \"threads\"?");
 }
 
+TEST(Configuration, suggestsOnlyKeysThatAreNear) {
+  for (const auto& [setting, part] :
+       {std::pair{"foo.bar=1", "\"foo.bar\"; docs/configuration.md lists all keys"},
+        std::pair{"cameras.0.rate=1", "did you mean \"trigger.rate\"?"},
+        std::pair{"cameras.driver=mock", "cameras is a list"},
+        std::pair{"cameras.7.name=a", "at most 4 cameras, numbered from 0"},
+        std::pair{"rig.name:a=1", "a colon needs a space"},
+        std::pair{"calibration.online=of", "one of off, on; did you mean \"off\"?"},
+        std::pair{"sync.mode=bus", "; \"bus\" is now ieee1394_cycle_time"}})
+    EXPECT_TRUE(contains(refusal("", {setting}), part)) << refusal("", {setting});
+}
+
+TEST(Configuration, wrongYamlIsExplainedWithLine) {
+  for (const auto& [text, part] :
+       {std::pair{"threads:2\n", "yaml:1: is not a configuration; write `key: value`"},
+        std::pair{"rig:\n  name: a\n   state_dir: b\n",
+                  "yaml:3: is not YAML: a second `key: value`"},
+        std::pair{"rig: name: a\n", "yaml:1: is not YAML: a second `key: value`"},
+        std::pair{"rig:\n\tname: a\n", "yaml:2: is not YAML: the line is indented by a tab"},
+        std::pair{"cameras:\n- name: a\n  - name: b\n", "is not YAML: the indentation"},
+        std::pair{"rig: {name: a\nthreads: 2\n", "is not YAML: a `{` or `[` is not closed"},
+        std::pair{"rig: {name: a}}\n", "is not YAML: a `}` or `]` that nothing opens"},
+        std::pair{"rig: @a\n", "a character that YAML reserves"}}) {
+    const std::string message = refusal(text);
+    EXPECT_TRUE(contains(message, part)) << text << ": " << message;
+  }
+  EXPECT_TRUE(contains(refusal("", {"cameras.0.size=[3"}), "size=[3: is not YAML: a `{` or `[`"))
+      << refusal("", {"cameras.0.size=[3"});
+}
+
 TEST(Configuration, listItemsAreNamedByNumber) {
   const auto c = parse_configuration("cameras: [{serial: a, size: [800, 600]}, {serial: b}]",
                                      "drive.yaml", {"cameras.1.serial=c"});
@@ -71,7 +101,7 @@ TEST(Configuration, impossibleValuesAreRefusedWithPlace) {
            {"threads: []", "takes one value"},
            {"odometry: 3", "is a group of keys"},
            {"[1, 2]", "is not a configuration"},
-           {long_name, "longer than 64 bytes"},
+           {long_name, "longer than the limit of 64 bytes"},
            {"odometry: {min_inliers: 60, ok_inliers: 50}",
             "odometry.ok_inliers (50) is below odometry.min_inliers (60)"},
            {"cameras: [{serail: a}]", "drive.yaml:1: unknown key \"cameras.0.serail\""},

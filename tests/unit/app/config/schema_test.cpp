@@ -1,24 +1,16 @@
 #include "app/config/schema.hpp"
 
-#include <fstream>
 #include <limits>
-#include <sstream>
 #include <string>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "app/runtime/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
-
-std::string file_text(const std::string& below) {
-  std::ifstream in(std::string(VERGENCE_SOURCE_DIR) + "/" + below, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 /// Taken with this value of this key, and the value arrives.
 bool accepts(const Key& key, const KeyValue& value) {
@@ -99,7 +91,7 @@ TEST(Schema, everyKeyChangesItsOwnValueOnly) {
 }
 
 TEST(Schema, documentIsWrittenFromTheTable) {
-  EXPECT_EQ(file_text("docs/configuration.md"), configuration_document())
+  EXPECT_EQ(test::read_file(VERGENCE_SOURCE_DIR "/docs/configuration.md"), configuration_document())
       << "write it again: ninja -C build docs";
 }
 

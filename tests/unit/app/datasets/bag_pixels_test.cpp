@@ -134,8 +134,7 @@ TEST_P(BagPixels, convertsMosaicsLikeCameras) {
 
 TEST_P(BagPixels, refusesOtherEncodingsAndShortData) {
   EXPECT_TRUE(grey_of(image_of("32FC1", 4)).empty());
-  EXPECT_TRUE(
-      test::mentions(refusal_, "/left/image (0 images, 1 that cannot be read, of the encoding"));
+  EXPECT_TRUE(test::mentions(refusal_, "/left/image (0 images, 1 of the unsupported encoding"));
   ImageMessage image = image_of("mono8", 1);
   image.data.pop_back();
   EXPECT_TRUE(grey_of(image).empty());
@@ -161,23 +160,6 @@ TEST_P(BagPixels, detectsPngAndJpegByContent) {
         ending[1] == 'p' ? 0 : 1);
   }
   EXPECT_TRUE(grey_of_file("png", "no image at all").empty());
-}
-
-// As image_transport packs mono16 of cameras of 12 bits.
-TEST_P(BagPixels, detectsTwelveBitsInSixteenBitPng) {
-  cv::Mat source(kHeight, kWidth, CV_16U);
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x)
-      source.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(16 * value(x, y, 0) + 15);
-  std::vector<std::uint8_t> file;
-  ASSERT_TRUE(cv::imencode(".png", source, file));
-  const std::string message = compressed_message(
-      GetParam().wire(), kStart, "mono16; compressed png", std::string(file.begin(), file.end()));
-  StereoSequence s = make_sequence("sensor_msgs/CompressedImage", message);
-  find_deep_bits(&s);
-  EXPECT_EQ(s.deep_bits, 12);
-  expect_grey(
-      right_of(s), [](int x, int y) { return value(x, y, 0); }, "png");
 }
 
 // TUM VI's and many industrial cameras' way.

@@ -124,9 +124,9 @@ TEST_P(Bag, countsImagesOfOtherSizeOrBackwardStamp) {
   EXPECT_EQ(s.pairs.size(), 4U);
   EXPECT_EQ(s.left_out, 3U);
   ASSERT_EQ(s.remarks.size(), 1U);
-  EXPECT_TRUE(mentions(s.remarks[0],
-                       "1 images that cannot be read, 1 of another size than the first and "
-                       "1 whose stamps do not go forward"));
+  EXPECT_TRUE(mentions(
+      s.remarks[0],
+      "1 unreadable images, 1 of another size than the first and 1 whose stamps do not increase"));
   EXPECT_TRUE(mentions(s.remarks[0], "drive_0" + GetParam().ending() + ", offset "));
 }
 

@@ -249,9 +249,9 @@ TEST(StLuciaIns, repairsOrRefusesLogs) {
   for (const Log& c : {
            Log{"shows nothing", [](Lines*) {}, 800, "too slow or too short", 0.3},
            Log{"out of order", [](Lines* l) { std::swap((*l)[100], (*l)[500]); }, 800,
-               "not in the order"},
+               "sorted by their stamps"},
            Log{"a stamp twice", [](Lines* l) { (*l)[200] = (*l)[199]; }, 799,
-               "1 samples of the INS had the stamp of another"},
+               "1 samples of the INS repeat a stamp"},
            Log{"a broken line", [](Lines* l) { (*l)[300] = "1292391546 0 -27.5"; }, 799,
                "1 lines that are not twelve numbers"},
            Log{"longitude first",
@@ -270,7 +270,7 @@ TEST(StLuciaIns, repairsOrRefusesLogs) {
                },
                0, "Ins0.log:1: and 2 more lines"},
            Log{"no place", [](Lines* l) { *l = {"1292391531 0 -27.5 153 1e9 0 0 0 0 0 0 0"}; }, 0,
-               "a place that is none"},
+               "an invalid position"},
        }) {
     Lines lines = ins_lines({}, c.speed);
     c.spoil(&lines);

@@ -57,12 +57,12 @@ TEST_F(Sequence, refusalNamesFileAndProblem) {
            Bad{"times.txt", "0\n0.1\nnoon\n", "times.txt:3", "noon"},
            Bad{"calib.txt", p0, "calib.txt", "P1"},
            Bad{"calib.txt", p0 + "P1: 60 0 35 -30 0 60 24 0 0 0 1\n", "calib.txt:2",
-               "12 are expected"},
+               "instead of 12"},
            Bad{"calib.txt", p0 + "P1: 60 0 35 30 0 60 24 0 0 0 1 0\n", "calib.txt", "swapped"},
            Bad{"calib.txt", p0 + "P1: 60 0 35 nan 0 60 24 0 0 0 1 0\n", "calib.txt:2", "nan"},
            Bad{list, "#timestamp [ns],filename\n15,x.png\nnoon,y.png\n", "cam0/data.csv:3", "noon"},
            Bad{list, "15,../../secret.png\n", "cam0/data.csv:1", "secret"},
-           Bad{list, "15,15.png\n", "cam1/data.csv", "no stamp near"},
+           Bad{list, "15,15.png\n", "cam1/data.csv", "no stamp close"},
            Bad{right, with("0.0, -1.0, 0.0,", "0.0, -1.01, 0.0,"), "cam1/sensor.yaml",
                "cameras.1.T_camera_left", "orthonormal"},
            Bad{right, with("radial-tangential", "fov"), "cam1/sensor.yaml", "fov"},
@@ -168,21 +168,21 @@ TEST_F(Sequence, refusesImplausibleTimes) {
   };
   for (const Times& c : {
            // Another unit; a gap is none.
-           Times{times_of("{:.0f}", 104.0, 5), "other units"},
-           Times{times_of("{:.0f}", 999'999.0, 5), "other units"},
-           Times{times_of("{:.1f}", 10.5, 5), "other units"},
-           Times{times_of("{:.1f}", 5e7, 5), "other units"},
+           Times{times_of("{:.0f}", 104.0, 5), "check the unit of its times"},
+           Times{times_of("{:.0f}", 999'999.0, 5), "check the unit of its times"},
+           Times{times_of("{:.1f}", 10.5, 5), "check the unit of its times"},
+           Times{times_of("{:.1f}", 5e7, 5), "check the unit of its times"},
            Times{times_of("{:.0f}", 5e6, 5)},
            Times{times_of("{:.0f}", 5e7, 5)},
            Times{times_of("{:.0f}", 1e9, 5)},
            Times{"0.0\n0.1\n0.2\n500.0\n500.1\n"},
            // Beyond any drive, before differences overflow; the last two are 337 years apart.
-           Times{far("9223372036854775807"), "9223372036854775807", "1824 and 2116"},
-           Times{far("-9223372036854775807"), "-9223372036854775807", "1824 and 2116"},
-           Times{far("4611686018427387905"), "4611686018427387905", "1824 and 2116"},
+           Times{far("9223372036854775807"), "9223372036854775807", "1824 to 2116"},
+           Times{far("-9223372036854775807"), "-9223372036854775807", "1824 to 2116"},
+           Times{far("4611686018427387905"), "4611686018427387905", "1824 to 2116"},
            Times{"-5317300000000000000\n-5317299900000000000\n-5317299800000000000\n"
                  "5317300000000000000\n5317300100000000000\n",
-                 "1824 and 2116"},
+                 "1824 to 2116"},
            Times{"-300000000\n-200000000\n-100000000\n0\n100000000\n"},
            // Backwards; one frame that goes back is skipped when it comes.
            Times{"0.5\n0.4\n0.3\n0.2\n0.1\n", "of 4 steps", "4 go back", "oldest first"},
@@ -260,7 +260,7 @@ TEST_F(Sequence, detectsEffectiveBitsFromSamples) {
     const auto s = open_sequence(SequenceFormat::folder, folder_.path());
     EXPECT_EQ(s.deep_bits, c.bits) << c.most << ' ' << c.last;
     const auto said = [&](const std::string& remark) {
-      return remark.find("16 bits a sample") != std::string::npos;
+      return remark.find("16 bits per sample") != std::string::npos;
     };
     EXPECT_EQ(std::count_if(s.remarks.begin(), s.remarks.end(), said), c.bits < 16 ? 1 : 0);
   }

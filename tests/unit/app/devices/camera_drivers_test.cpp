@@ -66,7 +66,7 @@ Configuration halves(const std::array<ImageHalf, 2>& which,
 TEST(CameraDrivers, contradictingEntriesAreRefused) {
   EXPECT_TRUE(test::mentions(refusal(gige({"A", "A"})), "two entries"));
   EXPECT_TRUE(test::mentions(refusal(halves({ImageHalf::left, ImageHalf::right}, {"A", "B"})),
-                             "cameras.0.image_half is left, and no other entry is the right half"));
+                             "cameras.0.image_half is left, but no other entry is the right half"));
   Configuration other = halves({ImageHalf::left, ImageHalf::right}, {"A", "A"});
   other.cameras[1].exposure_us = 1000;
   EXPECT_TRUE(test::mentions(refusal(other), "cameras.0 and cameras.1 are halves"));

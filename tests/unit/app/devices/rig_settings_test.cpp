@@ -96,14 +96,14 @@ TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
            Bad{{"cameras.1.intrinsics=[0, 460, 300, 200]"}, "cameras.1.intrinsics is ["},
            Bad{{"cameras.1.intrinsics=[460, 460, 0, 200]"}, "cameras.1.intrinsics is ["},
            Bad{{"cameras.1.intrinsics=[460, 0, 300, 200]"}, "cameras.1.intrinsics is ["},
-           Bad{{"cameras.0.distortion=[-0.2, 0.05]"}, "given without cameras.0.intrinsics"},
+           Bad{{"cameras.0.distortion=[-0.2, 0.05]"}, "set without cameras.0.intrinsics"},
            Bad{{"cameras.1.model=pinhole-equidistant", "cameras.1.intrinsics=[300, 301, 322, 241]",
                 "cameras.1.distortion=[0, 0, 0, 0, 0.01]"},
                "cameras.1.distortion has five"},
            Bad{{"cameras.1.T_camera_left=[1, 0, 0, 0.75, 0, 1, 0, 0, 0, 0, 1, 0]"},
                "left and right are swapped"},
            Bad{{"mock.calibration_error.x_m=0.3"}, "mock.calibration_error"},
-           Bad{{"cameras.3.driver=mock"}, "no holes"},
+           Bad{{"cameras.3.driver=mock"}, "before it has none"},
        })
     EXPECT_TRUE(test::mentions(refusal(bad.set), bad.mentions)) << bad.set[0];
 }

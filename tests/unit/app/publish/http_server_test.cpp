@@ -91,7 +91,7 @@ TEST_F(Http, portInUseIsInputError) {
   EXPECT_TRUE(test::contains(test::refusal_of([&] {
                                const HttpServer second(HostPort{"127.0.0.1", port_}, {}, kPage, {});
                              }),
-                             "another program has the port"));
+                             "another program uses the port"));
 }
 
 /// A request's first line and headers, and what becomes of it.

@@ -127,7 +127,8 @@ TEST(Realtime, kernelSchedulesAsRequested) {
   worker.join();
   EXPECT_EQ(CPU_COUNT(&set), 1);
   EXPECT_TRUE(CPU_ISSET(first, &set));
-  if (!messages.empty()) GTEST_SKIP() << "no real-time priority is allowed here: " << messages[0];
+  if (!messages.empty())
+    GTEST_SKIP() << "needs the permission for a real-time priority: " << messages[0];
   EXPECT_EQ(policy, SCHED_FIFO | SCHED_RESET_ON_FORK);
   EXPECT_EQ(parameter.sched_priority, 9);
 }

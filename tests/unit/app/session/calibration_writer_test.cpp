@@ -27,7 +27,7 @@ TEST(CalibrationWriter, emptyFieldsReplaceMissingNumbers) {
   writer.on_calibration(CalibrationRecord{decision(false)});
   close(&writer);
   const CalibrationTotals& totals = writer.totals();
-  const auto lines = lines_of(folder / "calibrations.csv");
+  const auto lines = test::read_lines(folder / "calibrations.csv");
   ASSERT_EQ(lines.size(), 4U);
   EXPECT_EQ(lines[0], kCalibrationsHeader);
   const std::string numbers =

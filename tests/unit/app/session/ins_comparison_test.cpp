@@ -85,30 +85,5 @@ TEST(InsComparison, keepsAlignmentsOfManyTunnels) {
   (void)session.recorder.close();
 }
 
-/// A way a tenth too long, at 10 Hz for a minute, the last third of it without an INS.
-TEST(InsComparison, countsScaleDisagreementOnlyWithIns) {
-  ComparedSession session;
-  InsComparison& comparison = session.comparison;
-  const LocalTangentPlane plane(Geodetic{48, 11, 500});
-  // Time in s at which the INS stops.
-  constexpr double kGone = 40;
-  for (int i = 0; i < 600; ++i) {
-    const double t = i / 10.0;
-    if (t < kGone) comparison.add(reading(plane, t, {kSpeed * t, 0, 0}));
-    FrameReport report;
-    PoseSample& pose = report.pose;
-    pose.stamp = at(t);
-    pose.status = PoseStatus::ok;
-    pose.T_world_left.t = {1.1 * kSpeed * t, 0, 0};
-    comparison.add(report);
-    comparison.drain();
-  }
-  comparison.finish();
-  // Steps are of 5 m or more, at 1.1 m a pose of 5.5 m: forty are driven with pose 200, and 399 is
-  // the last that has a reading.
-  EXPECT_EQ(counter(comparison, "scale_disagrees"), 200U);
-  (void)session.recorder.close();
-}
-
 }  // namespace
 }  // namespace vergence::app

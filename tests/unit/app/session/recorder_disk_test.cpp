@@ -15,7 +15,7 @@ namespace {
 /// Sentences of the events of one kind.
 std::vector<std::string> reported(const std::filesystem::path& folder, const std::string& kind) {
   std::vector<std::string> messages;
-  for (const std::string& line : lines_of(folder / "events.jsonl")) {
+  for (const std::string& line : test::read_lines(folder / "events.jsonl")) {
     const auto event = nlohmann::json::parse(line);
     if (event["kind"] == kind) messages.push_back(event["message"]);
   }
@@ -40,12 +40,12 @@ TEST(Recorder, brieflyFullDiskLosesNothing) {
   const auto totals = recorder.close();
   EXPECT_TRUE(totals->faults.empty());
   EXPECT_EQ(totals->lost_lines, 0U);
-  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 100U);
-  EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
+  EXPECT_EQ(test::read_lines(folder / "trajectory.tum").size(), 100U);
+  EXPECT_EQ(test::read_lines(folder / "poses.csv").size(), 101U);
   EXPECT_EQ(reported(folder.path(), "disk_full").size(), 1U);
   EXPECT_EQ(reported(folder.path(), "disk_recovered"),
-            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
-  const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
+            std::vector<std::string>{"lines are written again; 0 were lost"});
+  const auto full = nlohmann::json::parse(test::read_lines(folder / "events.jsonl").front());
   EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
   const auto errors = recorder.pop_errors();
   ASSERT_EQ(errors.size(), 1U) << "once, not for every file";
@@ -64,11 +64,11 @@ TEST(Recorder, longFullDiskLosesWholeCountedLines) {
   const auto totals = recorder.close();
   EXPECT_EQ(totals->faults.size(), 2U) << "trajectory.tum and poses.csv lack lines";
   ASSERT_GT(totals->lost_lines, 1000U);
-  const std::size_t written =
-      lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
+  const std::size_t written = test::read_lines(folder / "trajectory.tum").size() +
+                              test::read_lines(folder / "poses.csv").size() - 1;
   EXPECT_EQ(written + totals->lost_lines, 2 * kFrames);
   EXPECT_EQ(reported(folder.path(), "disk_recovered"),
-            std::vector<std::string>{"the disk takes lines again; " +
+            std::vector<std::string>{"lines are written again; " +
                                      std::to_string(totals->lost_lines) + " were lost"});
 }
 

@@ -1,9 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <filesystem>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "app/session/records.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -29,13 +25,6 @@ inline FrameReport pose(std::uint64_t frame, PoseStatus status, double x) {
   report.pose = sample;
   report.decode_ms = 2;
   return report;
-}
-
-inline std::vector<std::string> lines_of(const std::filesystem::path& file) {
-  std::istringstream in(test::read_file(file));
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  return lines;
 }
 
 inline RigCalibration two_cameras() {

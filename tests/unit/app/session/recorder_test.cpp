@@ -46,17 +46,17 @@ TEST(Recorder, stampsAreExactAndLostFramesHaveNoPose) {
   recorder.on_report(pose(2, PoseStatus::degraded, 1.5));
   const auto totals = recorder.close();
 
-  const auto tum = lines_of(folder / "trajectory.tum");
+  const auto tum = test::read_lines(folder / "trajectory.tum");
   ASSERT_EQ(tum.size(), 2U);
   EXPECT_EQ(tum[0],
             "1403636584.763555584 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 "
             "0.000000000 1.000000000");
   EXPECT_EQ(tum[1].substr(0, 32), "1403636584.863555584 1.500000000");
-  const auto reference = lines_of(folder / "reference.tum");
+  const auto reference = test::read_lines(folder / "reference.tum");
   ASSERT_EQ(reference.size(), 1U);
   EXPECT_EQ(reference[0].substr(0, 54), "1403636584.763555584 1.000000000 2.000000000 3.0000000");
 
-  const auto csv = lines_of(folder / "poses.csv");
+  const auto csv = test::read_lines(folder / "poses.csv");
   ASSERT_EQ(csv.size(), 4U);
   EXPECT_EQ(csv[0], kPosesHeader);
   for (const std::string& line : csv)
@@ -99,7 +99,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   change.value = 2.5;
   recorder.on_event(EventRecord::of(change));
   (void)recorder.close();
-  const auto lines = lines_of(folder / "events.jsonl");
+  const auto lines = test::read_lines(folder / "events.jsonl");
   ASSERT_EQ(lines.size(), 3U);
   const auto truncated = nlohmann::json::parse(lines[0]), state = nlohmann::json::parse(lines[1]);
   EXPECT_EQ(truncated["stamp_ns"], kStamp);
@@ -133,7 +133,7 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   EXPECT_GT(totals->dropped_records, 0U);
   EXPECT_GT(totals->read, 0U);
   EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
-  EXPECT_EQ(lines_of(folder / "poses.csv").size(), totals->read + 1);
+  EXPECT_EQ(test::read_lines(folder / "poses.csv").size(), totals->read + 1);
   EXPECT_TRUE(totals->trajectory.empty());
 }
 
@@ -144,7 +144,7 @@ TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
   bool found = false;
   // The loop waits two seconds at most; one is promised.
   for (int i = 0; i < 200 && !found; ++i) {
-    found = lines_of(folder / "trajectory.tum").size() == 1;
+    found = test::read_lines(folder / "trajectory.tum").size() == 1;
     if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   EXPECT_TRUE(found);

@@ -81,7 +81,7 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   const StartingCalibration other = drive("4712");
   EXPECT_EQ(other.trust, CalibrationTrust::given);
   ASSERT_EQ(other.remarks.size(), 1U);
-  EXPECT_NE(other.remarks[0].find("\"4711\", the one that is there \"4712\""), std::string::npos)
+  EXPECT_NE(other.remarks[0].find("\"4711\", the connected one \"4712\""), std::string::npos)
       << other.remarks[0];
 }
 

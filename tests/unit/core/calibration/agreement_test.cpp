@@ -69,28 +69,6 @@ RigCalibration moved(const RigCalibration& from, const FreeVector& by) {
   return r;
 }
 
-TEST(Agreement, calibrationAgreesWithItself) {
-  Random random(81);
-  RigCalibration r = rig();
-  r.covariance = published(covariance_of_noise(random));
-  EXPECT_LT(agreement(r, r, 1), 1e-20);
-}
-
-TEST(Agreement, conditionalCovarianceIsTheNoise) {
-  Random random(82);
-  const Free noise = covariance_of_noise(random);
-  const RigCovariance left = noise_only(with_held(noise, random));
-  for (int i = 0; i < kFree; ++i)
-    for (int j = 0; j <= i; ++j)
-      // Differences of numbers that are some ten times as large.
-      EXPECT_NEAR(left(row_of(i), row_of(j)), noise(i, j),
-                  1e-12 * std::sqrt(noise(i, i) * noise(j, j)))
-          << i << ' ' << j;
-  for (int j = 0; j < 4; ++j)
-    for (int i = 0; i < kRigSize; ++i)
-      EXPECT_NEAR(left(i, intrinsic_row(0) + j), 0, 1e-15) << i << ' ' << j;
-}
-
 // Where the lenses of all cameras are estimated, camera 0's go with each other.
 TEST(Agreement, conditionalCovarianceOfCorrelatedIntrinsics) {
   Random random(86);
@@ -111,6 +89,9 @@ TEST(Agreement, conditionalCovarianceOfCorrelatedIntrinsics) {
   for (int i = 0; i < kFree; ++i)
     for (int j = 0; j <= i; ++j)
       EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10) << i << ' ' << j;
+  for (int j = 0; j < 4; ++j)
+    for (int i = 0; i < kRigSize; ++i)
+      EXPECT_NEAR(left(i, intrinsic_row(0) + j), 0, 1e-15) << i << ' ' << j;
 }
 
 TEST(Agreement, covarianceWithoutFixedIntrinsicsIsUnchanged) {
@@ -150,19 +131,6 @@ TEST(Agreement, oneSigmaDifferencesAverageToOne) {
     mean += agreement(a, b, 1) / kDraws;
   }
   EXPECT_NEAR(mean, 1, 0.2);
-}
-
-TEST(Agreement, halvedSigmasQuadrupleTheDifference) {
-  Random random(85);
-  RigCalibration a = rig();
-  const Free noise = covariance_of_noise(random);
-  FreeVector by = FreeVector::Zero();
-  by[1] = 5e-4, by[4] = 1e-3, by[8] = 2;
-  RigCalibration b = moved(a, by);
-  a.covariance = b.covariance = published(noise);
-  const double before = agreement(a, b, 1);
-  a.covariance = b.covariance = published(noise / 4);
-  EXPECT_NEAR(agreement(a, b, 1), 4 * before, 1e-6 * before);
 }
 
 }  // namespace

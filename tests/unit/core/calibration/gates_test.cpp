@@ -1,4 +1,5 @@
 #include "core/calibration/gates.hpp"
+#include "core/math/robust.hpp"
 
 #include <gtest/gtest.h>
 
@@ -127,8 +128,8 @@ TEST(Gates, heldOutFramesRejectAWrongSolution) {
   const HeldOut h = held_out(c.log, c.solution.newest, c.solution.rig);
   EXPECT_NEAR(h.median_px, 1247 * 0.2 * kDegree, 0.3);
   // Without frames to tell, nothing contradicts it.
-  c.solution.newest = 50 - kMinHeldOut;
-  EXPECT_EQ(held_out(c.log, c.solution.newest, c.solution.rig).frames, kMinHeldOut - 1);
+  c.solution.newest = 50 - kMinForMean;
+  EXPECT_EQ(held_out(c.log, c.solution.newest, c.solution.rig).frames, kMinForMean - 1);
   EXPECT_EQ(c.ask(), Gate::open);
   EXPECT_FALSE(held_out_enough(c.log, c.solution.newest)) << "so no solve is decided then";
   EXPECT_TRUE(held_out_enough(c.log, c.solution.newest - 1));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/quantile.hpp"
 #include "tests/unit/core/calibration/monitor_modes.hpp"
 
 namespace vergence::test {
@@ -13,6 +14,7 @@ namespace {
 
 using calibration::MonitorResult;
 using calibration::detail::ChangeDetector;
+using test::quantile;
 
 // An hour has this many frames at 30 Hz.
 constexpr int kHour = 108000;
@@ -36,13 +38,6 @@ FiveReference five_of(const FeatureDriveOptions& o) {
       tangent_basis(o.T_right_left.t.normalized()).transpose() / o.T_right_left.t.norm();
   const Mat5 C = back * reference.covariance * back.transpose();
   return {C, Eigen::LLT<Mat5>(C).matrixL()};
-}
-
-double quantile(std::vector<double> v, double share) {
-  const auto at =
-      v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
-  std::nth_element(v.begin(), at, v.end());
-  return *at;
 }
 
 TEST(MonitorModes, modesHaveTheStatisticsOfTracks) {

@@ -37,18 +37,6 @@ void expect_frame(const LoggedFrame& f, std::uint64_t number, std::size_t observ
     EXPECT_EQ(f.observations[i].track, 100 * number + i);
 }
 
-TEST(TrackLog, framesKeepOrderAndObservations) {
-  Log l(4, 5);
-  EXPECT_TRUE(l.log.empty());
-  l.frame(3, 2);
-  l.frame(5, 0);
-  l.frame(6, 5);
-  ASSERT_EQ(l.log.size(), 3U);
-  expect_frame(l.log.frame(0), 3, 2);
-  expect_frame(l.log.frame(1), 5, 0);
-  expect_frame(l.log.frame(2), 6, 5);
-}
-
 TEST(TrackLog, fullLogDropsItsOldestFrame) {
   Log l(4, 5);
   for (std::uint64_t n = 1; n <= 23; ++n) {

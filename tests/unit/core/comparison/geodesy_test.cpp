@@ -3,12 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <charconv>
-#include <fstream>
-#include <string>
-#include <vector>
-
-#include "tests/support/shared_data.hpp"
 
 namespace vergence {
 namespace {
@@ -74,39 +68,6 @@ TEST(CompassHeading, headingIsClockwiseFromNorth) {
   EXPECT_NEAR(compass_heading_deg(-kPi / 2), 180, 1e-12);
   EXPECT_NEAR(compass_heading_deg(kPi), 270, 1e-12);
   EXPECT_NEAR(compass_heading_deg(5 * kPi / 2 + 0.1), 360 - 0.1 * 180 / kPi, 1e-9);
-}
-
-/// The numbers of a CSV line.
-std::vector<double> numbers(const std::string& line) {
-  std::vector<double> out;
-  for (std::size_t at = 0; at < line.size();) {
-    std::size_t end = line.find(',', at);
-    if (end == std::string::npos) end = line.size();
-    double v = 0;
-    if (std::from_chars(line.data() + at, line.data() + end, v).ec == std::errc{}) out.push_back(v);
-    at = end + 1;
-  }
-  return out;
-}
-
-TEST(LocalTangentPlane, recordedDriveMatchesToTwoMicrometres) {
-  const auto file = test::shared_data("data/oxts/enu.csv");
-  if (!file) GTEST_SKIP() << test::shared_data_missing("data/oxts/enu.csv");
-  std::ifstream in(*file);
-  std::string line;
-  std::getline(in, line);
-  LocalTangentPlane plane;
-  int rows = 0;
-  while (std::getline(in, line)) {
-    const std::vector<double> v = numbers(line);
-    ASSERT_EQ(v.size(), 7U);
-    const Geodetic place{v[1], v[2], v[3]};
-    if (rows == 0) plane = LocalTangentPlane(place);
-    // The file has six decimals.
-    EXPECT_LT((plane.to_enu(place) - Vec3(v[4], v[5], v[6])).norm(), 2e-6) << line;
-    ++rows;
-  }
-  EXPECT_EQ(rows, 3565);
 }
 
 }  // namespace

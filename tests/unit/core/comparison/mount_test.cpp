@@ -96,22 +96,6 @@ MountStatus estimate(const Drove& d, Mount* m) {
 /// Ground truth in Mount's parameters.
 Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().transpose()); }
 
-TEST(Mount, idealReferenceGivesTheExtrinsics) {
-  for (const bool velocity : {true, false}) {
-    const Drove d = drove({.ideal = true, .velocity = velocity, .late_s = 0.012});
-    Mount m;
-    ASSERT_EQ(estimate(d, &m), MountStatus::ok);
-    for (std::size_t k = 0; k < 3; ++k) {
-      ASSERT_TRUE(m.rotation[k].observable) << k;
-      EXPECT_NEAR(m.rotation[k].value, true_turn()[static_cast<int>(k)], 1e-4);
-    }
-    for (std::size_t k = 0; k < 2; ++k)
-      EXPECT_NEAR(m.lever_arm[k].value, kLever[static_cast<int>(k)], 0.02);
-    ASSERT_TRUE(m.clock_offset.observable);
-    EXPECT_NEAR(m.clock_offset.value, 0.012, 1e-3);
-  }
-}
-
 TEST(Mount, slowReferenceGivesTheExtrinsics) {
   struct Slow {
     double rate, jitter_s;

@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include "core/estimator/degradations.hpp"
 #include "core/estimator/transitions.hpp"
 #include "tests/support/mentions.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace vergence {
 namespace {
@@ -33,13 +32,6 @@ constexpr std::array kDegradationNames = {"pairing",    "scene", "frame",       
                                           "late_image", "rig",   "calibration", "dynamic_scene",
                                           "window",     "motion"};
 static_assert(kDegradationNames.size() == kDegradations);
-
-std::string readme() {
-  std::ifstream file(VERGENCE_SOURCE_DIR "/core/README.md");
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 std::string edge(std::string_view from, std::string_view to, std::string_view on) {
   return std::string(from) + " --> " + std::string(to) + ": " + std::string(on) + "\n";
@@ -65,7 +57,7 @@ TEST(CalibrationStates, suspectAndVerifiedHaveTheirTriggersOnly) {
 }
 
 TEST(CalibrationStates, readmeDiagramsMatchTheTables) {
-  const std::string text = readme();
+  const std::string text = test::read_file(VERGENCE_SOURCE_DIR "/core/README.md");
   for (const CalibrationTransition& t : kCalibrationTransitions) {
     const std::string line = edge(kStateNames[static_cast<std::size_t>(t.from)],
                                   kStateNames[static_cast<std::size_t>(t.to)],

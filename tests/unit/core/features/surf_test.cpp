@@ -8,7 +8,7 @@
 
 #include "core/features/detail/surf_hessian.hpp"
 #include "core/features/surf_match.hpp"
-#include "core/memory/allocation_guard.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
@@ -310,16 +310,13 @@ TEST(Surf, detectionUsesTheArenaAndNoHeap) {
   const std::span<SurfDescriptor> descriptors = arena.make<SurfDescriptor>(kRoom, "descriptors");
   BoundedVector<SurfMatch> matches(arena.make<SurfMatch>(kRoom, "matches"));
 
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
+  vergence::test::expect_no_allocations([&] {
     ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);
     (void)surf.detect({}, &points);
     surf.describe(points.span(), descriptors.first(points.size()));
     const SurfView view{points.span(), descriptors.first(points.size())};
     ASSERT_EQ(matcher.match(view, view, &matches), SurfMatchStatus::ok);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  });
   ASSERT_GT(points.size(), 30U);
   // Everything finds itself.
   EXPECT_EQ(matches.size(), points.size());

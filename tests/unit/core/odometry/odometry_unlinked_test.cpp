@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "core/memory/allocation_guard.hpp"
 #include "core/odometry/odometry.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence::odometry {
@@ -135,13 +135,10 @@ TEST(OdometryUnlinked, thirdCameraIsFoundFromTheMap) {
 
 TEST(OdometryUnlinked, processingUsesTheArenaAndNoHeap) {
   Drive d(false);
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   for (int i = 0; i < 8; ++i) {
     const RigFrame frame = d.corridor.frame(i);
-    const SealedScope sealed;
-    (void)d.odometry.process(frame);
+    vergence::test::expect_no_allocations([&] { (void)d.odometry.process(frame); });
   }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 }  // namespace

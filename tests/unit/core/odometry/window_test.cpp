@@ -6,24 +6,15 @@
 
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "core/odometry/undistorted_camera.hpp"
+#include "tests/support/no_allocations.hpp"
+#include "tests/support/parallel_rig.hpp"
 
 namespace vergence::odometry {
 namespace {
 
 RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
-  r.baseline = 0.5;
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = r.intrinsics[k];
-    c.width = 640;
-    c.height = 480;
-    c.fx = c.fy = 500;
-    c.cx = 320;
-    c.cy = 240;
-  }
+  RigCalibration r = vergence::test::parallel_rig(vergence::test::pinhole(640, 480, 500), 0.5);
   r.T_camera_left[1] = {exp_so3(Vec3(0.01, -0.02, 0.015)), Vec3(-0.5, 0.01, 0.02)};
   return r;
 }
@@ -225,12 +216,7 @@ TEST(WindowAdjuster, certainCalibrationIsKeptFixed) {
 TEST(WindowAdjuster, adjustmentAllocatesNothing) {
   Bend b;
   b.disturb();
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope sealed;
-    (void)b.adjuster.adjust(b.map, true);
-  }
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+  vergence::test::expect_no_allocations([&] { (void)b.adjuster.adjust(b.map, true); });
 }
 
 }  // namespace

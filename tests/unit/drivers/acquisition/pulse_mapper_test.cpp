@@ -13,17 +13,6 @@ const HostStamp kHost(70'000'000'000);
 
 ClockMapperOptions exact() { return {.min_delay = Duration::milliseconds(1)}; }
 
-TEST(PulseMapper, mappedPulseIsUnchanged) {
-  PulseMapper mapper(exact());
-  Pulse p{.arrival = kHost,
-          .mapped = true,
-          .host = HostStamp(1234),
-          .host_error = Duration::nanoseconds(5)};
-  const PulseMapper::Report report = mapper.add(p);
-  EXPECT_EQ(report.pulse.host, HostStamp(1234));
-  EXPECT_EQ(report.pulse.host_error, Duration::nanoseconds(5));
-}
-
 TEST(CameraClock, growingExposureIsNoDrift) {
   CameraClock clock(exact());
   for (int n = 0; n < 100; ++n) {

@@ -74,9 +74,11 @@ TEST_F(Queue, stopDeliversNothingAndDrainsTheRest) {
   EXPECT_EQ(slot, 3U);
   EXPECT_FALSE(queue.drain(&slot)) << "1 is held";
   EXPECT_EQ(queue.held(), 1U);
+  EXPECT_EQ(queue.out(), 1U);
   queue.begin(nullptr);
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout);
   EXPECT_TRUE(queue.release(1)) << "over the stop";
+  EXPECT_FALSE(queue.release(1)) << "once only";
 }
 
 /// Asks again and again, as a drive does, until it is not a time-out or `most` has passed.
@@ -104,6 +106,7 @@ TEST_F(Queue, silentDeviceIsDisconnectedUntilRestarted) {
   EXPECT_EQ(queue.state(), FrameQueue::State::disconnected);
   EXPECT_FALSE(queue.offer(frame(1)));
   queue.begin(&ready, kSilence);
+  EXPECT_EQ(ask(&queue, kSilence * 2, &out), DeviceStatus::timeout) << "again a first image";
   EXPECT_TRUE(queue.offer(frame(1)));
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::ok);
 }
@@ -111,6 +114,8 @@ TEST_F(Queue, silentDeviceIsDisconnectedUntilRestarted) {
 TEST_F(Queue, underrunsAreNoSilence) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence * 20);
+  ASSERT_TRUE(queue.offer(frame(1)));
+  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
   while (monotonic_now() - begun < kSilence * 22) {
     queue.count_underrun();
     ASSERT_EQ(ask(&queue, kSilence, &out), DeviceStatus::timeout);

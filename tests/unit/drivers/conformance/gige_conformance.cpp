@@ -1,6 +1,5 @@
 #include "drivers/gige/gige.hpp"
 
-#include <cstring>
 #include <memory>
 #include <stdexcept>
 

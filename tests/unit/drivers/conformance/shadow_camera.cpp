@@ -1,10 +1,11 @@
 #include "tests/unit/drivers/conformance/shadow_camera.hpp"
 
 #include <gtest/gtest.h>
-#include <time.h>
 
 #include <chrono>
 #include <thread>
+
+#include "drivers/clock.hpp"
 
 namespace vergence::test {
 namespace {
@@ -15,12 +16,6 @@ using std::chrono::steady_clock;
 constexpr Duration kSlack = Duration::milliseconds(500);
 // Maximum time from start() to the first frame: links are probed and sensors settle.
 constexpr Duration kFirst = Duration::milliseconds(4000);
-
-HostStamp now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 /// FNV-1a over the pixels, without the padding.
 std::uint64_t checksum(const ImageView& view) noexcept {
@@ -148,7 +143,7 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
     case DeviceStatus::disconnected:
       EXPECT_TRUE(unplugged_) << "disconnected with the cable in: " << camera_.last_error();
       if (state_ == State::streaming) {
-        EXPECT_LE(frame.arrival, now());
+        EXPECT_LE(frame.arrival, monotonic_now());
         EXPECT_GT(frame.arrival.ns(), 0) << "when it went is not said";
       }
       state_ = State::disconnected;
@@ -172,7 +167,7 @@ void ShadowCamera::check(const Frame& frame) {
     EXPECT_NE(h.frame.slot, frame.slot) << "handed out twice";
     EXPECT_FALSE(overlap(h.view, view)) << "two slots share pixels";
   }
-  EXPECT_LE(frame.arrival, now());
+  EXPECT_LE(frame.arrival, monotonic_now());
   EXPECT_GT(frame.exposure, Duration{});
   if (any_) {
     EXPECT_GT(frame.counter, newest_.counter) << "counters go up";

@@ -2,13 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <numbers>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
 #include "tests/support/mentions.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace vergence::mock {
 namespace {
@@ -50,10 +49,8 @@ TEST(Faults, everyKindTakesItsParameterRanges) {
 }
 
 TEST(Faults, documentationHasTheTable) {
-  std::ifstream in(std::string(VERGENCE_SOURCE_DIR) + "/docs/simulated_rig.md", std::ios::binary);
-  std::ostringstream page;
-  page << in.rdbuf();
-  EXPECT_TRUE(test::mentions(page.str(), "-->\n" + fault_document() + "<!--"))
+  const std::string page = test::read_file(VERGENCE_SOURCE_DIR "/docs/simulated_rig.md");
+  EXPECT_TRUE(test::mentions(page, "-->\n" + fault_document() + "<!--"))
       << "the table between the comments of docs/simulated_rig.md is not this one:\n"
       << fault_document();
 }

@@ -144,15 +144,6 @@ void expect_proven_within_a_second(PulseRigOptions o, std::uint64_t seed, double
 
 TEST(PulsePairing, tenHoursGiveNoWrongPairAndCountLosses) { testing::expect_ten_hours_right(1); }
 
-TEST(PulsePairing, isVerifiedWithinASecondAfterReconnect) {
-  for (std::uint64_t seed = 1; seed <= 40; ++seed)
-    for (const double rate : {20.0, 30.0}) {
-      PulseRigOptions o{
-          .rate_hz = rate, .outages = {{1, 5, 7}, {0, 15.02, 16}}, .reboots = {10.01}};
-      expect_proven_within_a_second(o, seed, 20, 3);
-    }
-}
-
 TEST(PulsePairing, isVerifiedWithinASecondAfterBriefLoss) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed)
     for (const double seconds : {0.05, 0.1, 0.2, 0.3}) {

@@ -21,33 +21,6 @@ OpenSet& open(OpenSets* sets, std::uint64_t number, std::int64_t time) {
   return set;
 }
 
-TEST(TimeNumbering, timeWithinToleranceJoinsTheOpenSet) {
-  TimeNumbering numbering(options(SyncMode::ptp));
-  OpenSets sets;
-  EXPECT_EQ(numbering.number_of(0, 1000 * kMs, &sets).number, 0U);
-  open(&sets, 0, 1000 * kMs);
-  EXPECT_EQ(numbering.number_of(0, 1002 * kMs, &sets).number, 0U);
-  EXPECT_EQ(numbering.number_of(0, 1003 * kMs, &sets).number, 1U) << "the next at least";
-  EXPECT_EQ(numbering.number_of(0, 1148 * kMs, &sets).number, 3U);
-}
-
-TEST(TimeNumbering, timeOfAClosedSetIsTooLate) {
-  TimeNumbering numbering(options(SyncMode::ptp));
-  OpenSets sets;
-  sets.close(&open(&sets, 4, 1000 * kMs));
-  EXPECT_EQ(numbering.number_of(0, 1001 * kMs, &sets).number, 4U);
-  EXPECT_EQ(numbering.number_of(0, 950 * kMs, &sets).number, 4U);
-  EXPECT_EQ(numbering.number_of(0, 1050 * kMs, &sets).number, 5U);
-}
-
-TEST(TimeNumbering, frameOfAMissingSetGetsItsNumber) {
-  TimeNumbering numbering(options(SyncMode::ptp));
-  OpenSets sets;
-  sets.close(&open(&sets, 4, 1000 * kMs));
-  open(&sets, 7, 1150 * kMs);
-  EXPECT_EQ(numbering.number_of(0, 1100 * kMs, &sets).number, 6U);
-}
-
 TEST(TimeNumbering, busClockWrapIsUnwrapped) {
   const TimeNumbering numbering(options(SyncMode::ieee1394_cycle_time));
   OpenSets sets;

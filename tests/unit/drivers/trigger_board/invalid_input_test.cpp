@@ -199,8 +199,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         Stranger{"receiver", kNone, {"NMEA"}, "$GPGGA,130305.0,4717.115,N,00833.912,E,1,08*5B\r\n"},
         Stranger{"ins", kNone, {"Xbus"}, "\xFA\xFF\x36\x03\x10\x20\x01\x99"},
-        Stranger{"noise", kNone, {"no frames"}, "\x81\x82\x93\xA4\xB5"},
-        Stranger{"silence", kNone, {"nothing there answers"}, ""},
+        Stranger{"noise", kNone, {"not frames"}, "\x81\x82\x93\xA4\xB5"},
+        Stranger{"silence", kNone, {"no trigger board responds"}, ""},
         // One that answers a HELLO of any version, with an INFO that has grown.
         Stranger{"newerInfo",
                  kOther,
@@ -233,7 +233,7 @@ TEST(AStubbornBoard, boardIgnoringRequestsIsNamed) {
                                }));
   Device device(std::make_unique<test::SimulatedLinkFactory>(there, direct_line()), {});
   EXPECT_EQ(device.configure(test::thirty_hertz(), nullptr), DeviceStatus::failed);
-  EXPECT_TRUE(test::mentions(device.last_error(), "does not do it"));
+  EXPECT_TRUE(test::mentions(device.last_error(), "does not execute"));
 }
 
 }  // namespace

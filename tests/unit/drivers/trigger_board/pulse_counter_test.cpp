@@ -53,6 +53,12 @@ TEST_F(Accounted, numbersSkippedByTheBoardAreNotLost) {
   EXPECT_EQ(account.counters().lost, 0U);
 }
 
+TEST_F(Accounted, intervalsMayBeShorterByDitherAndRounding) {
+  EXPECT_TRUE(account.accept(event(41, 39 * kPeriod), &pulse));
+  account.set_intervals(30'000, 10'000);
+  EXPECT_TRUE(account.accept(event(82, 65 * kPeriod), &pulse));
+}
+
 TEST_F(Accounted, missingReportsAreCountedAtTheEnd) {
   ASSERT_TRUE(accept(1));
   account.end(2, 0);
@@ -70,7 +76,7 @@ TEST_F(Accounted, repeatedAndOlderEventsAreRefused) {
   EXPECT_FALSE(account.accept(event(2, kPeriod), &pulse));
   EXPECT_FALSE(account.accept(event(2, 2 * kPeriod), &pulse)) << "at the tick of the one before";
   EXPECT_FALSE(account.accept(event(2, kMaxTicks + 1), &pulse));
-  EXPECT_FALSE(account.accept(event(100'000, 3 * kPeriod), &pulse));
+  EXPECT_FALSE(account.accept(event(5, 3 * kPeriod), &pulse)) << "too many for the time";
   EXPECT_EQ(account.refused_in_row(), 6);
   EXPECT_EQ(pulse.number, 1U) << "untouched";
   EXPECT_TRUE(accept(2));
@@ -105,6 +111,12 @@ TEST_F(Accounted, impossibleExposuresAreRefusedAndCounted) {
   EXPECT_EQ(pulse.exposure[0].end, Duration::microseconds(8120));
   EXPECT_FALSE(pulse.exposure[1].seen || pulse.exposure[2].seen || pulse.exposure[3].seen);
   EXPECT_EQ(account.counters().exposures_refused, 2U);
+  e = event(2, 3 * kPeriod);
+  // An exposure lasts ten seconds at most.
+  e.exposure[0] = {120, 10'000'001};
+  ASSERT_TRUE(account.accept(e, &pulse));
+  EXPECT_FALSE(pulse.exposure[0].seen);
+  EXPECT_EQ(account.counters().exposures_refused, 3U);
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
 #pragma once
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -67,27 +66,5 @@ struct XsensRig {
   }
   int disconnects = 0;
 };
-
-/// |mapped − true| of every reading after `settled` of the first, in milliseconds, ascending.
-[[nodiscard]] inline std::vector<double> stamp_errors_ms(const XsensSimulator& simulator,
-                                                         const std::vector<InsReading>& readings,
-                                                         std::int64_t origin_ns, Duration settled) {
-  std::vector<double> errors;
-  for (const InsReading& r : readings) {
-    if (r.measured - readings.front().measured < settled) continue;
-    const HostStamp truth = simulator.host_time(r.measured.ns() - origin_ns);
-    errors.push_back(std::abs((r.host - truth).to_seconds()) * 1e3);
-  }
-  std::sort(errors.begin(), errors.end());
-  return errors;
-}
-
-[[nodiscard]] inline double percentile(const std::vector<double>& ascending, double p) {
-  return ascending.empty()
-             ? 1e9
-             : ascending[std::min(
-                   ascending.size() - 1,
-                   static_cast<std::size_t>(p * static_cast<double>(ascending.size())))];
-}
 
 }  // namespace vergence::test

@@ -139,22 +139,6 @@ TEST(FrameStream, preambleInsideAPayloadIsPayload) {
   EXPECT_TRUE(find_all(cut, std::span(bytes).subspan(1), 1).empty());
 }
 
-TEST(FrameStream, everyByteIsCountedOnce) {
-  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
-    Bytes bytes = noise(5000, seed);
-    // The bytes contain many plausible frame starts.
-    for (std::size_t i = 0; i + 1 < bytes.size(); i += 97) {
-      bytes[i] = kPreamble;
-      bytes[i + 1] = kBusMaster;
-    }
-    FrameStream stream;
-    (void)find_all(stream, bytes, 1 + seed * 13);
-    EXPECT_EQ(stream.counters().message_bytes + stream.counters().garbage_bytes + stream.waiting(),
-              bytes.size());
-    EXPECT_GT(stream.counters().checksum_wrong + stream.counters().length_refused, 0U);
-  }
-}
-
 TEST(FrameStream, abandonFindsTheMessageBehindALongClaim) {
   FrameStream stream;
   const Bytes bytes = joined({from_hex("FA FF 36 FF 08 00"), frame(0x31, {})});

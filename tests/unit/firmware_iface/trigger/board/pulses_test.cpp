@@ -1,8 +1,6 @@
 // When pulses are due, and which exposure belongs to which.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "tests/unit/firmware_iface/trigger/board/virtual_board.hpp"
 
 namespace vergence {
