@@ -26,7 +26,7 @@ template <int Rows, int Cols, class F>
 /// Compares an analytic derivative with central differences at δ = 0, column by column, each within
 /// `tolerance`·(1 + |column|). A failure prints both matrices and their difference:
 ///
-///     EXPECT_TRUE(test::jacobian_matches(J, [&](const Vec3& d) { return pixel_of(p + d); },
+///     EXPECT_TRUE(test::jacobian_matches(J, [&](const Vec3& d) { return project(p + d); },
 ///     1e-6));
 template <class Derived, class F>
 [[nodiscard]] testing::AssertionResult jacobian_matches(const Eigen::MatrixBase<Derived>& analytic,

@@ -18,7 +18,7 @@ constexpr Duration kSlack = Duration::milliseconds(500);
 constexpr Duration kFirst = Duration::milliseconds(4000);
 
 /// FNV-1a over the pixels, without the padding.
-std::uint64_t sum_of(const ImageView& view) noexcept {
+std::uint64_t checksum(const ImageView& view) noexcept {
   std::uint64_t h = 0xcbf29ce484222325U;
   for (int y = 0; y < view.height; ++y)
     for (const std::uint8_t *p = view.row(y), *end = p + view.width; p != end; ++p)
@@ -188,12 +188,12 @@ void ShadowCamera::check(const Frame& frame) {
     EXPECT_TRUE(rig_->content_fits(frame, view))
         << "frame " << frame.counter << " has another one's pixels";
   }
-  held_.push_back({frame, view, sum_of(view)});
+  held_.push_back({frame, view, checksum(view)});
 }
 
 void ShadowCamera::release(std::size_t which) {
   const Held h = held_[which];
-  EXPECT_EQ(sum_of(h.view), h.sum)
+  EXPECT_EQ(checksum(h.view), h.sum)
       << "frame " << h.frame.counter << " was written to while it was ours";
   held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(which));
   camera_.release(h.frame.slot);

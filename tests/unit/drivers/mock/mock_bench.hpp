@@ -14,7 +14,7 @@ namespace vergence::mock {
 
 inline constexpr double kRate = 20;
 
-inline double mean_of(const ImageView& v) {
+inline double mean_grey(const ImageView& v) {
   double sum = 0;
   for (int y = 0; y < v.height; ++y)
     for (int x = 0; x < v.width; ++x) sum += v.at(x, y);
@@ -75,7 +75,7 @@ struct MockBench {
     Frame f;
     DeviceStatus status = camera.wait(Duration{}, &f);
     if (status == DeviceStatus::ok) {
-      frames[k].push_back({f, mean_of(camera.view(f.slot))});
+      frames[k].push_back({f, mean_grey(camera.view(f.slot))});
       camera.release(f.slot);
     } else if (status == DeviceStatus::disconnected) {
       status = camera.start(nullptr);

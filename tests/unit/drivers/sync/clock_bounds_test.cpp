@@ -57,7 +57,7 @@ struct Errors {
   }
 };
 
-ClockMapperOptions options_of(const Line& line, bool two_way) {
+ClockMapperOptions mapper_options(const Line& line, bool two_way) {
   ClockMapperOptions o;
   if (!two_way) o.min_delay = Duration::nanoseconds(line.floor_back);
   return o;
@@ -70,7 +70,7 @@ TEST(ClockBounds, settledErrorIsTwentyMicroseconds) {
     for (std::uint64_t seed = 1; seed <= 200; ++seed) {
       Line line(seed);
       line.drift = seed % 2 == 0 ? 50e-6 : -50e-6;
-      ClockMapper clock(options_of(line, two_way));
+      ClockMapper clock(mapper_options(line, two_way));
       for (int i = 0; i < rate_hz * settled_s * 3 / 2; ++i) {
         const std::int64_t t = 1'000'000'000 + std::llround(i * 1e9 / rate_hz);
         MappedStamp m;
@@ -97,7 +97,7 @@ TEST(ClockBounds, boundsHoldFromTheFirstStampForAnyDelay) {
     // The delays differ, which cannot be observed; the bound allows for it.
     line.floor_there = line.random.below(3'000'000);
     line.floor_back = line.random.below(3'000'000);
-    ClockMapper arrivals(options_of(line, false)), pings(options_of(line, true));
+    ClockMapper arrivals(mapper_options(line, false)), pings(mapper_options(line, true));
     std::int64_t t = 1'000'000'000;
     const std::int64_t step = 5'000'000 + line.random.below(60'000'000);
     for (int i = 0; i < 800; ++i, t += step) {
@@ -115,7 +115,7 @@ TEST(ClockBounds, boundsHoldFromTheFirstStampForAnyDelay) {
 TEST(ClockBounds, setClockIsFoundByTheNextPings) {
   for (const double step : {3600.0, 0.5, 0.003, -0.003, -0.5, -3600.0}) {
     Line line(5);
-    ClockMapper clock(options_of(line, true));
+    ClockMapper clock(mapper_options(line, true));
     int outside = 0;
     std::int64_t t = 1'000'000'000;
     for (int i = 0; i < 4000; ++i, t += 10'000'000) {
@@ -155,7 +155,7 @@ TEST(ClockBounds, tenYearsStayExactToTheNanosecond) {
 TEST(ClockBounds, backlogKeepsStampsMonotonic) {
   Line line(7);
   line.drift = 80e-6;
-  ClockMapper clock(options_of(line, false));
+  ClockMapper clock(mapper_options(line, false));
   HostStamp last{};
   for (int i = 0; i < 5000; ++i) {
     const auto at = [](int n) { return 10'000'000'000 + n * std::int64_t{8'333'333}; };
