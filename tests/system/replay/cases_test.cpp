@@ -516,7 +516,7 @@ std::vector<Case> folders() {
        "!--calibration|camchain.yaml",
        {{"camchain.yaml", kalibr("", kStepBetween)}}},
       {"a pair of camera_info", {}, "{ns}", "0.11 m", info, "--calibration @/l.yaml,@/r.yaml"},
-      {"colour only", named("image_{c2}/{i:06}.png"), "{f:.6e}", "P2, P3", kitti("P2:", "P3:")},
+      {"colour only", named("image_{c2}/{i:06}.png"), "{f:.6e}", "P2 and P3", kitti("P2:", "P3:")},
       {"colour under grey names",
        {"image_{c}/{i:06}.png", {-1, -1}, 0, 3},
        "{f:.6e}",
