@@ -68,8 +68,7 @@ UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
   argument.name = given.substr(0, given.find('='));
   argument.option = argument.name.size() > 1 && argument.name.front() == '-';
   if (!argument.option) argument.why = did_you_mean(argument.name, command_names(command));
-  // The first argument of `calibrate` was a configuration.
-  if (argument.why.empty() && (argument.option || argument.name.find('.') != std::string::npos))
+  if (argument.why.empty())
     argument.why =
         new_name(Renamed::Kind::option,
                  full_name(command) + " " + (argument.option ? argument.name : "CONFIG"));

@@ -125,7 +125,7 @@ std::vector<Case> trajectories() {
       {"VINS", "{ns},{wc},", kTum, "w first|60 poses matched"},
       {"VINS as the reference", kTum, "{ns},{wc},", "w first|60 poses matched"},
       {"NaN and double blanks", "{s}  NaN NaN NaN NaN NaN NaN NaN|{s}  {p}", kTum,
-       "3 rows without numbers|57 poses matched"},
+       "3 rows with NaN|57 poses matched"},
       {"lost, all zeros", "{s} 0 0 0 0 0 0 0|{s} {p}", kTum, "3 rows|57 poses matched"},
       {"all stamps equal", "1403636584.0 {p}", kTum, "the same stamp in all", 2},
       {"repeated", "{s} {p}\n{s} {p}|{s} {p}", kTum,
@@ -317,7 +317,7 @@ std::vector<Case> calibrations() {
       calibration("P in centimetres", pair(camera_info(0), camera_info(-880)),
                   "11 m|unusually long"),
       calibration("sign of P", pair(camera_info(0), camera_info(8.8)), "right.yaml|swapped", 2),
-      calibration("P of one in both", pair(camera_info(-8.8), camera_info(-8.8)), "both have", 2),
+      calibration("P of one in both", pair(camera_info(-8.8), camera_info(-8.8)), "the same P", 2),
       calibration("size of the sensor",
                   pair(camera_info(0, "image_width: 192\nimage_height: 144\n"),
                        camera_info(-8.8, "image_width: 192\nimage_height: 144\n")),
@@ -516,7 +516,7 @@ std::vector<Case> folders() {
        "!--calibration|camchain.yaml",
        {{"camchain.yaml", kalibr("", kStepBetween)}}},
       {"a pair of camera_info", {}, "{ns}", "0.11 m", info, "--calibration @/l.yaml,@/r.yaml"},
-      {"colour only", named("image_{c2}/{i:06}.png"), "{f:.6e}", "P2, P3", kitti("P2:", "P3:")},
+      {"colour only", named("image_{c2}/{i:06}.png"), "{f:.6e}", "P2 and P3", kitti("P2:", "P3:")},
       {"colour under grey names",
        {"image_{c}/{i:06}.png", {-1, -1}, 0, 3},
        "{f:.6e}",
@@ -573,7 +573,7 @@ std::vector<Case> folders() {
                     "0 0.05 0.03 4 {} 4 4 0\n",
                     49 + 4.5e-6 * i, i == 3 ? 0 : 8));
   rows.push_back({"KITTI raw with its INS", named(drive + "image_0{c}/data/{i:010}.png"), "",
-                  "1 of 6 packets have no satellites' fix", raw});
+                  "1 of 6 packets have no satellite fix", raw});
   rows.push_back(
       {"St Lucia with its INS",
        named("200101_100000_MultiCamera0/cam{c}_{i}.bmp"),

@@ -159,7 +159,7 @@ TEST(Conversion, corruptFilesNameFileAndKey) {
   };
   const std::vector<Case> cases{
       {"", "", "is empty"},
-      {"just words", "", "is not a group of keys"},
+      {"just words", "", "is not a calibration"},
       {"a: [1, 2", "", "is not YAML"},
       {"a: 1", "", "the camera matrix of a second camera is missing"},
       {replaced(kalibr, "camera_model: pinhole", "camera_model: omni"), "",

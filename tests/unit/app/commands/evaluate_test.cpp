@@ -195,9 +195,9 @@ TEST(EvaluateCommand, refusesInvalidArguments) {
   refused({"--step", "many"}, "--step");
   refused({"--associate", "guess"}, "guess");
   refused({"--axes", "north"}, "north");
-  refused({"--max-gap", "-1"}, "--max-gap needs");
+  refused({"--max-gap", "-1"}, "--max-gap must be");
   refused({"--max-gap", "nan"}, "--max-gap");
-  refused({"--max-difference", "1e300"}, "--max-difference needs");
+  refused({"--max-difference", "1e300"}, "--max-difference must be");
   EXPECT_EQ(evaluate_command({(folder / "none.tum").string(), a}).code, 2);
   EXPECT_EQ(evaluate_command({a}).code, 2);
 }

@@ -201,7 +201,7 @@ TEST(KittiRaw, missingFilesSkipTheirFrames) {
       {"another day", text(times_name(1), "2012-01-01 00:00:00.0\n"), 0, "no stamp close"},
       {"numbers missing", calibration("D_01: -0.3 0.1 0.001", "D_01: -0.3"), 0,
        "calib_cam_to_cam.txt:12: D_01: has 3 numbers instead of 5"},
-      {"a key missing", calibration("R_01:", "Q_01:"), 0, "has no line `R_01:`, 9 numbers"},
+      {"a key missing", calibration("R_01:", "Q_01:"), 0, "has no line `R_01:` with 9 numbers"},
       {"no number", calibration("R_01: 1 0", "R_01: 1 x"), 0, "calib_cam_to_cam.txt:13: R_01: `x`"},
       {"not a rotation", calibration("R_01: 1 0", "R_01: 1 2"), 0, "R_01: is not a rotation"},
       {"no calibration", [](const Folder& f) { fs::remove(f / kCameras); }, 0,

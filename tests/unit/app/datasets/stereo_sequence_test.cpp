@@ -68,7 +68,8 @@ TEST_F(Sequence, refusalNamesFileAndProblem) {
            Bad{right, with("radial-tangential", "fov"), "cam1/sensor.yaml", "fov"},
            Bad{right, with(lens, "intrinsics: [60, 61, 35]"), "cam1/sensor.yaml", "intrinsics",
                "fx fy cx cy"},
-           Bad{right, with(lens, "intrinsics: {a: b}"), "cam1/sensor.yaml", "lens", "missing"},
+           Bad{right, with(lens, "intrinsics: {a: b}"), "cam1/sensor.yaml", "camera matrix",
+               "missing"},
            Bad{right, with(size, "resolution: [1e30, 48]"), "cam1/sensor.yaml", "resolution"},
            Bad{right, with(size, "resolution: [80, 48]"), "sensor.yaml", "80x48", "one size"},
        }) {

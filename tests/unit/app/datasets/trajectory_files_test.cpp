@@ -72,7 +72,7 @@ TEST(Trajectory, readsVariantsOfPrograms) {
       Row{"an index and more columns",
           "0 1.5" + moved + " 7 7\n1 1.6" + moved + " 7 7\n2 1.7" + moved + " 7 7\n", 3,
           1'500'000'000, ""},
-      Row{"unfinished", "1.5" + moved + "\n1.6 1 2", 1, 1'500'000'000, "unfinished"},
+      Row{"unfinished", "1.5" + moved + "\n1.6 1 2", 1, 1'500'000'000, "incomplete"},
       Row{"a matrix with its time", "1.5 0 -1 0 1 1 0 0 2 0 0 1 3\n", 1, 1'500'000'000, ""},
       Row{"a matrix of 4 x 4", "1.5 0 -1 0 1 1 0 0 2 0 0 1 3 0 0 0 1\n", 1, 1'500'000'000, ""},
       Row{"a matrix of three decimals", "1.5 0.001 -1 0 1 1 0.001 0 2 0 0 1.001 3\n", 1,
