@@ -5,12 +5,13 @@
 //
 // NEES is the normalised squared error of the motion over a number of frames, position and rotation
 // apart, each 3 where the covariance is right: above, it promises too much, below, too little.
-// "within" is the share of positions
-// inside the ellipsoid of 95 %. The recorded drives' truth has errors of its own, which are added
-// to the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger, Lenz, Urtasun, CVPR 2012), of
-// EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where nothing is stated, an assumed
-// 0.05°. The last line of a drive is the largest share of a motion that the window corrected by
-// more than the motion's sigma.
+// "within" is the share of positions inside the ellipsoid of 95 %. "path alone" is the NEES of the
+// position after the path is turned about its start onto the truth's, which does not depend on the
+// truth's orientation there. The recorded drives' truth has errors of its own, which are added to
+// the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger, Lenz, Urtasun, CVPR 2012), of EuRoC's
+// Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where nothing is stated, an assumed 0.05°. The
+// last line of a drive is the largest share of a motion that the window corrected by more than the
+// motion's sigma.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,6 +22,7 @@
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "app/session/drive_calibration.hpp"
 #include "core/estimator/detail/window_correction.hpp"
@@ -74,7 +76,7 @@ double nees(const Mat3& covariance, const Vec3& error) {
 struct Means {
   int count = 0, within = 0;
   // Sums of NEES.
-  double position = 0, rotation = 0;
+  double position = 0, path_alone = 0, rotation = 0;
   // Sums of squares of the error lengths.
   double error_m = 0, sigma_m = 0;
   double error_rad = 0, sigma_rad = 0;
@@ -95,20 +97,38 @@ struct Means {
     const auto rms = [n](double sum) { return std::sqrt(sum / n); };
     fmt::print(
         "{:12s} {:>6s} frames: {:4d} motions, position {:.3f} m, sigma {:.3f}, NEES {:7.2f}, "
-        "within {:3.0f} %; rotation {:.4f} deg, sigma {:.4f}, NEES {:7.2f}\n",
-        drive, frames, count, rms(error_m), rms(sigma_m), position / n, 100.0 * within / n,
-        rms(error_rad) * 57.29578, rms(sigma_rad) * 57.29578, rotation / n);
+        "path alone {:7.2f}, within {:3.0f} %; rotation {:.4f} deg, sigma {:.4f}, NEES {:7.2f}\n",
+        drive, frames, count, rms(error_m), rms(sigma_m), position / n, path_alone / n,
+        100.0 * within / n, rms(error_rad) * 57.29578, rms(sigma_rad) * 57.29578, rotation / n);
   }
 };
 
-/// Errors of the motion from `a` to `b`, about the axes of world where `a` is it.
-void add_motion(const Posed& a, const Posed& b, const TruthSigma& sigma, Mat6 C, Means* means) {
+/// Rotation about the first pose that turns the estimated path onto the true one.
+Mat3 turn_onto_truth(std::span<const Posed> poses) {
+  Eigen::Matrix3Xd ours(3, poses.size()), truth(3, poses.size());
+  for (Eigen::Index i = 0; i < ours.cols(); ++i) {
+    const Posed &a = poses.front(), &b = poses[static_cast<std::size_t>(i)];
+    ours.col(i) = (a.sample.T_world_left.inverse() * b.sample.T_world_left).t;
+    truth.col(i) = (a.T_world_left_true.inverse() * b.T_world_left_true).t;
+  }
+  const Eigen::JacobiSVD<Mat3> svd(truth * ours.transpose(),
+                                   Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  return svd.matrixU() * Vec3(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+}
+
+/// Errors of the motion from the first pose to the last, about the axes of the world in which the
+/// first is the identity.
+void add_motion(std::span<const Posed> poses, const TruthSigma& sigma, Mat6 C, Means* means) {
+  const Posed &a = poses.front(), &b = poses.back();
   const Transform ours = a.sample.T_world_left.inverse() * b.sample.T_world_left;
   const Transform truth = a.T_world_left_true.inverse() * b.T_world_left_true;
   // Combines both ends; the first one's rotation also moves the other end.
   const double position = sigma.position_m * sigma.position_m,
                rotation = sigma.rotation_rad * sigma.rotation_rad;
-  C.diagonal().head<3>().array() += 2 * position + rotation * truth.t.squaredNorm();
+  C.diagonal().head<3>().array() += 2 * position;
+  means->path_alone += nees(C.topLeftCorner<3, 3>(), turn_onto_truth(poses) * ours.t - truth.t);
+  C.diagonal().head<3>().array() += rotation * truth.t.squaredNorm();
   C.diagonal().tail<3>().array() += 2 * rotation;
   means->add(C, ours.t - truth.t, log_so3(ours.R * truth.R.transpose()));
 }
@@ -179,14 +199,14 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   for (const std::size_t frames : {1U, 5U, 10U, 20U, 50U, 100U}) {
     Means means, spoilt;
     for (std::size_t i = 0; i + frames < poses.size(); ++i)
-      add_motion(poses[i], poses[i + frames], sigma, propagated(poses.subspan(i, frames + 1)),
+      add_motion(poses.subspan(i, frames + 1), sigma, propagated(poses.subspan(i, frames + 1)),
                  without_truth(name, i, i + frames) ? &spoilt : &means);
     if (means.count > 0) means.print(name, std::to_string(frames));
     if (spoilt.count > 0) spoilt.print(name + " *", std::to_string(frames));
   }
   Means all;
   for (std::size_t i = 10; i < poses.size(); ++i)
-    add_motion(poses[0], poses[i], sigma, full(poses[i].sample.covariance), &all);
+    add_motion(poses.first(i + 1), sigma, full(poses[i].sample.covariance), &all);
   all.print(name, "all");
   fmt::print(
       "{:12s} the window's largest correction beyond a motion's sigma: {:.1f} % of the motion\n",
