@@ -8,7 +8,6 @@
 
 namespace vergence::calibration {
 
-
 /// Change of one frame's disparities against their prediction from the previous frame.
 struct DisparityJump {
   /// False if there are too few tracks.

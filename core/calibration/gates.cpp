@@ -9,7 +9,6 @@
 #include "core/camera/camera.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/angle.hpp"
-#include "core/math/robust.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::calibration {

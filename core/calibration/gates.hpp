@@ -3,6 +3,7 @@
 #include "core/calibration/options.hpp"
 #include "core/calibration/rig_solver.hpp"
 #include "core/calibration/track_log.hpp"
+#include "core/math/robust.hpp"
 #include "core/types/calibration.hpp"
 
 namespace vergence::calibration {
@@ -19,8 +20,6 @@ struct HeldOut {
 inline constexpr double kMaxFitPx = 0.5;
 /// Maximum numbers of held-out frames of a test and of matches of each, which bound its time.
 inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
-/// Number of standard errors by which one calibration must fit better in a single comparison.
-inline constexpr double kChance = 2.0;
 
 /// Measures the fit on frames newer than frame number `after`: at most the newest kHeldOutFrames,
 /// and at most kHeldOutMatches of each. With several additional cameras the worst one counts, in

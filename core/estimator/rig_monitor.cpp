@@ -83,8 +83,8 @@ void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
                                        const Mat6& covariance) noexcept {
   CameraMonitors& w = camera(k);
   (void)w.monitor.set_reference(T_camera_left, pinhole(rig_, 0), pinhole(rig_, k), covariance);
-  // Until the spread of matches is known, a result makes poses `degraded` and raises no knock.
-  w.grace = kMinForMean;
+  // Before the spread of matches is known, a result makes poses `degraded` and raises no knock.
+  w.grace = kMinForMean - 1;
 }
 
 void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,

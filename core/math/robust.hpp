@@ -16,6 +16,8 @@ inline constexpr double kMinScale = 0.05;
 /// Number of reweighting rounds; two reduce the scale from that of a shifted set to that of the
 /// noise.
 inline constexpr int kReweightings = 3;
+/// Number of standard errors that a single comparison needs.
+inline constexpr double kChance = 2.0;
 /// Number of standard errors that a decision needs which is repeated with every frame or solve.
 inline constexpr double kCertainSigmas = 3.0;
 /// Number of sigmas of a single value beyond which it has another cause than noise: not once in a

@@ -18,7 +18,8 @@ struct RoughMatch {
 /// mutually best. docs/benchmarks.md compares it with corners.
 ///
 /// Threads  One caller.
-/// Memory   From the arena at construction. If there are more than kMaxPoints blobs, the weakest are
+/// Memory   From the arena at construction. If there are more than kMaxPoints blobs, the weakest
+/// are
 ///          dropped.
 /// Errors   Images that are empty or too large give no matches.
 class BlobMatcher {

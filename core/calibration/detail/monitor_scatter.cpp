@@ -1,6 +1,5 @@
 #include "core/calibration/detail/monitor_scatter.hpp"
 
-#include "core/calibration/detail/evidence_history.hpp"
 #include "core/math/linear_solve.hpp"
 
 namespace vergence::calibration::detail {
@@ -8,6 +7,8 @@ namespace {
 
 // Ratio to the expected scatter above which a block's offset is a change of the rig.
 constexpr double kMaxOfExpected = 20;
+// Length of the running mean, in blocks: half a minute at 30 Hz.
+constexpr std::uint64_t kMaxBlocks = 60;
 
 }  // namespace
 
@@ -21,7 +22,7 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const double limit = kMaxOfExpected * std::max(variance(), lambda / block.n);
   // The comparison also rejects NaN.
   if (!(scatter < limit)) return;
-  if (blocks_ == EvidenceHistory::kBlocks) {
+  if (blocks_ == kMaxBlocks) {
     sum_ -= sum_ / static_cast<double>(blocks_);
     --blocks_;
   }

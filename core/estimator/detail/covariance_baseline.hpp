@@ -24,7 +24,7 @@ class CovarianceBaseline {
   /// Returns true if the motion is significant against the baseline's sigma. Residuals are smaller
   /// at standstill, so such motions must not enter the baseline.
   [[nodiscard]] bool measurable(double step_m, double sigma_m) const noexcept {
-    return step_m > kCertainSigmas * (known() ? median() : sigma_m);
+    return step_m > kChance * (known() ? median() : sigma_m);
   }
   /// Adds a motion. Returns true if it is unusually uncertain; it does not enter the baseline then.
   [[nodiscard]] bool update(double sigma_m) noexcept {

@@ -111,9 +111,10 @@ TEST(StateFile, stateOfOtherRigIsRefusedWithReason) {
            Change{
                "rig.nominal.baseline_m was 0.75 when it was saved and is now 0.7512",
                [](CalibrationFile* f) { (*f->configured)["rig.nominal.baseline_m"] = "0.7512"; }},
-           Change{"cameras.1.model was pinhole-equidistant, it is its default now",
-                  [](CalibrationFile* f) { f->configured->erase("cameras.1.model"); }},
-           Change{"cameras.0.offset.0 was its default, it is 200 now",
+           Change{
+               "cameras.1.model was pinhole-equidistant when it was saved and is now its default",
+               [](CalibrationFile* f) { f->configured->erase("cameras.1.model"); }},
+           Change{"cameras.0.offset.0 was its default when it was saved and is now 200",
                   [](CalibrationFile* f) { (*f->configured)["cameras.0.offset.0"] = "200"; }},
            Change{"its baseline is 0.75 m, the configuration's 0.8 m",
                   [](CalibrationFile* f) { f->rig.baseline = 0.8; }},

@@ -112,7 +112,7 @@ TEST_P(BagIns, interpolatesOrientationAtFix) {
     EXPECT_DOUBLE_EQ(s.heading_sigma, 0.01);
   }
   EXPECT_TRUE(mentions(all(ins), "the INS is /fix with the orientation of /imu/data"));
-  EXPECT_TRUE(mentions(all(ins), "/fix: 1 of 4 readings have no fix"));
+  EXPECT_TRUE(mentions(all(ins), "/fix: 1 of 4 samples have no fix"));
 }
 
 TEST_P(BagIns, fixWithoutOrientationHasNoAttitude) {

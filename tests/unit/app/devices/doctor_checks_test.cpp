@@ -81,7 +81,7 @@ const std::vector<Case>& cases() {
          f.camera("v4l2", "A", "/dev/video0");
          f.need("v4l2", ""), f.need("v4l2", "B");
        },
-       "cameras", "problem ok", "there: A"},
+       "cameras", "problem ok", "found: A"},
       {"a driver hangs",
        [](auto& f) {
          f.inventory.drivers.push_back({"v4l2", "", false, {}, "no answer"});

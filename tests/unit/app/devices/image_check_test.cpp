@@ -74,7 +74,7 @@ TEST(ImageCheck, rejectsBlackWhiteAndFlatImages) {
   ASSERT_EQ(remarks.size(), 3U);
   EXPECT_TRUE(contains(remarks[0].message, "left is black"));
   EXPECT_TRUE(contains(remarks[1].message, "right is overexposed: 100 %"));
-  EXPECT_TRUE(contains(remarks[2].message, "middle shows nothing"));
+  EXPECT_TRUE(contains(remarks[2].message, "middle is one uniform grey"));
   for (const ImageIssue& r : remarks) EXPECT_TRUE(r.unusable);
 }
 

@@ -5,12 +5,12 @@
 namespace vergence::odometry {
 namespace {
 
-TEST(NewPointMonitor, fewerThanThreeInTenKeptIsLost) {
+TEST(NewPointMonitor, fewerThanAQuarterKeptIsLost) {
   NewPointMonitor watch;
   EXPECT_FALSE(watch.lost());
-  watch.add(100, 31);
+  watch.add(100, 26);
   EXPECT_FALSE(watch.lost());
-  watch.add(100, 29);
+  watch.add(100, 24);
   EXPECT_TRUE(watch.lost());
   watch.add(100, 90);
   EXPECT_FALSE(watch.lost());
