@@ -6,10 +6,9 @@
 
 namespace vergence::odometry {
 
-/// Share of the found points that may agree with a wrong pose: 0.05 if it follows a moving object,
-/// and a quarter of the far points with a wrong calibration. With the right pose and rig it is 0.5
-/// to 0.9.
-inline constexpr double kChanceShare = 0.25;
+/// Share of the found points above which a pose is not wrong: 0.05 agree with one that follows a
+/// moving object. A wrong calibration leaves a quarter of the far points, the right one 0.5 to 0.9.
+inline constexpr double kChanceShare = 0.2;
 /// Minimum share of found points that agree with the pose; below it something else moves. A half
 /// loses three frames of `sand_rover` in a mirror.
 inline constexpr double kRigidShare = 0.4;

@@ -5,12 +5,12 @@
 namespace vergence::odometry {
 namespace {
 
-TEST(NewPointMonitor, fewerThanAQuarterKeptIsLost) {
+TEST(NewPointMonitor, fewerThanAFifthKeptIsLost) {
   NewPointMonitor watch;
   EXPECT_FALSE(watch.lost());
-  watch.add(100, 26);
+  watch.add(100, 21);
   EXPECT_FALSE(watch.lost());
-  watch.add(100, 24);
+  watch.add(100, 19);
   EXPECT_TRUE(watch.lost());
   watch.add(100, 90);
   EXPECT_FALSE(watch.lost());
