@@ -14,7 +14,7 @@ class NewPointMonitor {
     tried_ += tried;
     kept_ += kept;
     if (tried_ < static_cast<int>(kMinTracksOfFrame)) return;
-    lost_ = kept_ < kChanceShare * tried_;
+    lost_ = kept_ < kMinSeenAgain * tried_;
     tried_ = kept_ = 0;
   }
   /// True if the last evaluated points were mostly lost.

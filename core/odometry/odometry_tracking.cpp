@@ -133,7 +133,7 @@ void Odometry::count_across(const PoseFit& fit) noexcept {
     seen += p.across && now ? 1 : 0;
     p.across = p.across || now;
   }
-  stereo_fails_ = link_ == Link::linked && seen < kChanceShare * expected;
+  stereo_fails_ = link_ == Link::linked && seen < kMinSeenAgain * expected;
 }
 
 void Odometry::settle_points(const PoseFit& fit) noexcept {

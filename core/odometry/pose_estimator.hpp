@@ -6,9 +6,12 @@
 
 namespace vergence::odometry {
 
-/// Share of the found points above which a pose is not wrong: 0.05 agree with one that follows a
-/// moving object. A wrong calibration leaves a quarter of the far points, the right one 0.5 to 0.9.
+/// Share of the found points that may agree with a wrong pose. A wrong calibration leaves a quarter
+/// of the far points.
 inline constexpr double kChanceShare = 0.2;
+/// Minimum share of points that are seen where pose and rig expect them: in a static scene it is
+/// 0.5 to 0.9, and 0.05 if the pose follows a moving object.
+inline constexpr double kMinSeenAgain = 0.3;
 /// Minimum share of found points that agree with the pose; below it something else moves. A half
 /// loses three frames of `sand_rover` in a mirror.
 inline constexpr double kRigidShare = 0.4;

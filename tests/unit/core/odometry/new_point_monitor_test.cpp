@@ -5,12 +5,12 @@
 namespace vergence::odometry {
 namespace {
 
-TEST(NewPointMonitor, fewerThanAFifthKeptIsLost) {
+TEST(NewPointMonitor, fewerThanThreeInTenKeptIsLost) {
   NewPointMonitor watch;
   EXPECT_FALSE(watch.lost());
-  watch.add(100, 21);
+  watch.add(100, 31);
   EXPECT_FALSE(watch.lost());
-  watch.add(100, 19);
+  watch.add(100, 29);
   EXPECT_TRUE(watch.lost());
   watch.add(100, 90);
   EXPECT_FALSE(watch.lost());
