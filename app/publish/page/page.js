@@ -88,7 +88,8 @@ function item(text) {
   return li;
 }
 
-const EVENTS = 10, HISTORY = 4;  // that a page has room for; files have all of them
+// Numbers of events and calibrations that the page shows; the session files have all of them.
+const EVENTS = 10, HISTORY = 4;
 
 function showEvents(list) {
   const ul = $("events");
@@ -137,7 +138,8 @@ function drawMap() {
   const canvas = $("map"), ratio = fit(canvas), g = canvas.getContext("2d");
   g.clearRect(0, 0, canvas.width, canvas.height);
   const ours = drive.trail.map(onEarth), theirs = drive.enu_alignment ? drive.trail.filter(p => p.length > 4).map(p => [p[4], p[5]]) : [];
-  if (drive.now && drive.now.position_m) ours.push(onEarth(drive.now.position_m));  // steps of the trail are long after a long drive
+  // After a long drive the trail's steps are long, so the newest position is added.
+  if (drive.now && drive.now.position_m) ours.push(onEarth(drive.now.position_m));
   show("map_words", drive.enu_alignment ? "View from above, north up; the bar is the scale." : "View from above, the first viewing direction up; the bar is the scale. The INS appears after the ENU alignment.");
   if (!ours.length) return;
   let [l, b, r, t] = [Infinity, Infinity, -Infinity, -Infinity];
@@ -273,7 +275,8 @@ function receive(message) {
   redraw();
 }
 
-const POLL_MS = 100, AGAIN_MS = 1000, REFUSED_MS = 2000;  // until the next request
+// Times until the next request: usually, without a connection, and after a refusal.
+const POLL_MS = 100, AGAIN_MS = 1000, REFUSED_MS = 2000;
 const QUIET_MS = 3000, GIVEN_UP_MS = 15000;
 let have = {epoch: "", after: 0, image: ""}, connected = false, heard = 0;
 
@@ -291,7 +294,8 @@ async function ask() {
   try {
     if (connected) receive(JSON.parse(text));
   } catch (error) {
-    console.error(error);  // a mistake of the page's is not to look like a lost connection
+    // An error of the page itself must not look like a lost connection.
+    console.error(error);
   }
   return POLL_MS;
 }
