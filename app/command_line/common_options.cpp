@@ -36,7 +36,8 @@ void CommonOptions::declare_quiet(CLI::App& command) {
 void CommonOptions::declare(CLI::App& command) {
   declare_set(command);
   add_option(command, "--threads", threads,
-             "Threads of the estimator, 1 or 2; the poses are the same", "N", "Performance");
+             "Threads of the estimator, 1 or 2; the poses are the same", "N", "Performance")
+      ->check(CLI::Range(1, 2).description(""));
   add_option(command, "--seed", seed,
              "Seed of the random sampling; the same seed gives the same poses", "N", "Performance");
   declare_quiet(command);
