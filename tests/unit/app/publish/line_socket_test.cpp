@@ -178,13 +178,13 @@ TEST_F(UnixLines, imageReaderGetsWholePairsAtItsRateAndNoLines) {
   // This is more than a socket buffers.
   const std::string pair(1'000'000, 'p');
   ASSERT_TRUE(socket->wants_images());
+  const HostStamp begin = monotonic_now();
   socket->send_images(pair);
   EXPECT_FALSE(socket->wants_images()) << "it has not read the pair";
   socket->send_images("dropped");
   socket->greet("greeting\n");
   socket->send("line\n");
   std::string read;
-  const HostStamp begin = monotonic_now();
   while (read.size() < 4 + pair.size() && monotonic_now() - begin < Duration::seconds(10)) {
     read += all_of(images);
     wait(socket.get());
