@@ -11,7 +11,7 @@ namespace vergence::calibration::detail {
 
 /// Size of the monitor's θ: rotation φ (3, rad) and the direction of t by α and β (rad).
 inline constexpr int kTheta = 5;
-/// Rate of a fast running mean of widths, per frame.
+/// Rate of a fast running mean of widths, per frame: over ten frames, a second of the slowest rigs.
 inline constexpr double kFastUpdate = 0.1;
 
 /// Gradient g, information A and weight n (1/px²) of θ from observations with residuals r at θ = 0,

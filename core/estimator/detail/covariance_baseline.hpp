@@ -44,10 +44,11 @@ class CovarianceBaseline {
   [[nodiscard]] double margin() const noexcept { return ratio_ / kUnusualRatio; }
 
  private:
-  // Numbers of motions in the baseline and in the test for the end.
+  // Numbers of motions in the baseline (six seconds at 10 Hz) and in the test for the end, so that
+  // one certain motion among uncertain ones ends nothing.
   static constexpr std::size_t kKept = 61, kRecent = 3;
 
-  // A quarter of the motions determines the median well enough.
+  // The standard error of the median of a quarter of the motions is a third of their scatter.
   [[nodiscard]] bool known() const noexcept { return kept_ >= kKept / 4; }
 
   [[nodiscard]] double median() const noexcept {

@@ -154,7 +154,7 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
        "at the end is not verified"},
       {"not monitored", [](Case& c) { c.given(false), c.calibration()["online"] = false; }, care,
        "calibration.online: off"},
-      {"truncated, waited in vain",
+      {"truncated, timed out",
        [](Case& c) {
          c.session.summary = nullptr, c.attempt(true, "given", 0, 0);
          c.frames_of(1000, 0), c.analysis.waited = 1000;

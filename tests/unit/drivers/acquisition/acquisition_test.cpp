@@ -120,7 +120,8 @@ TEST(Acquisition, everyPulseAndReadingComesOnceInOrder) {
   EXPECT_EQ(b.source->counters().pulses, 81U);
 }
 
-/// Starts, gives nothing and disconnects, again and again; who tells it is only told of the first.
+/// Starts, gives nothing and disconnects, again and again; only the first of these events is
+/// reported.
 struct EmptyCamera final : test::IdleCamera {
   DeviceStatus start(Notifier*) noexcept override {
     starts.fetch_add(1);
