@@ -240,7 +240,6 @@ class Solve {
     for (std::size_t i = 0; i < problem_.T_left_world.size(); ++i)
       if (w_.poses[i].block >= 0) problem_.T_left_world[i] = s.poses[i];
     for (std::size_t i = 0; i < w_.point_count; ++i) {
-      if (w_.point_free[i] == 0) continue;
       const std::size_t batch = i / detail::kBatch, lane = i % detail::kBatch;
       for (std::size_t c = 0; c < 3; ++c)
         problem_.points[static_cast<std::uint32_t>(w_.order[i])][static_cast<Eigen::Index>(c)] =

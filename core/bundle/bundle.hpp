@@ -53,8 +53,6 @@ struct BundleProblem {
   std::span<const std::uint8_t> pose_constant;
   /// Points in the world in metres, in/out.
   std::span<Vec3> points;
-  /// One flag per point, 1 if it is constant; if empty, none is.
-  std::span<const std::uint8_t> point_constant;
   std::span<const BundleObservation> observations;
   /// Output: |ε|² inverse_sigma² of each observation at the result; one per observation, or empty.
   std::span<float> squared_residuals;

@@ -7,8 +7,8 @@
 namespace vergence::calibration {
 namespace {
 
-// Systematic error of the measured focal length: at most 3.2 % on recorded sequences after 25
-// frames (docs/calibration.md). A contradiction must exceed it and kCertainSigmas of noise.
+// Systematic error of the measured focal length, relative: at most 3.2 % on recorded sequences
+// after 25 frames (docs/calibration.md).
 constexpr double kSystematic = 0.04;
 
 }  // namespace
@@ -23,11 +23,13 @@ FocalMeasurement check_focal_length(const RigSolution& found,
   if (found.status == RigSolveStatus::not_converged && off > kFocalPriorSigma) {
     // The solve has not converged but is already far off, and the true value is farther.
     m.measured_px = lens.fx;
-    m.contradicted = true;
+    m.contradicted = m.doubted = true;
   } else if (found.status == RigSolveStatus::ok && lens.sigma[0] > 0) {
     m.measured_px = lens.fx;
     m.sigma_px = std::hypot(lens.sigma[0], kSystematic * lens.fx);
-    m.contradicted = off > kSystematic + kCertainSigmas * lens.sigma[0] / lens.fx;
+    const double noise = lens.sigma[0] / lens.fx;
+    m.contradicted = off > kSystematic + kCertainSigmas * noise;
+    m.doubted = m.contradicted || log_odds(off, noise, kSystematic, kFocalPriorSigma) < 0;
   }
   return m;
 }
@@ -36,7 +38,8 @@ void FocalCheck::measure(RigSolver& solver, RigSolveRequest request,
                          const RigSolution& solved) noexcept {
   solved_ = {};
   solve_ms_ = 0;
-  if (!measures_ || solved.status != RigSolveStatus::ok || request.given == nullptr) return;
+  if (!enabled_ || known_ || solved.status != RigSolveStatus::ok || request.given == nullptr)
+    return;
   request.measure_focal_lengths = true;
   request.rig.T_camera_left = solved.rig.T_camera_left;
   request.rig.intrinsics = solved.rig.intrinsics;
@@ -48,10 +51,9 @@ void FocalCheck::measure(RigSolver& solver, RigSolveRequest request,
 }
 
 void FocalCheck::accept(bool full) noexcept {
-  if (!measures_ || solved_.measured_px <= 0) return;
+  if (solved_.measured_px <= 0) return;
   newest_ = solved_;
-  measured_frames_ = frames_;
-  known_ = full && !newest_.contradicted;
+  known_ = full && !newest_.doubted;
 }
 
 }  // namespace vergence::calibration

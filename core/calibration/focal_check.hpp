@@ -15,7 +15,7 @@ namespace vergence::calibration {
 [[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,
                                                   const RigCalibration& given) noexcept;
 
-/// Decides which solves measure the focal length, and keeps the newest result.
+/// Measures the focal length after solves of the rig, and keeps the newest result.
 ///
 /// Threads  measure() runs on the solver's thread, the others on the estimator's while no solve
 ///          runs.
@@ -23,15 +23,10 @@ class FocalCheck {
  public:
   explicit FocalCheck(bool enabled) noexcept : enabled_(enabled) {}
 
-  /// Call before a solve of `frames` frames; `full`: the maximum number. The solve measures the
-  /// focal length if it is full or has twice the frames of the last measurement. After a full solve
-  /// has agreed with the configured value, no more are measured.
-  void begin_solve(std::size_t frames, bool full) noexcept {
-    measures_ = enabled_ && !known_ && (full || frames >= 2 * measured_frames_);
-    frames_ = frames;
-  }
-  /// Call after `solved`, the result of `request` on the solver's log, which is the starting point.
-  /// The posterior of earlier frames is not used, because it assumes the focal length.
+  /// Measures the focal length, unless a solve of the maximum number of frames has agreed with the
+  /// configured value. Call after `solved`, the result of `request` on the solver's log, which is
+  /// the starting point. The posterior of earlier frames is not used, because it assumes the focal
+  /// length.
   void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& solved) noexcept;
   /// Accepts the measurement of a finished solve. `full`: it had the maximum number of frames.
   void accept(bool full) noexcept;
@@ -41,11 +36,9 @@ class FocalCheck {
   [[nodiscard]] double solve_ms() const noexcept { return solve_ms_; }
 
  private:
-  bool enabled_, measures_ = false;
+  bool enabled_;
   // True if a full solve has agreed with the configured value.
   bool known_ = false;
-  // Numbers of frames of the running solve and of the newest result.
-  std::size_t frames_ = 0, measured_frames_ = 0;
   FocalMeasurement newest_{}, solved_{};
   double solve_ms_ = 0;
 };

@@ -9,6 +9,7 @@
 #include "core/camera/camera.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/angle.hpp"
+#include "core/math/robust.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::calibration {
@@ -149,14 +150,6 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
 }
 
 namespace {
-
-/// Log odds that the rig is the one of the calibration in use. `difference` of the depths and the
-/// sigmas of the measurement, of the calibration in use and of another rig, all in percent.
-double log_odds(double difference, double measured, double current, double other) noexcept {
-  const double same = current * current + measured * measured,
-               wrong = other * other + measured * measured;
-  return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
-}
 
 /// Sigma of the relative depth of a calibration that is the rig's, in percent.
 double current_percent(const RigCalibration& current, int k, double depth,

@@ -1,45 +1,26 @@
 #include "core/calibration/monitor.hpp"
 
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "core/calibration/detail/change_detector.hpp"
+#include "core/calibration/detail/exposure_offset.hpp"
 #include "core/calibration/detail/monitor_residuals.hpp"
 
 namespace vergence::calibration {
 namespace {
 
 using Kind = MonitorResult::Kind;
-
-void check(bool good, const char* name, const char* range) {
-  if (!good)
-    throw std::invalid_argument(std::string("monitor.") + name + " is out of range: allowed is " +
-                                range);
-}
-
-void validate(const MonitorOptions& o) {
-  check(o.threshold >= 20 && o.threshold <= 500, "threshold", "20 … 500");
-  check(o.bias_px >= 0 && o.bias_px <= 1, "bias_px", "0 … 1");
-  check(o.verified_bias_px >= 0 && o.verified_bias_px <= 2, "verified_bias_px", "0 … 2");
-  check(o.unverified_bias_px >= 0 && o.unverified_bias_px <= 5, "unverified_bias_px", "0 … 5");
-  check(o.min_matches >= 12 && o.min_matches <= 1000, "min_matches", "12 … 1000");
-  check(o.short_window >= 1 && o.short_window <= 10, "short_window", "1 … 10");
-  check(o.long_window >= 60 && o.long_window <= 1800, "long_window", "60 … 1800");
-  check(o.collapse_frames >= 2 && o.collapse_frames <= 60, "collapse_frames", "2 … 60");
-  check(o.collapse_share >= 0.01 && o.collapse_share <= 0.9, "collapse_share", "0.01 … 0.9");
-  check(o.collapse_expected >= 10 && o.collapse_expected <= 1000, "collapse_expected", "10 … 1000");
-}
-
 }  // namespace
 
 struct Monitor::Parts {
   MonitorOptions options{};
   bool valid = false;
+  Transform T_camera_left{};
   detail::Reference reference{};
   Mat5 covariance = Mat5::Zero();
   detail::MonitorResiduals residuals{};
   detail::ChangeDetector windows{};
+  detail::ExposureOffset offset{};
   MonitorResult latest{};
   int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
@@ -47,6 +28,7 @@ struct Monitor::Parts {
   void clear() noexcept {
     residuals.reset();
     windows.reset(options, covariance);
+    offset = {};
     latest = MonitorResult{};
     collapsed = standing_over = 0;
   }
@@ -56,7 +38,6 @@ struct Monitor::Parts {
 };
 
 Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
-  validate(options);
   parts_ = arena.make<Parts>(1, "monitor").data();
   parts_->options = options;
   parts_->clear();
@@ -73,6 +54,7 @@ bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
       T_camera_left.finite() && length > 0 && good(left) && good(right) && covariance.allFinite();
   if (p.valid) {
     const Mat32 B = tangent_basis(T_camera_left.t / length);
+    p.T_camera_left = T_camera_left;
     p.reference = {EpipolarGeometry(T_camera_left), left, right};
     Eigen::Matrix<double, 5, 6> back = Eigen::Matrix<double, 5, 6>::Zero();
     back.topLeftCorner<3, 3>().setIdentity();
@@ -110,6 +92,7 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   }
   standing_over = 0;
   windows.push(stereo);
+  offset.add(stereo.evidence, T_camera_left, frame.T_now_before);
   latest = windows.decide();
 }
 
@@ -127,7 +110,6 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
   latest.kind = standing_over >= options.collapse_frames ? Kind::knock : Kind::quiet;
   latest.undecided = standing_over > 0 && standing_over < options.collapse_frames;
   latest.onset_frame = standing_from;
-  latest.frames_since_onset = standing_over;
 }
 
 MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
@@ -138,17 +120,16 @@ MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
   }
   MonitorResult v = p.latest;
   v.threshold = p.options.threshold;
+  v.offset_frames = p.offset.frames();
   if (v.kind == Kind::quiet) {
     v.evidence = {};
     v.onset_frame = frame.frame;
-    v.frames_since_onset = 0;
   }
   v.evidence.rotation_mrad = 1e3 * v.evidence.shift_px / p.reference.right.fx;
   if (p.collapsed >= p.options.collapse_frames) {
     v.evidence = {};
     v.kind = Kind::collapse;
     v.onset_frame = p.collapsed_from;
-    v.frames_since_onset = p.collapsed;
   }
   return v;
 }

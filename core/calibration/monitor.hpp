@@ -56,6 +56,8 @@ struct MonitorFrame {
   /// False at standstill, where images repeat and their errors do not average out.
   bool moving = false;
   std::span<const StereoObservation> stereo;
+  /// Motion of the left camera since the previous frame, for MonitorResult::offset_frames.
+  Transform T_now_before{};
   /// Number of matches that a good pair of images would give; 0 if either image is poor.
   int expected_stereo = 0;
   int found_stereo = 0;
@@ -80,12 +82,13 @@ struct MonitorResult {
   double statistic = 0;
   double threshold = 0;
 
+  /// Fraction of a frame that the camera's images are late (negative: early), if that explains most
+  /// of the changes since the reference was set; else 0.
+  double offset_frames = 0;
   /// Evidence for a knock or a drift.
   ChangeEvidence evidence;
   /// First frame of the changed rig after a knock, start of a drift, else `frame`.
   std::uint64_t onset_frame = 0;
-  /// Number of frames measured since the onset.
-  int frames_since_onset = 0;
 };
 
 /// Tests whether the transform of one additional camera still holds.
@@ -116,8 +119,7 @@ struct MonitorResult {
 /// Memory   All of it from the arena in the constructor. update() allocates nothing.
 /// Threads  One caller.
 /// Time     Under 0.1 ms for 300 stereo matches.
-/// Errors   The constructor throws (std::invalid_argument with a message, std::length_error).
-///          Values that are not finite are left out.
+/// Errors   None; values that are not finite are left out.
 class Monitor {
  public:
   Monitor(const MonitorOptions& options, Arena& arena);

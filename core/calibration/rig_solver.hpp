@@ -58,6 +58,9 @@ struct RigSolution {
 
   /// Number of frames that a camera's images are late, else 0.
   int lag_frames = 0;
+  /// Fraction of a frame that a camera's images are late (negative: early), if that explains most
+  /// of the changes of its transform during the frames used, else 0.
+  double offset_frames = 0;
   /// Number of the first frame after the latest change of any camera during the frames used; 0 if
   /// the rig did not change.
   std::uint64_t changed_at = 0;
@@ -122,6 +125,7 @@ class RigSolver {
   /// reference.
   struct Watch {
     int lag_frames = 0;
+    double offset_frames = 0;
     std::uint64_t changed_at = 0;
   };
   [[nodiscard]] Watch watch_camera(int k, const RigCalibration& rig) noexcept;

@@ -84,6 +84,7 @@ void RigSolver::watch_frames(RigSolution* s) noexcept {
   for (int k = 1; k < count_; ++k) {
     const Watch seen = watch_camera(k, s->rig);
     if (s->lag_frames == 0) s->lag_frames = seen.lag_frames;
+    if (s->offset_frames == 0) s->offset_frames = seen.offset_frames;
     // All cameras have been in place since the latest change.
     s->changed_at = std::max(s->changed_at, seen.changed_at);
   }
@@ -118,11 +119,12 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
     shown.frame = f.number;
     shown.moving = true;
     shown.stereo = stereo_.span();
+    if (i > 0) shown.T_now_before = poses_[i] * poses_[i - 1].inverse();
     const MonitorResult v = monitor_.update(shown);
+    seen.offset_frames = v.offset_frames;
     pairing_.next(f.number, stereo_.span(), rig.T_camera_left[other], left, right);
     if (seen.lag_frames == 0) seen.lag_frames = pairing_.lag_frames();
-    const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
-    const DisparityJump jump = jumps_.next(f.number, stereo_.span(), step);
+    const DisparityJump jump = jumps_.next(f.number, stereo_.span(), shown.T_now_before);
     if (jump.confirmed) seen.changed_at = jump.onset_frame;
     if (v.kind == MonitorResult::Kind::knock) seen.changed_at = v.onset_frame;
   }

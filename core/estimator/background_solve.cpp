@@ -23,8 +23,6 @@ void BackgroundSolve::start(const calibration::TrackLog& log, const Request& req
     prior_ = *request.prior;
     request_.prior = &prior_;
   }
-  focal_check_.begin_solve(log.size(),
-                           log.size() >= static_cast<std::size_t>(options_.calibration.max_frames));
   running_ = true;
   discarded_ = false;
   frames_since_start_ = 0;

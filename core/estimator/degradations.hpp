@@ -27,12 +27,10 @@ enum class Degradation : std::uint8_t {
   calibration,
   /// Points of this frame or of recent ones do not move as one rigid scene.
   dynamic_scene,
-  /// The window still contains degraded frames.
+  /// The window still contains degraded frames, or unusually uncertain motions.
   window,
-  /// This motion is unusually uncertain, or the window corrected it strongly.
-  motion,
 };
-inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradation::motion) + 1;
+inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradation::window) + 1;
 
 /// The degradations that apply, each with its reason, first frame, and number of frames of evidence
 /// that ends it. A pose is `ok` while there are none, otherwise `degraded` for the strongest

@@ -64,6 +64,8 @@ struct EstimatorEvent {
     dropped,
     /// Number of frames since the onset. Also recorded for a requested calibration.
     rig_changed,
+    /// Offset between the cameras' exposures in frames if that explains the changes, else 0.
+    rig_not_rigid,
     /// Lag in frames; 0 if unknown.
     out_of_sync,
     cameras_in_sync,

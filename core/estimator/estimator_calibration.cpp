@@ -98,7 +98,8 @@ void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexce
 /// collapse or lag.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorResult::Kind;
-  const RigAssessment v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
+  const RigAssessment v =
+      calibrator.monitor().update(odometry, out, frame.number, moves, calibrator.verified());
   margins = v.margins;
   degradations.set(Degradation::rig, v.undecided, Reason::recalibrating, frame.number);
   if (v.lag_frames != 0) {
@@ -209,6 +210,7 @@ void Estimator::Parts::apply_refinement(const CalibrationDecision& decision, Sta
 }
 
 void Estimator::Parts::notify_verified(Stamp stamp) noexcept {
+  not_rigid = false;
   record(EstimatorEvent::Kind::calibration_verified, stamp, "the calibration in use is verified",
          verified_percent, verified_by);
 }
@@ -219,6 +221,12 @@ void Estimator::Parts::apply(const CalibrationDecision& decision, Stamp stamp) n
     record(EstimatorEvent::Kind::focal_length_contradicted, stamp,
            "the configured focal length does not fit the images", decision.focal.measured_px);
   focal_contradicted = decision.focal.contradicted;
+  if (decision.not_rigid && !std::exchange(not_rigid, true))
+    record(EstimatorEvent::Kind::rig_not_rigid, stamp,
+           decision.offset_frames == 0
+               ? "the extrinsics change all the time: a camera is loose"
+               : "the images of the cameras are a fraction of a frame apart",
+           decision.offset_frames);
   if (decision.is_refinement) {
     apply_refinement(decision, stamp);
     return record_length_sigma(decision);

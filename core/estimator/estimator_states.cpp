@@ -78,6 +78,8 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   if (out.restarted) {
     record(EstimatorEvent::Kind::map_reset, frame.stamp,
            "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
+    // The speed and the points of the new map have another usual uncertainty.
+    covariance_baseline = {};
     mark_calibration_unverified(frame.number);
   }
   if (out.relocalised)
@@ -102,29 +104,24 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;
   const Mat6 motion = motion_covariance(out);
-  check_motion(out, motion, drift.motion_to(out.T_left_world).t.norm());
+  check_motion(motion, drift.motion_to(out.T_left_world).t.norm());
   const Mat6 reported = motion + odometry::correction_covariance(out.corrected);
   drift.step(out.T_left_world, reported, length_sigma, out.keyframe);
   sample->covariance = upper_triangle(drift.pose());
   sample->motion_covariance = upper_triangle(reported);
-  sample->corrected_m = static_cast<float>(out.corrected.t.norm());
   sample->length_sigma = static_cast<float>(length_sigma);
 }
 
-/// Checks the motion against the usual uncertainty and the window's correction, unless a stronger
-/// degradation explains it.
-void Estimator::Parts::check_motion(const odometry::FrameOutcome& out, const Mat6& motion,
-                                    double step_m) noexcept {
-  degradations.clear(Degradation::motion);
+/// Checks the motion against the usual uncertainty, unless a stronger degradation explains it.
+/// Errors of an unusually uncertain motion stay in the window.
+void Estimator::Parts::check_motion(const Mat6& motion, double step_m) noexcept {
   if (degradations.any_up_to(Degradation::rig) || degradations.active(Degradation::dynamic_scene))
     return;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
-  const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
-  const bool measurable = covariance_baseline.measurable(step_m, sigma_m);
-  const bool unusual = measurable && covariance_baseline.update(sigma_m);
-  if (measurable) margins.uncertainty = covariance_baseline.margin();
-  degradations.set(Degradation::motion, unusual || correction.motion_unreliable(),
-                   Reason::weak_geometry, last_number);
+  if (!covariance_baseline.measurable(step_m, sigma_m)) return;
+  if (covariance_baseline.update(sigma_m))
+    degradations.enter(Degradation::window, Reason::weak_geometry, last_number, kWindowFrames + 1);
+  margins.uncertainty = covariance_baseline.margin();
 }
 
 /// Enters the degradations that a posed frame causes.

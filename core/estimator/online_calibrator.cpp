@@ -182,8 +182,13 @@ std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::
   const Gate gate = review().gate(false);
   if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
     solve_.focal_check().accept(frames_.solved_frames() >= frames_.max_frames());
-  return solve_.for_new_rig() ? evaluate_estimate(stamp, number)
-                              : evaluate_refinement(stamp, number, last);
+  CalibrationDecision d = solve_.for_new_rig() ? evaluate_estimate(stamp, number)
+                                               : evaluate_refinement(stamp, number, last);
+  // One knock changes the rig in one solve only.
+  const bool changed = solve_.solved().changed_at > 0;
+  d.not_rigid = std::exchange(search_.changed_in_solve, changed) && changed;
+  d.offset_frames = solve_.solved().offset_frames;
+  return d;
 }
 
 CalibrationDecision OnlineCalibrator::evaluate_estimate(Stamp stamp,
@@ -263,7 +268,7 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
     d.verified = gate_ == Gate::open
                      ? certain
                      : a.verified && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
-    d.verified = d.verified && !d.focal.contradicted;
+    d.verified = d.verified && !d.focal.doubted;
     if (d.verified)
       apply_assessment(CalibrationTrigger::verified, misfit_px(d));
     else if (a.contradicted || d.focal.contradicted)

@@ -94,6 +94,8 @@ class OnlineCalibrator {
     std::uint64_t onset = 0, since = 0;
     /// Frames before a change were dropped once; the remaining ones count as frames of one rig.
     bool frames_before_change_dropped = false;
+    /// The rig changed during the frames of the newest solve.
+    bool changed_in_solve = false;
     /// Number of new frames that the last rejection made the next solve wait for.
     std::size_t wait = 0;
   };

@@ -16,8 +16,6 @@ using odometry::MapPoint;
 // solve's own sigmas do not apply, because it determines rotations and principal points only
 // together.
 constexpr std::array kVerifiedSigmas = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
-// Minimum speed of a moving rig, in m/s; below it, consecutive images are nearly the same.
-constexpr double kMovingSpeed = 0.5;
 
 /// Covariance of a reference with a baseline of `length` metres. Unless it was solved from images
 /// and verified it is wide, so that only a change against earlier frames counts as a knock.
@@ -193,10 +191,10 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
 
 MonitorResult RigMonitor::update_monitor(int k, const odometry::Odometry& odometry,
                                          const odometry::FrameOutcome& outcome,
-                                         const RigFrame& frame, int found, bool moving) noexcept {
+                                         std::uint64_t number, int found, bool moving) noexcept {
   CameraMonitors& w = camera(k);
   calibration::MonitorFrame f;
-  f.frame = frame.number;
+  f.frame = number;
   f.moving = moving;
   f.stereo = stereo_.span();
   f.expected_stereo = outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
@@ -266,20 +264,17 @@ void RigMonitor::add_to_assessment(int k, MonitorResult v, const calibration::Di
 }
 
 RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
-                                 const odometry::FrameOutcome& outcome, const RigFrame& frame,
-                                 bool verified) noexcept {
+                                 const odometry::FrameOutcome& outcome, std::uint64_t number,
+                                 bool moving, bool verified) noexcept {
   RigAssessment rig;
   rig.cameras_in_sync = true;
-  const double seconds = T_left_world_before_ ? (frame.stamp - stamp_before_).to_seconds() : 0;
-  stamp_before_ = frame.stamp;
   const Transform step = step_to(outcome.T_left_world);
-  const bool moving = seconds > 0 && step.t.norm() > kMovingSpeed * seconds;
   for (int k = 1; k < cameras_; ++k) {
     const int found = collect_stereo(odometry.map(), k, odometry::kMinFound);
-    update_pairing(k, frame.number, &rig);
-    const calibration::DisparityJump jump = update_jumps(k, outcome, frame.number, step);
+    update_pairing(k, number, &rig);
+    const calibration::DisparityJump jump = update_jumps(k, outcome, number, step);
     MonitorResult v;
-    if (!map_rebuild_pending_) v = update_monitor(k, odometry, outcome, frame, found, moving);
+    if (!map_rebuild_pending_) v = update_monitor(k, odometry, outcome, number, found, moving);
     add_to_assessment(k, v, jump, verified, &rig);
   }
   return rig;

@@ -35,10 +35,9 @@ struct RigAssessment {
 ///
 ///     monitor.watch(rig, solved_and_verified);  // when the map was built with it
 ///     // With each posed frame:
-///     const RigAssessment rig = monitor.update(odometry, outcome, frame, verified);
+///     const RigAssessment rig = monitor.update(odometry, outcome, number, moving, verified);
 ///
-/// Not thread-safe. Memory from the arena at construction. The constructor throws as Monitor's
-/// does.
+/// Not thread-safe. Memory from the arena at construction.
 class RigMonitor {
  public:
   /// `capacity`: maximum number of tracks in a frame.
@@ -64,11 +63,12 @@ class RigMonitor {
   /// Call when the cameras are unlinked because a calibration is estimated.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
-  /// Assesses a posed frame of linked cameras. `verified`: state of the reference. With an
+  /// Assesses a posed frame of linked cameras. `moving`: the pose differs from the last one by more
+  /// than its uncertainty. `verified`: state of the reference. With an
   /// unverified calibration, whose errors vary over the image, changes of the rig are `undecided`.
   [[nodiscard]] RigAssessment update(const odometry::Odometry& odometry,
-                                     const odometry::FrameOutcome& outcome, const RigFrame& frame,
-                                     bool verified) noexcept;
+                                     const odometry::FrameOutcome& outcome, std::uint64_t number,
+                                     bool moving, bool verified) noexcept;
   /// Detects jumps in a posed frame of unlinked cameras. Returns the number of the first frame of
   /// the changed rig, if it has changed.
   [[nodiscard]] std::optional<std::uint64_t> update_unlinked(const odometry::Odometry& odometry,
@@ -109,7 +109,7 @@ class RigMonitor {
   /// Result of camera k's monitor; the caller handles jumps.
   [[nodiscard]] calibration::MonitorResult update_monitor(int k, const odometry::Odometry& odometry,
                                                           const odometry::FrameOutcome& outcome,
-                                                          const RigFrame& frame, int found,
+                                                          std::uint64_t number, int found,
                                                           bool moving) noexcept;
   /// Motion of the left camera since the previous monitored frame.
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
@@ -139,7 +139,6 @@ class RigMonitor {
   RigCalibration rig_{};
   bool solved_and_verified_ = false;
   std::optional<Transform> T_left_world_before_;
-  Stamp stamp_before_{};
   bool map_rebuild_pending_ = false;
 };
 

@@ -39,7 +39,7 @@ void SolutionReview::assess_next(CalibrationDecision* decision) const noexcept {
   decision->reference_depth_m = then.depth_m;
   decision->depth_sigma_percent = then.sigma_percent;
   // An error of the focal length scales all distances.
-  decision->verified = then.verified && !decision->focal.contradicted;
+  decision->verified = then.verified && !decision->focal.doubted;
   if (context_.in_use != nullptr)
     decision->depth_error_percent = assess(*context_.in_use, context_.source).difference_percent;
 }

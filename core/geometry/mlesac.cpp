@@ -175,7 +175,6 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
   const double cap = options.outlier_cost;
   gather(o, cap);
   problem_.gather(o);
-  out.observations = observations_;
   const bool has_prior = prior != nullptr && prior->finite();
   // Number of observations in cameras that have at least three.
   int drawable = 0;
@@ -237,11 +236,7 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
     for (int j = 0; j < found.count; ++j)
       consider(T_left_camera * found.T_camera_world[static_cast<std::size_t>(j)]);
   }
-  if (!out.found) {
-    std::fill_n(flags_.begin(), points_, std::uint8_t{0});
-    return out;
-  }
-  out.score = best;
+  if (!out.found) std::fill_n(flags_.begin(), points_, std::uint8_t{0});
   return out;
 }
 

@@ -31,10 +31,6 @@ struct MlesacPose {
   /// Number of points all of whose observations are usable and within T².
   int inliers = 0;
   int inlier_observations = 0;
-  /// Number of usable observations of all cameras.
-  int observations = 0;
-  /// Cost C; lower is better.
-  double score = 0;
   int samples = 0;
 };
 

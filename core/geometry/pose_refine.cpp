@@ -14,6 +14,12 @@ constexpr const char* kWho = "pose refinement";
 // √(2 ln 2).
 constexpr double kRayleighMedian = 1.1774100225154747;
 constexpr int kMinObservations = 3;
+// Maximum number of solver steps per round; four are usual.
+constexpr int kMaxSteps = 10;
+// Update in rad and m below which the solver has converged.
+constexpr double kSmallUpdate = 1e-7;
+// Squared residual in scaled sigmas above which an observation is left out of the second round.
+constexpr double kGrossChi2 = 36;
 // Number of steps after which the pose is within about two sigmas.
 constexpr int kRescaleAfter = 2;
 // Damping relative to the diagonal after a plain step has failed.
@@ -24,13 +30,8 @@ constexpr int kMaxFailures = 6;
 // direction.
 constexpr double kMaxCondition = 1e12;
 
-[[nodiscard]] bool valid(const PoseRefineOptions& o) noexcept {
-  return o.max_steps >= 1 && o.max_steps <= 10 && o.huber > 0 && o.min_scale > 0 &&
-         o.inlier_chi2 > 0 && o.gross_chi2 > 0 && o.small_update >= 0;
-}
-
-[[nodiscard]] bool small(const Vec6& delta, double limit) noexcept {
-  return delta.head<3>().norm() < limit && delta.tail<3>().norm() < limit;
+[[nodiscard]] bool small(const Vec6& delta) noexcept {
+  return delta.head<3>().norm() < kSmallUpdate && delta.tail<3>().norm() < kSmallUpdate;
 }
 
 }  // namespace
@@ -40,7 +41,7 @@ PoseRefiner::PoseRefiner(std::size_t capacity, Arena& arena)
       sorted_(arena.make<double>(static_cast<std::size_t>(kMaxCameras) * capacity, kWho)),
       flags_(arena.make<std::uint8_t>(capacity, kWho)) {}
 
-double PoseRefiner::residual_scale(const Transform& T, double floor) noexcept {
+double PoseRefiner::residual_scale(const Transform& T) noexcept {
   problem_.evaluate(T);
   std::size_t n = 0;
   for (int k = 0; k < problem_.cameras(); ++k) {
@@ -48,9 +49,9 @@ double PoseRefiner::residual_scale(const Transform& T, double floor) noexcept {
     for (std::size_t i = 0; i < errors.size(); ++i)
       if (problem_.counts(k, i)) sorted_[n++] = errors[i];
   }
-  if (n == 0) return floor;
+  if (n == 0) return 1;
   const double scale = std::sqrt(median(sorted_.first(n))) / kRayleighMedian;
-  return std::isfinite(scale) ? std::max(floor, scale) : floor;
+  return std::isfinite(scale) ? std::max(1.0, scale) : 1;
 }
 
 int PoseRefiner::counted() const noexcept {
@@ -60,9 +61,9 @@ int PoseRefiner::counted() const noexcept {
   return n;
 }
 
-bool PoseRefiner::drop_gross(const RefinedPose& pose, const PoseRefineOptions& options) noexcept {
+bool PoseRefiner::exclude_gross(const RefinedPose& pose) noexcept {
   problem_.evaluate(pose.T_left_world);
-  const double limit = options.gross_chi2 * pose.scale * pose.scale;
+  const double limit = kGrossChi2 * pose.scale * pose.scale;
   bool dropped = false;
   for (int k = 0; k < problem_.cameras(); ++k) {
     const std::span<const double> errors = problem_.errors(k);
@@ -75,18 +76,17 @@ bool PoseRefiner::drop_gross(const RefinedPose& pose, const PoseRefineOptions& o
   return dropped && counted() >= kMinObservations;
 }
 
-bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) noexcept {
-  pose->scale = residual_scale(pose->T_left_world, options.min_scale);
-  detail::PoseProblem::Sums now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
-  pose->converged = false;
+bool PoseRefiner::descend(RefinedPose* pose) noexcept {
+  pose->scale = residual_scale(pose->T_left_world);
+  detail::PoseProblem::Sums now = problem_.sums(pose->T_left_world, pose->scale, kHuber);
   double damping = 0;
   int failures = 0, steps = 0;
   bool rescaled = false;
-  while (steps < options.max_steps) {
+  while (steps < kMaxSteps) {
     if (!rescaled && steps >= kRescaleAfter && failures == 0) {
       rescaled = true;
-      pose->scale = residual_scale(pose->T_left_world, options.min_scale);
-      now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
+      pose->scale = residual_scale(pose->T_left_world);
+      now = problem_.sums(pose->T_left_world, pose->scale, kHuber);
     }
     ++steps;
     Mat6 H = now.H;
@@ -98,43 +98,34 @@ bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) n
       continue;
     }
     const Transform next = detail::moved(pose->T_left_world, delta);
-    const detail::PoseProblem::Sums then = problem_.sums(next, pose->scale, options.huber);
+    const detail::PoseProblem::Sums then = problem_.sums(next, pose->scale, kHuber);
     // Tolerate rounding of the sum, because steps at the optimum change nothing.
     if (!(then.cost <= now.cost * (1.0 + 1e-12)) || !next.finite()) {
-      if (small(delta, options.small_update)) {
-        pose->converged = true;
-        break;
-      }
-      if (++failures > kMaxFailures) break;
+      if (small(delta) || ++failures > kMaxFailures) break;
       damping = damping > 0 ? 10.0 * damping : kFirstDamping;
       continue;
     }
-    const bool converged = small(delta, options.small_update);
     pose->T_left_world = next;
     now = then;
     damping *= 0.1;
     if (damping < 1e-9) damping = 0;
     failures = 0;
-    if (converged) {
-      pose->converged = true;
-      break;
-    }
+    if (small(delta)) break;
   }
   // Information and flags use the final scale.
   if (!rescaled) {
-    pose->scale = residual_scale(pose->T_left_world, options.min_scale);
-    now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
+    pose->scale = residual_scale(pose->T_left_world);
+    now = problem_.sums(pose->T_left_world, pose->scale, kHuber);
   }
   pose->steps += steps;
   pose->information = now.H;
   return true;
 }
 
-void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& options,
-                           RefinedPose* pose) noexcept {
+void PoseRefiner::describe(const RigObservations& o, RefinedPose* pose) noexcept {
   problem_.evaluate(pose->T_left_world);
   std::fill_n(flags_.begin(), points_, std::uint8_t{0});
-  const double limit = options.inlier_chi2 * pose->scale * pose->scale;
+  const double limit = kChi2OfPixel * pose->scale * pose->scale;
   double sum_px2 = 0;
   int agreeing = 0;
   for (int k = 0; k < problem_.cameras(); ++k) {
@@ -153,13 +144,12 @@ void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& op
 }
 
 RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start,
-                                std::span<const std::uint8_t> use,
-                                const PoseRefineOptions& options) noexcept {
+                                std::span<const std::uint8_t> use, bool drop_gross) noexcept {
   RefinedPose out;
   out.T_left_world = start;
   points_ = 0;
-  if (!valid(options) || !o.consistent() || !start.finite() ||
-      (!use.empty() && use.size() != o.size()) || o.size() > flags_.size())
+  if (!o.consistent() || !start.finite() || (!use.empty() && use.size() != o.size()) ||
+      o.size() > flags_.size())
     return out;
   points_ = o.size();
   std::fill_n(flags_.begin(), points_, std::uint8_t{0});
@@ -172,13 +162,13 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
     }
   if (counted() < kMinObservations) return out;
 
-  if (!descend(options, &out)) return out;
-  if (drop_gross(out, options)) {
+  if (!descend(&out)) return out;
+  if (drop_gross && exclude_gross(out)) {
     // If the remaining observations do not determine the pose, keep that of all.
     const RefinedPose of_all = out;
-    if (!descend(options, &out)) out = of_all;
+    if (!descend(&out)) out = of_all;
   }
-  describe(o, options, &out);
+  describe(o, &out);
 
   Vec6 d;
   for (int i = 0; i < 6; ++i) {

@@ -4,37 +4,19 @@
 
 #include "core/geometry/detail/pose_problem.hpp"
 #include "core/geometry/observations.hpp"
-#include "core/math/robust.hpp"
 
 namespace vergence {
 
-struct PoseRefineOptions {
-  /// Maximum number of solver steps per round, 1 … 10; four are usual.
-  int max_steps = 10;
-  /// Threshold of Huber's loss in scaled sigmas, > 0.
-  double huber = 2.0;
-  /// Minimum residual scale in input sigmas; a good frame does not make them smaller.
-  double min_scale = 1.0;
-  double inlier_chi2 = kChi2OfPixel;
-  /// Squared residual in scaled sigmas above which an observation is left out of the second round;
-  /// > 0.
-  double gross_chi2 = 36.0;
-  /// Update in rad and m below which the solver has converged.
-  double small_update = 1e-7;
-};
-
 struct RefinedPose {
-  /// True if there is a pose. False if the input, start or options are invalid, the workspace is
-  /// too small, or the usable observations do not determine six degrees of freedom.
+  /// True if there is a pose. False if the input or start is invalid, the workspace is too small,
+  /// or the usable observations do not determine six degrees of freedom.
   bool usable = false;
-  /// False if the pose was still changing; it is then the best so far.
-  bool converged = false;
 
   /// Result; the start if nothing could be refined.
   Transform T_left_world{};
   /// Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m), X_left ← Exp(φ) X_left + τ.
   Mat6 information = Mat6::Zero();
-  /// Robust residual scale in input sigmas, ≥ min_scale.
+  /// Robust residual scale in input sigmas, ≥ 1.
   double scale = 1;
   /// Root mean square of the inliers' residuals, per coordinate.
   double rms_px = 0;
@@ -49,14 +31,14 @@ struct RefinedPose {
 /// on Huber-weighted pixels.
 ///
 ///     min Σ_o ρ(|x_o − π_k(T_k T_left_world p)| / (σ_o s)),
-///     s = max(min_scale, median |e| / 1.1774)
+///     s = max(1, median |e| / 1.1774)
 ///
 /// (1.1774 σ is the median length of a Gaussian vector of two coordinates.) s is computed at the
 /// start and again after the first steps, when a rough start no longer inflates it.
 ///
-/// If there are gross outliers then (gross_chi2), a second round continues without them: Huber's
-/// loss bounds an outlier's influence but never removes it. A wrong point 5 m away weighs as much
-/// as hundreds of right ones at 50 m.
+/// If there are gross outliers then, beyond six sigmas, and `drop_gross` is set, a second round
+/// continues without them: Huber's loss bounds an outlier's influence but never removes it. A wrong
+/// point 5 m away weighs as much as hundreds of right ones at 50 m.
 ///
 /// Ownership  Workspace in the arena. flags() stay valid until the next refine().
 /// Threads    One caller per object. Memory: all at construction.
@@ -71,7 +53,7 @@ class PoseRefiner {
   /// for example MLESAC's flags. Flags, rms and counts cover all usable observations.
   [[nodiscard]] RefinedPose refine(const RigObservations& observations,
                                    const Transform& T_left_world, std::span<const std::uint8_t> use,
-                                   const PoseRefineOptions& options) noexcept;
+                                   bool drop_gross) noexcept;
 
   /// Per point of the last refine(), bit k is set if camera k's observation is below the χ²
   /// threshold.
@@ -81,14 +63,13 @@ class PoseRefiner {
 
  private:
   /// Residual scale of the observations that count.
-  [[nodiscard]] double residual_scale(const Transform& T_left_world, double floor) noexcept;
+  [[nodiscard]] double residual_scale(const Transform& T_left_world) noexcept;
   [[nodiscard]] int counted() const noexcept;
   /// Excludes gross outliers. Returns true if there were some and enough observations are left.
-  [[nodiscard]] bool drop_gross(const RefinedPose& pose, const PoseRefineOptions& options) noexcept;
+  [[nodiscard]] bool exclude_gross(const RefinedPose& pose) noexcept;
   /// Runs one round from pose->T_left_world and adds its steps. Returns false if rank deficient.
-  [[nodiscard]] bool descend(const PoseRefineOptions& options, RefinedPose* pose) noexcept;
-  void describe(const RigObservations& observations, const PoseRefineOptions& options,
-                RefinedPose* pose) noexcept;
+  [[nodiscard]] bool descend(RefinedPose* pose) noexcept;
+  void describe(const RigObservations& observations, RefinedPose* pose) noexcept;
 
   detail::PoseProblem problem_;
   // Buffer for the median.

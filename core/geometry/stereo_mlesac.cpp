@@ -216,7 +216,6 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
     }
   }
   if (!out.found) return out;
-  out.score = best;
   Vec5 unused;
   out.information = information(cap, out.T_right_left, &unused);
   out.direction_sigma = std::numeric_limits<double>::infinity();

@@ -38,8 +38,6 @@ struct StereoEstimate {
 
   /// Number of matches within T² and in front of both cameras.
   int inliers = 0;
-  /// Cost C; lower is better.
-  double score = 0;
   int samples = 0;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <span>
 
@@ -8,8 +9,8 @@ namespace vergence {
 
 /// Median of |x| for x standard normal.
 inline constexpr double kMedianOfNormal = 0.6745;
-// Threshold of Tukey's biweight in scales; 95 % efficient for normal errors.
-inline constexpr double kTukey = 4.685;
+/// Thresholds of Huber's loss and of Tukey's biweight in scales; 95 % efficient for normal errors.
+inline constexpr double kHuber = 1.345, kTukey = 4.685;
 /// Minimum scale of residuals, in px or in sigmas of about as much; corners are not localised
 /// better.
 inline constexpr double kMinScale = 0.05;
@@ -39,6 +40,17 @@ inline constexpr double kMajority = 0.5;
 inline constexpr int kMinAgreeing = 8;
 /// χ² of two coordinates at 99 %.
 inline constexpr double kChi2OfPixel = 9.21;
+
+/// Log odds that a difference, measured with sigma `measured`, is of the usual kind (sigma `usual`)
+/// rather than of another (sigma `other`):
+///
+///     log N(d; 0, usual² + measured²) − log N(d; 0, other² + measured²)
+[[nodiscard]] inline double log_odds(double difference, double measured, double usual,
+                                     double other) noexcept {
+  const double same = usual * usual + measured * measured,
+               wrong = other * other + measured * measured;
+  return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
+}
 
 /// Upper median; reorders the values. Precondition: not empty.
 template <class T>

@@ -1,7 +1,6 @@
 #include "core/memory/allocation_guard.hpp"
 
 #include <atomic>
-#include <cstdlib>
 
 namespace vergence {
 namespace {
@@ -9,7 +8,6 @@ namespace {
 // Constant-initialised thread-local storage, because reading it inside malloc must not allocate.
 thread_local constinit bool sealed = false;
 std::atomic<std::uint64_t> count{0};
-std::atomic<bool> abort_on{false};
 std::atomic<bool> hooked{false};
 
 }  // namespace
@@ -21,18 +19,9 @@ bool AllocationGuard::thread_sealed() noexcept { return sealed; }
 std::uint64_t AllocationGuard::runtime_allocations() noexcept {
   return count.load(std::memory_order_relaxed);
 }
-void AllocationGuard::abort_on_allocation(bool on) noexcept {
-  abort_on.store(on, std::memory_order_relaxed);
-}
 
 void AllocationGuard::record_allocation() noexcept {
-  if (!sealed) return;
-  count.fetch_add(1, std::memory_order_relaxed);
-  if (abort_on.load(std::memory_order_relaxed)) {
-    // abort() itself may allocate.
-    sealed = false;
-    std::abort();
-  }
+  if (sealed) count.fetch_add(1, std::memory_order_relaxed);
 }
 
 void AllocationGuard::set_available() noexcept { hooked.store(true, std::memory_order_relaxed); }

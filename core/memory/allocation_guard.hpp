@@ -17,9 +17,6 @@ class AllocationGuard {
   [[nodiscard]] static bool thread_sealed() noexcept;
   /// Number of allocations on sealed threads since the program's start.
   [[nodiscard]] static std::uint64_t runtime_allocations() noexcept;
-  /// Sets whether an allocation on a sealed thread aborts, for tests: the debugger then stops at
-  /// its cause.
-  static void abort_on_allocation(bool on) noexcept;
 
   /// Called by the hooks at an allocation on this thread.
   static void record_allocation() noexcept;

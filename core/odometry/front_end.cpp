@@ -107,9 +107,8 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     }
     if (repeated[i]) check.repeated = true;
     if (structured[i] && !repeated[i]) any_new = true;
-    // A repeated image of an additional camera is from another instant; the left camera's pose is
-    // valid.
-    if (k > 0 && repeated[i] && !repeated[0]) structured[i] = false;
+    // The pose is the one at the instant of the left image; only images of that instant measure it.
+    if (k > 0 && repeated[i] != repeated[0]) structured[i] = false;
     if (structured[i]) add_camera(&check.structured, k);
   }
   check.left_repeated = repeated[0];

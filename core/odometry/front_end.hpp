@@ -20,13 +20,14 @@ namespace vergence::odometry {
 
 /// Margin of the image in px, in which points are not followed: half a row of a window in memory,
 /// and one more.
-inline constexpr double kImageMargin = features::kWindowStride / 2 + 1;
+inline constexpr double kImageMargin = 0.5 * features::kWindowStride + 1;
 
 /// Checks of the images of one frame.
 struct ImageCheck {
   /// Bit k is set if camera k delivered an image.
   std::uint8_t given = 0;
-  /// Bit k is set if that image has structure. A repeated one counts only if the left one is, too.
+  /// Bit k is set if that image has structure and is from the left image's instant: repeated
+  /// exactly if the left one is.
   std::uint8_t structured = 0;
   /// True if a camera delivered its previous image or the left one's again, which noise makes
   /// impossible for a new image.

@@ -21,8 +21,6 @@ struct OdometryOptions {
   /// Additional standard deviation in px, in quadrature, of a patch seen from one depth to the
   /// side, because its slope is unknown, 0 … 10.
   double parallax_sigma = 0.8;
-  /// Threshold of the robust loss, in sigmas, 1 … 10.
-  double huber = 2.0;
 
   /// Number of keyframes in the adjusted window, 3 … 20.
   int window_keyframes = 10;

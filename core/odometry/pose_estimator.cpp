@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/math/linear_solve.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::odometry {
-namespace {}  // namespace
-
 bool PoseFit::confirmed_stereo() const noexcept {
   return std::popcount(cameras) >= 2 && stereo >= kMajority * stereo_found;
 }
@@ -67,14 +64,6 @@ void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
   });
 }
 
-PoseRefineOptions PoseEstimator::how_to_refine(bool rough) const noexcept {
-  PoseRefineOptions o;
-  o.huber = options_.huber;
-  o.inlier_chi2 = kChi2OfPixel;
-  if (rough || !drop_gross_) o.gross_chi2 = std::numeric_limits<double>::infinity();
-  return o;
-}
-
 PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample,
                                            std::span<const std::uint8_t> used) noexcept {
   Solved s;
@@ -87,7 +76,7 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample,
     s.T = m.T_left_world;
   }
   const RefinedPose r =
-      refiner_.refine(table_.view(), s.T, sample ? mlesac_.flags() : used, how_to_refine(sample));
+      refiner_.refine(table_.view(), s.T, sample ? mlesac_.flags() : used, drop_gross_ && !sample);
   if (!r.usable) return s;
   s.found = true;
   s.T = r.T_left_world;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/calibration/health.hpp"
+#include "core/math/robust.hpp"
 #include "core/odometry/undistorted_camera.hpp"
 
 namespace vergence::odometry {
@@ -178,7 +179,7 @@ WindowOutcome WindowAdjuster::solve(bool linked, const FrameWorkload& effort) no
                       : rotations_free_ ? BundleConfiguration::stereo_calibration
                                         : BundleConfiguration::stereo_odometry;
   how.loss = BundleLoss::huber;
-  how.loss_threshold = options_.huber;
+  how.loss_threshold = kHuber;
   how.max_steps = std::min<int>(options_.window_steps, effort.window_steps);
   how.cost_tolerance = 1e-4;
   if (how.configuration == BundleConfiguration::stereo_calibration)

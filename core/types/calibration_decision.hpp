@@ -36,7 +36,10 @@ struct FocalMeasurement {
   /// Standard deviation including systematic lens errors; 0 if the solve has not converged but is
   /// already far from the configured value.
   double sigma_px = 0;
-  /// True if the configured value certainly does not fit the images.
+  /// True if the measurement is more probable with another focal length than with the configured
+  /// one. Nothing is verified then, because the focal length scales all distances.
+  bool doubted = false;
+  /// True if the configured value certainly does not fit the images; it is then doubted, too.
   bool contradicted = false;
 };
 
@@ -78,6 +81,11 @@ struct CalibrationDecision {
   /// Log odds for the previous calibration over those that decide: Assessment::certainty.
   double certainty = 0;
   FocalMeasurement focal{};
+  /// True if the rig changed during the frames of this solve and of the one before it.
+  bool not_rigid = false;
+  /// Fraction of a frame that a camera's images are late (negative: early), if that explains most
+  /// of the changes of its transform during the solve's frames, else 0.
+  double offset_frames = 0;
   /// Time that the solve took on the solver's thread.
   double solve_ms = 0;
 };

@@ -53,8 +53,8 @@ enum class Reason : std::uint8_t {
   time_gap,
   /// The map was rebuilt; the motion across the gap was extrapolated.
   map_reset,
-  /// The points constrain the pose poorly or several times worse than usual, or the window
-  /// corrected it strongly.
+  /// The points constrain the pose poorly, or several times worse than usual in this frame or a
+  /// recent one.
   weak_geometry,
   /// There are more outliers than in a rigid scene.
   dynamic_scene,
@@ -109,8 +109,6 @@ struct PoseSample {
 
   /// Relative standard deviation that all lengths share, from the calibration.
   float length_sigma = 0;
-  /// Distance by which the window moved the fitted pose; included in the covariances.
-  float corrected_m = 0;
 
   /// Number of points that support the pose.
   int inliers = 0;

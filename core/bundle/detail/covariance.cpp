@@ -121,7 +121,7 @@ void publish_all(const Shared& joint, const Combination* rows, RigCovariance* ou
 double residual_variance(const BundleWorkspace& w, const BundleProblem& problem, const Partition& p,
                          double weighted) noexcept {
   const double freedom = 2.0 * static_cast<double>(problem.observations.size()) -
-                         3.0 * static_cast<double>(w.free_points) -
+                         3.0 * static_cast<double>(w.point_count) -
                          static_cast<double>(kBlock * w.free_poses) - p.estimated_count;
   return freedom > 0 ? weighted / freedom : 1.0;
 }

@@ -34,7 +34,6 @@ bool check_sizes(const BundleWorkspace& w, const BundleProblem& p, const BundleO
   const auto as_many = [](std::size_t n, std::size_t of) { return n == of || n == 0; };
   if (p.cameras.empty() || p.cameras.size() > kMaxCameras || p.T_left_world.empty() ||
       !as_many(p.pose_constant.size(), p.T_left_world.size()) ||
-      !as_many(p.point_constant.size(), p.points.size()) ||
       !as_many(p.squared_residuals.size(), p.observations.size()) ||
       (mono ? !as_many(p.T_camera_left.size(), p.cameras.size())
             : p.T_camera_left.size() != p.cameras.size()))
@@ -122,13 +121,10 @@ bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions
 /// Sorts the points with observations so that those seen by the same poses are adjacent.
 bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) noexcept {
   w.point_count = 0;
-  w.free_points = 0;
   for (std::size_t i = 0; i < p.points.size(); ++i) {
     const std::uint32_t begin = w.first_observation[i], end = w.first_observation[i + 1];
     if (begin == end) continue;
-    const bool free = p.point_constant.empty() || p.point_constant[i] == 0;
-    if (free && end - begin < 2) return refuse(r, BundleTermination::rank_deficient);
-    w.free_points += free ? 1U : 0U;
+    if (end - begin < 2) return refuse(r, BundleTermination::rank_deficient);
     const std::uint64_t first = p.observations[begin].pose, last = p.observations[end - 1].pose;
     w.order[w.point_count++] = (first << 48U) | (last << 32U) | i;
   }
@@ -293,8 +289,7 @@ bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o,
     for (std::size_t c = 0; c < 3; ++c)
       state.points[(batch * 3 + c) * kBatch + lane] =
           used ? p.points[point][static_cast<Eigen::Index>(c)] : 0.0;
-    w.point_free[i] =
-        used && (p.point_constant.empty() || p.point_constant[point] == 0) ? 1.0 : 0.0;
+    w.point_free[i] = used ? 1.0 : 0.0;
   }
   std::copy(p.T_left_world.begin(), p.T_left_world.end(), state.poses.begin());
   for (std::size_t k = 0; k < p.cameras.size(); ++k) {

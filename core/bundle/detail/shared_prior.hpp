@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+
 #include "core/bundle/detail/workspace.hpp"
 
 namespace vergence::detail {
@@ -38,7 +40,7 @@ class SharedPrior {
   std::size_t cameras_ = 0;
   double weight_ = 1;
   // Only their bases are used.
-  KernelCamera mean_[kMaxCameras]{};
+  std::array<KernelCamera, kMaxCameras> mean_{};
   SharedMatrix information_;
 };
 

@@ -187,7 +187,6 @@ struct BundleWorkspace {
 
   /// Sizes of the current problem; points have observations.
   std::size_t batch_count = 0, block_count = 0, slot_count = 0, point_count = 0;
-  std::size_t free_points = 0;
   int free_poses = 0;
 };
 

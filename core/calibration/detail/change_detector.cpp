@@ -190,7 +190,7 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
     second.add(entry.evidence, age * age);
     const auto keep = [&](Onset* best, const Evidence& sum) {
       if (const double g = gain(sum.A, sum.g - sum.A * mean) / lambda_; g > best->gain)
-        *best = Onset{g, entry.frame, frames, sum};
+        *best = Onset{g, entry.frame, sum};
     };
     keep(&found->step, zeroth);
     if (2 * frames < options_.long_window) return;
@@ -230,7 +230,6 @@ void ChangeDetector::attribute(std::size_t window, MonitorResult* d) const noexc
   d->kind = ramp ? MonitorResult::Kind::drift : MonitorResult::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset_frame = onset.frame;
-  d->frames_since_onset = onset.frames;
   d->evidence = {0.5 * d->statistic, shift_px(onset.since), 0};
 }
 

@@ -33,7 +33,6 @@ class ChangeDetector {
     // Twice the log likelihood ratio against no change.
     double gain = 0;
     std::uint64_t frame = 0;
-    int frames = 0;
     // Evidence since the onset, not inflated; that of a ramp is weighted by the ramp.
     Evidence since;
   };

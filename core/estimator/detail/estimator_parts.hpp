@@ -4,7 +4,6 @@
 
 #include "core/estimator/degradations.hpp"
 #include "core/estimator/detail/covariance_baseline.hpp"
-#include "core/estimator/detail/window_correction.hpp"
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
@@ -77,7 +76,7 @@ struct Estimator::Parts {
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void notify_missing(Stamp stamp) noexcept;
   void update_degradations(const odometry::FrameOutcome& out, Pairing pairing) noexcept;
-  void check_motion(const odometry::FrameOutcome& out, const Mat6& motion, double step_m) noexcept;
+  void check_motion(const Mat6& motion, double step_m) noexcept;
   void weaken_degradations(const odometry::FrameOutcome& out, Stamp stamp) noexcept;
   [[nodiscard]] Reason why_uncalibrated() const noexcept;
 
@@ -102,6 +101,8 @@ struct Estimator::Parts {
   ChangeEvidence verified_by;
   // True if an event has reported a wrong focal length.
   bool focal_contradicted = false;
+  // True if an event has reported that the rig is not rigid, until a calibration is verified.
+  bool not_rigid = false;
   // True if this frame's pose differs from the last one by more than its uncertainty.
   bool moves = false;
 

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -156,33 +157,17 @@ TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
       const double value = hostile[random.below(6)];
       BundleObservation& o =
           rig.observations[random.below(static_cast<std::uint32_t>(rig.observations.size()))];
-      switch (random.below(8)) {
-        case 0:
-          o.x = value;
-          break;
-        case 1:
-          o.inverse_sigma = static_cast<float>(value);
-          break;
-        case 2:
-          rig.points[random.below(20)][random.below(3)] = value;
-          break;
-        case 3:
-          rig.T_left_world[random.below(5)].t[random.below(3)] = value;
-          break;
-        case 4:
-          rig.T_camera_left[random.below(2)].t[random.below(3)] = value;
-          break;
-        case 5:
-          o.point = random.next();
-          break;
-        case 6:
-          std::erase_if(rig.observations,
-                        [&](const BundleObservation&) { return random.below(3) == 0; });
-          break;
-        default:
-          for (Vec3& p : rig.points) p = rig.points[0];
-          break;
-      }
+      const std::function<void()> spoils[] = {
+          [&] { o.x = value; },
+          [&] { o.inverse_sigma = static_cast<float>(value); },
+          [&] { rig.points[random.below(20)][random.below(3)] = value; },
+          [&] { rig.T_left_world[random.below(5)].t[random.below(3)] = value; },
+          [&] { rig.T_camera_left[random.below(2)].t[random.below(3)] = value; },
+          [&] { o.point = random.next(); },
+          [&] { std::erase_if(rig.observations, [&](auto&) { return random.below(3) == 0; }); },
+          [&] { std::ranges::fill(rig.points, Vec3(rig.points[0])); },
+      };
+      spoils[random.below(8)]();
       if (rig.observations.empty()) break;
     }
     BundleOptions o{.configuration = static_cast<BundleConfiguration>(random.below(3)),

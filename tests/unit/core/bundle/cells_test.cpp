@@ -56,8 +56,7 @@ SimulatedRig small_motion(int poses, int life, Random& random,
 double ratio(int poses, int life, std::uint64_t seed, const std::function<Vec2(const Vec2&)>& field,
              int n = kCells) {
   Random random(seed);
-  SimulationOptions size{.poses = poses, .points = kPoints};
-  OwnAdjuster own(capacities_for(size));
+  OwnAdjuster own(capacities_for({.poses = poses, .points = kPoints}));
   BundleOptions o = with_covariance();
   const SimulatedRig start = small_motion(poses, life, random, field);
   SimulatedRig rig = start, again = start;

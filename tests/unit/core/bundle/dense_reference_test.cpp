@@ -144,14 +144,10 @@ class DenseReference : public ::testing::TestWithParam<Case> {};
 
 TEST_P(DenseReference, oneStepMatchesTheDenseStep) {
   const Case& c = GetParam();
-  SimulationOptions s{.cameras = c.cameras,
-                      .poses = 4,
-                      .points = 12,
-                      .noise = 0.5,
-                      .start_position = 0.01,
-                      .start_rotation = 0.002,
-                      .start_translation = 0.005,
-                      .start_points = 0.01};
+  SimulationOptions s{.cameras = c.cameras, .poses = 4, .points = 12, .noise = 0.5};
+  s.start_position = s.start_points = 0.01;
+  s.start_rotation = 0.002;
+  s.start_translation = 0.005;
   Random random(51);
   Dense d;
   d.rig = simulate_rig(s, random);

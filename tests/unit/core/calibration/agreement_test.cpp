@@ -94,13 +94,6 @@ TEST(Agreement, conditionalCovarianceOfCorrelatedIntrinsics) {
       EXPECT_NEAR(left(i, intrinsic_row(0) + j), 0, 1e-15) << i << ' ' << j;
 }
 
-TEST(Agreement, covarianceWithoutFixedIntrinsicsIsUnchanged) {
-  Random random(83);
-  const RigCovariance noise = published(covariance_of_noise(random)), left = noise_only(noise);
-  for (int i = 0; i < kRigSize; ++i)
-    for (int j = 0; j <= i; ++j) ASSERT_EQ(left(i, j), noise(i, j));
-}
-
 // Both calibrations are drawn about one truth. With 1000 draws the mean of χ²(5)/5 has a standard
 // error of 0.02, and the derivatives of a rig that is a sigma off differ by some hundredths.
 TEST(Agreement, oneSigmaDifferencesAverageToOne) {

@@ -105,8 +105,7 @@ RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_
   test::FeatureDriveOptions o;
   o.seed = seed;
   o.changes = changes;
-  CalibrationOptions held{.max_frames = 60, .intrinsics = IntrinsicsEstimation::fixed};
-  test::SolverInArena s(held);
+  test::SolverInArena s({.max_frames = 60, .intrinsics = IntrinsicsEstimation::fixed});
   test::FeatureDrive drive(o);
   test::log_drive(drive, 60, {}, s.solver.log());
   *nominal = test::rig_of(o);

@@ -23,16 +23,6 @@ void turn(RigCalibration* rig, const Vec3& angle) {
   rig->T_camera_left[1].R = exp_so3(angle) * rig->T_camera_left[1].R;
 }
 
-TEST(DepthDifference, identicalRigsHaveNoDifference) {
-  RigCalibration rig = wide_rig();
-  turn(&rig, {0.01, -0.02, 0.005});
-  rig.intrinsics[0].distortion = {-0.1, 0.02, 1e-3, -5e-4, 0};
-  rig.intrinsics[1].distortion = {-0.12, 0.03, -1e-3, 5e-4, 0};
-  // Iterations end at the rounding of a pixel, 1e-13 of a thousand; the disparity is 19 px and
-  // more.
-  for (const double z : kHealthDepths) EXPECT_LT(depth_error_percent(rig, rig, 1, z), 1e-8) << z;
-}
-
 // A yaw δ moves what is straight ahead by f δ, at the edge of the image (x/z = 0.41) by f (1 + x²)
 // δ; the disparity is f b / Z. So the inverse depth is off by Z δ (1 + x²) / b, relative, whatever
 // the depth: of the root mean square over the image x² takes 6 %.

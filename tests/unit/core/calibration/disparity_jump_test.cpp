@@ -98,18 +98,13 @@ TEST(DisparityJump, yawKnockIsConfirmedInTheNextFrame) {
   }
 }
 
-TEST(DisparityJump, constantWrongYawIsNoJump) {
-  for (const double yaw : {0.3, -1.0}) {
-    Street street(rig(yaw));
-    for (int i = 0; i < 300; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << yaw << ", " << i;
-  }
-}
-
-TEST(DisparityJump, noiseIsNoJumpInAThousandFrames) {
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    Street street(rig(0), seed);
-    for (int i = 0; i < 200; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << seed << ", " << i;
-  }
+TEST(DisparityJump, noiseOrConstantWrongYawIsNoJump) {
+  for (const double yaw : {0.0, 0.3, -1.0})
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Street street(rig(yaw), seed);
+      for (int i = 0; i < 300; ++i)
+        EXPECT_FALSE(street.drive(rig(0)).suspected) << yaw << ", " << seed << ", " << i;
+    }
 }
 
 TEST(DisparityJump, singleWrongImageIsNotConfirmed) {

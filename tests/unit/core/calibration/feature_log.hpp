@@ -1,8 +1,6 @@
 #pragma once
-#include <array>
 
 #include "core/calibration/rig_solver.hpp"
-#include "core/math/random.hpp"
 #include "tests/support/feature_drive.hpp"
 
 namespace vergence::test {

@@ -1,5 +1,4 @@
 #include "core/calibration/gates.hpp"
-#include "core/math/robust.hpp"
 
 #include <gtest/gtest.h>
 
@@ -53,8 +52,6 @@ struct Case {
   }
   [[nodiscard]] Transform& found() { return solution.rig.T_camera_left[1]; }
 };
-
-TEST(Gates, soundSolutionIsAccepted) { EXPECT_EQ(Case().ask(), Gate::open); }
 
 TEST(Gates, unusableSolutionIsRejectedByItsGate) {
   struct Row {
@@ -174,6 +171,8 @@ TEST(Gates, knockOfTheThirdCameraIsAccepted) {
   EXPECT_FALSE(a.worse);
   std::swap(c.solution.rig.T_camera_left[2], c.in_use.T_camera_left[2]);
   EXPECT_TRUE(fits_better(c.log, c.solution.newest, c.in_use, c.solution.rig));
+  c.question.in_use = nullptr;
+  EXPECT_EQ(c.ask(), Gate::does_not_fit) << "a solution with this third camera";
 }
 
 // A short drive holds every camera less well than a long one before it did: by what the gates take
@@ -207,13 +206,6 @@ TEST(Gates, uncertainCameraHidesNoContradiction) {
     EXPECT_TRUE(assessed().contradicted) << wrong;
     EXPECT_FALSE(assessed().verified);
   }
-}
-
-TEST(Gates, heldOutFramesRejectAWrongThirdCamera) {
-  Case c(kThird);
-  EXPECT_EQ(c.ask(), Gate::open);
-  c.turn(&c.solution.rig, {0.2, 0, 0}, 2);
-  EXPECT_EQ(c.ask(), Gate::does_not_fit);
 }
 
 TEST(Gates, thirdCameraWithoutMatchesDecidesNothing) {

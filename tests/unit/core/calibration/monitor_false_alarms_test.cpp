@@ -1,10 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
-#include <memory>
-#include <vector>
 
 #include "tests/support/quantile.hpp"
 #include "tests/unit/core/calibration/monitor_modes.hpp"
@@ -12,8 +9,6 @@
 namespace vergence::test {
 namespace {
 
-using calibration::MonitorResult;
-using calibration::detail::ChangeDetector;
 using test::quantile;
 
 // An hour has this many frames at 30 Hz.
@@ -51,7 +46,7 @@ TEST(MonitorModes, modesHaveTheStatisticsOfTracks) {
       if (trial.step().statistic > 0 && i > 300) tracks.push_back(trial.verdict().statistic);
   }
   ModeDrive drive(o, 3);
-  const auto windows = std::make_unique<ChangeDetector>();
+  const auto windows = std::make_unique<calibration::detail::ChangeDetector>();
   windows->reset({}, Mat5::Zero());
   for (int i = 0; i < 60000; ++i) {
     const ModeDrive::Frame f = drive.next(Vec5::Zero());
@@ -80,7 +75,7 @@ TEST(MonitorFalseAlarms, hundredHoursHaveAtMostFourAlarms) {
   }
   Random random(17);
   const calibration::MonitorOptions options;
-  const auto windows = std::make_unique<ChangeDetector>();
+  const auto windows = std::make_unique<calibration::detail::ChangeDetector>();
   int alarms = 0;
   double worst = 0, worst_standing = 0;
   std::vector<double> hourly;
@@ -99,9 +94,9 @@ TEST(MonitorFalseAlarms, hundredHoursHaveAtMostFourAlarms) {
       if (f.moving) {
         standing_over = 0;
         windows->push(f.evidence);
-        const MonitorResult d = windows->decide();
+        const calibration::MonitorResult d = windows->decide();
         most = std::max(most, d.statistic);
-        alarm = d.kind != MonitorResult::Kind::quiet;
+        alarm = d.kind != calibration::MonitorResult::Kind::quiet;
       } else {
         const double s = windows->single(f.evidence.evidence, f.spread_now);
         worst_standing = std::max(worst_standing, s);

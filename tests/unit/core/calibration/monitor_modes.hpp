@@ -1,13 +1,9 @@
 #pragma once
 #include <Eigen/Cholesky>
 
-#include <cmath>
 #include <cstdint>
-#include <memory>
-#include <vector>
 
 #include "core/calibration/detail/change_detector.hpp"
-#include "core/calibration/detail/monitor_residuals.hpp"
 #include "core/math/random.hpp"
 #include "tests/unit/core/calibration/monitor_trial.hpp"
 

@@ -54,17 +54,6 @@ class Blocks {
   Evidence past_;
 };
 
-TEST(BlockScatter, firstBlockKeepsTheExpectedVariance) {
-  BlockScatter s;
-  EXPECT_EQ(s.variance(), 0);
-  s.expect(0.2);
-  EXPECT_DOUBLE_EQ(s.variance(), 0.2 * 0.2 / 5);
-  // The first block has nothing to be held against.
-  Blocks b(91);
-  b.run(1, 0.5, &s);
-  EXPECT_DOUBLE_EQ(s.variance(), 0.2 * 0.2 / 5);
-}
-
 // Noise alone is λ/n in each direction, 7.5e-5 px²; what is taken off for it leaves a mean over 60
 // blocks of five that scatters by √(2/300) = 8 % of that, 6e-6. The expectation, 0.2² / 5 = 8e-3,
 // weighs four blocks beside them.

@@ -4,8 +4,8 @@
 #include <memory>
 #include <numbers>
 #include <optional>
-#include <vector>
 
+#include "core/calibration/detail/monitor_residuals.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "tests/support/feature_drive.hpp"

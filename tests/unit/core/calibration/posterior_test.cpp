@@ -28,10 +28,10 @@ RigCalibration known_rig() {
 TEST(Posterior, driftAddsTheRandomWalkOfItsTime) {
   CalibrationOptions options{.extrinsic_random_walk_mrad_per_sqrt_h = 0.4};
   const RigCalibration before = known_rig();
-  for (const double hours : {1.0, 4.0}) {
+  for (const double hours : {-1.0, 0.0, 1.0, 4.0}) {
     RigCalibration rig = before;
     let_drift(hours, options, &rig);
-    const double walk = 0.4e-3 * 0.4e-3 * hours;
+    const double walk = 0.4e-3 * 0.4e-3 * std::max(hours, 0.0);
     const auto added = [&](int row) {
       return rig.covariance(row, row) - before.covariance(row, row);
     };
@@ -41,21 +41,11 @@ TEST(Posterior, driftAddsTheRandomWalkOfItsTime) {
       EXPECT_NEAR(added(extrinsic_row(1) + 3 + i), walk * 0.75 * 0.75, 1e-9 * walk) << i;
       EXPECT_NEAR(added(extrinsic_row(2) + 3 + i), walk * 0.5 * 0.5, 1e-9 * walk) << i;
     }
-    for (int i = 0; i < kIntrinsicsSize - 1; ++i) EXPECT_GT(added(intrinsic_row(1) + i), 0) << i;
+    for (int i = 0; i < kIntrinsicsSize - 1; ++i)
+      EXPECT_EQ(added(intrinsic_row(1) + i) > 0, hours > 0) << i;
     for (int r = 0; r < kRigSize; ++r)
       for (int c = 0; c < r; ++c)
         ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c)) << "a walk of each by itself";
-  }
-}
-
-TEST(Posterior, zeroOrNegativeTimeAddsNothing) {
-  const RigCalibration before = known_rig();
-  for (const double hours : {0.0, -1.0}) {
-    RigCalibration rig = before;
-    let_drift(hours, {}, &rig);
-    for (int r = 0; r < kRigSize; ++r)
-      for (int c = 0; c <= r; ++c)
-        ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c)) << hours;
   }
 }
 

@@ -37,8 +37,7 @@ TEST(RigSolverSigmas, sigmasMatchErrorsOverFiftyDrives) {
   // Mean squared error of the path length over its sigma.
   double length = 0;
   for (int i = 0; i < kDrives; ++i) {
-    FeatureDriveOptions o;
-    o.seed = 100 + static_cast<std::uint64_t>(i);
+    FeatureDriveOptions o{.seed = 100 + static_cast<std::uint64_t>(i)};
     FeatureDrive drive(o);
     s.solver.log().clear();
     const double driven = log_drive(drive, kFrames, {2e-3, 0.02, 5e-3, 0.02}, s.solver.log());

@@ -1,7 +1,5 @@
 #include "core/camera/camera.hpp"
 
-#include <gtest/gtest.h>
-
 #include <array>
 #include <cmath>
 #include <limits>
@@ -205,15 +203,6 @@ TEST(Camera, pointBeyondTheFoldIsRefused) {
   EXPECT_EQ(camera.project({1.06, 0, 1}, &pixel, &J), ProjectStatus::folded);
   EXPECT_EQ(camera.project({0, -15, 10}, &pixel, &J), ProjectStatus::folded);
   EXPECT_EQ(pixel, Vec2(-1, -2));
-}
-
-TEST(Camera, equidistantWithoutCoefficientsIsTheAngle) {
-  const Camera camera(
-      intrinsics(CameraModelKind::pinhole_equidistant, 512, 512, {200, 200, 256, 256}, {}));
-  Vec2 pixel;
-  ASSERT_EQ(camera.project({1, 0, 1}, &pixel, nullptr), ProjectStatus::ok);
-  EXPECT_NEAR(pixel.x(), 256 + 200 * std::numbers::pi / 4, 1e-12 * 512);
-  EXPECT_EQ(pixel.y(), 256);
 }
 
 }  // namespace

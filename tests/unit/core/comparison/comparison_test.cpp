@@ -6,8 +6,6 @@
 #include <functional>
 #include <vector>
 
-#include "tests/support/no_allocations.hpp"
-
 namespace vergence {
 namespace {
 
@@ -442,24 +440,6 @@ TEST(Comparison, insClockSetBackIsAcceptedAfterASecond) {
     ASSERT_EQ(b.out.size(), 1U);
     EXPECT_EQ(b.out[0].ins, InsMatch::ok);
   }
-}
-
-TEST(Comparison, hourAt120HzAllocatesNothing) {
-  Bench b;
-  std::uint64_t out = 0;
-  test::expect_no_allocations([&] {
-    ComparedPose c;
-    for (int i = 0; i < 3600 * 120; ++i) {
-      const double t = i / 120.0;
-      b.comparison.add(b.sample(t));
-      if (i % 4 == 3) b.comparison.add(b.pose(t - 0.004));
-      while (b.comparison.next(&c)) ++out;
-    }
-    b.comparison.finish();
-    while (b.comparison.next(&c)) ++out;
-  });
-  EXPECT_EQ(out, 108000U);
-  EXPECT_GT(b.comparison.counters().compared, 107000U);
 }
 
 }  // namespace

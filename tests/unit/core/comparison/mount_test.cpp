@@ -3,10 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
-#include <vector>
 
 #include "core/comparison/comparison.hpp"
 #include "core/comparison/geodesy.hpp"

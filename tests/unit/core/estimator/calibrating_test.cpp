@@ -1,8 +1,6 @@
 // The estimator and its rig, on a corridor drawn ray by ray.
 #include <gtest/gtest.h>
 
-#include <vector>
-
 #include "tests/unit/core/estimator/corridor_drive.hpp"
 
 namespace vergence {
@@ -195,17 +193,6 @@ TEST(Calibrating, finishDecidesAPendingCalibrationOnce) {
   too_short.drive(0, 8);
   too_short.estimator->finish();
   EXPECT_TRUE(too_short.estimator->calibrations().empty());
-}
-
-TEST(Calibrating, fromScratchIgnoresTheSuppliedTransform) {
-  Drive d(CalibrationTrust::none), other(CalibrationTrust::none);
-  other.given.T_camera_left[1] = {exp_so3({1, 2, 3}), {7, 8, 9}};
-  d.begin();
-  other.begin();
-  d.drive(0, 35);
-  other.drive(0, 35);
-  for (std::size_t i = 0; i < d.samples.size(); ++i)
-    ASSERT_EQ(d.samples[i].T_world_left.t, other.samples[i].T_world_left.t) << i;
 }
 
 TEST(Calibrating, fromScratchNeedsABaselineLength) {

@@ -1,10 +1,5 @@
 #include "core/estimator/calibration_states.hpp"
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <string>
-
 #include "core/estimator/degradations.hpp"
 #include "core/estimator/transitions.hpp"
 #include "tests/support/mentions.hpp"
@@ -28,9 +23,9 @@ constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "pose_found",
                                                "pose_found_suspect",
                                                "pose_found_uncalibrated"};
-constexpr std::array kDegradationNames = {"pairing",    "scene", "frame",       "out_of_sync",
-                                          "late_image", "rig",   "calibration", "dynamic_scene",
-                                          "window",     "motion"};
+constexpr std::array kDegradationNames = {"pairing",     "scene",         "frame",
+                                          "out_of_sync", "late_image",    "rig",
+                                          "calibration", "dynamic_scene", "window"};
 static_assert(kDegradationNames.size() == kDegradations);
 
 std::string edge(std::string_view from, std::string_view to, std::string_view on) {

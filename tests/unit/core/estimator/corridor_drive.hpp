@@ -1,8 +1,6 @@
 #pragma once
-#include <algorithm>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "core/estimator/estimator.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"

@@ -41,12 +41,5 @@ TEST(DegradationLedger, entryKeepsItsFirstFrame) {
   EXPECT_EQ(ledger[Degradation::frame].since, 16U);
 }
 
-TEST(DegradationLedger, lateImageIsIgnoredWhileStanding) {
-  DegradationLedger ledger;
-  ledger.enter(Degradation::late_image, Reason::image_repeated, 3, 12);
-  EXPECT_EQ(ledger.strongest(false), nullptr);
-  EXPECT_NE(ledger.strongest(true), nullptr);
-}
-
 }  // namespace
 }  // namespace vergence

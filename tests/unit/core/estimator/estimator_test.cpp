@@ -2,13 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <vector>
 
-#include "core/math/random.hpp"
-#include "tests/support/no_allocations.hpp"
 #include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
@@ -71,18 +67,6 @@ void expect_at_start(const PoseSample& s) {
   EXPECT_LT(log_so3(s.T_world_left.R).norm(), 1e-3);
 }
 
-TEST(Estimator, everyFrameGetsItsNumberAndStamp) {
-  Standing s;
-  for (int i = 0; i < 5; ++i) {
-    const PoseSample sample = s.give(i);
-    EXPECT_EQ(sample.frame, static_cast<std::uint64_t>(i));
-    EXPECT_EQ(sample.stamp, s.frame(i).stamp);
-    EXPECT_EQ(sample.status, PoseStatus::ok) << to_string(sample.reason);
-    EXPECT_EQ(sample.state, State::stereo_odometry);
-    expect_at_start(sample);
-  }
-}
-
 /// 1 σ of a pose's position, m.
 double position_sigma(const PoseSample& s) {
   const auto variance = [&](std::size_t at) { return static_cast<double>(s.covariance[at]); };
@@ -121,18 +105,6 @@ TEST(Estimator, contradictedPairingUsesTheLeftImageOnly) {
   EXPECT_EQ(sample.T_world_left.t, expected.T_world_left.t) << "bit for bit";
   EXPECT_EQ(sample.stereo_inliers, 0);
   EXPECT_EQ(contradicted.give(4).status, PoseStatus::ok) << "that one frame only";
-}
-
-TEST(Estimator, assumedPairingIsUsedLikeAVerifiedOne) {
-  Standing verified, assumed;
-  for (int i = 0; i < 3; ++i) {
-    RigFrame frame = verified.frame(i);
-    frame.pairing = Pairing::verified;
-    const PoseSample p = verified.estimator.process(frame);
-    const PoseSample a = assumed.give(i);
-    EXPECT_EQ(p.status, a.status);
-    EXPECT_EQ(p.T_world_left.t, a.T_world_left.t);
-  }
 }
 
 TEST(Estimator, olderFrameIsLostAndChangesNothing) {
@@ -228,13 +200,6 @@ TEST(Estimator, invalidRigIsRefused) {
   EXPECT_EQ(refused(rig()), "");
   for (const RigCalibration& r : {one, small, no_focus, no_baseline, not_a_number})
     EXPECT_NE(refused(r), "");
-}
-
-TEST(Estimator, processingUsesTheArenaAndNoHeap) {
-  Standing s;
-  test::expect_no_allocations([&] {
-    for (int i = 0; i < 6; ++i) (void)s.give(i);
-  });
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // A camera that gave an image twice may be an exposure behind from then on.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <span>
 #include <utility>
 

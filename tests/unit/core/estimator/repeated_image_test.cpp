@@ -1,7 +1,6 @@
 // A camera that gives the same image again and again while the rig drives on.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <optional>
 
 #include "core/estimator/estimator.hpp"

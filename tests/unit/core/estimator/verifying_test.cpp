@@ -2,14 +2,13 @@
 // measures its own.
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <limits>
 
 #include "tests/unit/core/estimator/corridor_drive.hpp"
 
 namespace vergence {
 namespace {
 
-using odometry::test::Corridor;
 using Kind = EstimatorEvent::Kind;
 
 /// The corridor's rig, driven with a claim about it.
@@ -35,6 +34,20 @@ struct SuppliedRig : test::CorridorDrive {
       give(frame);
     }
   }
+  /// The poses of frames in [from, to) are all `ok`, or none of them is.
+  void expect_ok(bool ok, int from, int to = std::numeric_limits<int>::max()) const {
+    for (const PoseSample& s : samples)
+      if (const int i = static_cast<int>(s.frame); i >= from && i < to) {
+        EXPECT_EQ(s.status == PoseStatus::ok, ok) << i << '\n' << story;
+      }
+  }
+  /// By what the calibration in use turns what is straight ahead, rad: yaw and centre together.
+  [[nodiscard]] double turn_from(const Mat3& truth) const {
+    const RigCalibration& found = estimator->calibration();
+    const double yaw = log_so3(found.T_camera_left[1].R * truth.transpose()).y();
+    const Intrinsics &lens = found.intrinsics[1], &true_lens = corridor.rig().intrinsics[1];
+    return yaw + (lens.cx - true_lens.cx) / true_lens.fx;
+  }
 };
 
 // Inverse depth is off by Z ψ / b: at the depth where a match of 0.15 px is 1 % (6.6 m) the
@@ -48,14 +61,12 @@ TEST(Verifying, trueCalibrationIsDegradedUntilVerified) {
   EXPECT_EQ(c.first(Kind::calibration_contradicted), -1) << c.story;
   EXPECT_EQ(c.first(Kind::rig_changed), -1) << c.story;
   EXPECT_EQ(c.first(Kind::focal_length_contradicted), -1) << c.story;
-  for (const PoseSample& s : c.samples) {
-    if (static_cast<int>(s.frame) < confirmed) {
-      EXPECT_EQ(s.status, PoseStatus::degraded) << s.frame;
-      EXPECT_EQ(s.reason, Reason::unverified_calibration) << s.frame;
-    } else {
-      EXPECT_EQ(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
-    }
+  for (int i = 0; i < confirmed; ++i) {
+    const PoseSample& s = c.samples[static_cast<std::size_t>(i)];
+    EXPECT_EQ(s.status, PoseStatus::degraded) << i;
+    EXPECT_EQ(s.reason, Reason::unverified_calibration) << i;
   }
+  c.expect_ok(true, confirmed);
   EXPECT_TRUE(c.estimator->verified());
 }
 
@@ -68,14 +79,8 @@ TEST(Verifying, outageNeedsOneNewVerification) {
   ASSERT_GE(again, c.dark_to + 24) << c.story;
   EXPECT_EQ(c.first(Kind::calibration_verified, again + 1), -1) << c.story;
   EXPECT_EQ(c.first(Kind::rig_changed), -1) << c.story;
-  for (const PoseSample& s : c.samples) {
-    const int i = static_cast<int>(s.frame);
-    if (i >= c.dark_to && i < again) {
-      EXPECT_NE(s.status, PoseStatus::ok) << i << '\n' << c.story;
-    } else if (i >= again) {
-      EXPECT_EQ(s.status, PoseStatus::ok) << i << '\n' << c.story;
-    }
-  }
+  c.expect_ok(false, c.dark_to, again);
+  c.expect_ok(true, again);
 }
 
 // The tolerated 2 % of the depth at which the corridor is judged are a yaw of 1.5 mrad: this one is
@@ -85,12 +90,8 @@ TEST(Verifying, yawKnockDuringOutageIsNeverOk) {
   c.dark_from = 50, c.dark_to = 56;
   c.drive(110, 53, Vec3(0, 0.015, 0));
   const int adopted = c.first(Kind::calibration_accepted, c.dark_to);
-  for (const PoseSample& s : c.samples)
-    if (static_cast<int>(s.frame) >= c.dark_to &&
-        (adopted < 0 || static_cast<int>(s.frame) < adopted)) {
-      EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
-    }
   ASSERT_GE(adopted, 0) << c.story;
+  c.expect_ok(false, c.dark_to, adopted);
   EXPECT_GE(std::max(c.first(Kind::calibration_contradicted, c.dark_to),
                      c.first(Kind::rig_changed, c.dark_to)),
             c.dark_to)
@@ -113,15 +114,8 @@ void expect_mended_once(double yaw_rad) {
   EXPECT_EQ(c.first(Kind::rig_changed, adopted + 1), -1) << c.story;
   EXPECT_EQ(c.samples.back().status, PoseStatus::ok) << c.story;
   const Mat3 truth = exp_so3(knock) * c.corridor.rig().T_camera_left[1].R;
-  const RigCalibration& found = c.estimator->calibration();
-  const double yaw = log_so3(found.T_camera_left[1].R * truth.transpose()).y();
-  const Intrinsics &lens = found.intrinsics[1], &true_lens = c.corridor.rig().intrinsics[1];
-  EXPECT_NEAR(yaw + (lens.cx - true_lens.cx) / true_lens.fx, 0, 1.5e-3) << "the tolerated 2 %\n"
-                                                                        << c.story;
-  for (const PoseSample& s : c.samples)
-    if (static_cast<int>(s.frame) >= kKnock && static_cast<int>(s.frame) < adopted) {
-      EXPECT_NE(s.status, PoseStatus::ok) << s.frame;
-    }
+  EXPECT_NEAR(c.turn_from(truth), 0, 1.5e-3) << "the tolerated 2 %\n" << c.story;
+  c.expect_ok(false, kKnock, adopted);
 }
 
 TEST(Verifying, yawKnockIsRecalibratedOnce) {
@@ -141,16 +135,12 @@ TEST(Verifying, wrongYawIsContradictedAndReplaced) {
   ASSERT_GE(accepted, contradicted) << c.story;
   const int verified = c.first(Kind::calibration_verified);
   ASSERT_EQ(verified, accepted + 1) << c.story;
-  for (const PoseSample& s : c.samples) {
+  for (const PoseSample& s : c.samples)
     EXPECT_NE(s.status, PoseStatus::lost) << s.frame << '\n' << c.story;
-    // The poses of the frame of the adoption and of the next still are those of the contradicted
-    // rig. The first pose after them has what a fifth of all depths left in the window to correct.
-    if (static_cast<int>(s.frame) <= verified) {
-      EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
-    } else if (static_cast<int>(s.frame) > verified + 1) {
-      EXPECT_EQ(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
-    }
-  }
+  // The poses of the frame of the adoption and of the next still are those of the contradicted rig.
+  // The first pose after them has what a fifth of all depths left in the window to correct.
+  c.expect_ok(false, 0, verified + 1);
+  c.expect_ok(true, verified + 2);
   // Where it is judged (6.6 m) 15 mrad are 20 % of the inverse depth, known to a tenth: 2 % is what
   // the drive's own may be off.
   const auto first = std::find_if(c.decisions.begin(), c.decisions.end(),
@@ -163,10 +153,7 @@ TEST(Verifying, wrongYawIsContradictedAndReplaced) {
   EXPECT_TRUE(c.estimator->verified()) << c.story;
   // Straight ahead at 6.6 m, yaw and centre together: within the tolerance twice over of what the
   // truth gives.
-  const RigCalibration& found = c.estimator->calibration();
-  const double yaw = log_so3(found.T_camera_left[1].R * truth.R.transpose()).y();
-  const Intrinsics &lens = found.intrinsics[1], &true_lens = c.corridor.rig().intrinsics[1];
-  EXPECT_NEAR(yaw + (lens.cx - true_lens.cx) / true_lens.fx, 0, 3e-3) << c.story;
+  EXPECT_NEAR(c.turn_from(truth.R), 0, 3e-3) << c.story;
 }
 
 // While the calibration is a claim, epipolar lines cannot say whether a yaw is new; disparities
@@ -179,8 +166,7 @@ TEST(Verifying, yawKnockBeforeVerificationIsDetected) {
   const int noticed = c.first(Kind::rig_changed);
   ASSERT_GE(noticed, kKnock) << c.story;
   EXPECT_LE(noticed, kKnock + 1) << c.story;
-  for (const PoseSample& s : c.samples)
-    EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
+  c.expect_ok(false, 0);
 }
 
 // For five frames after a calibration was adopted the monitor tells no knock; a pose is not `ok`
@@ -188,17 +174,15 @@ TEST(Verifying, yawKnockBeforeVerificationIsDetected) {
 // lines.
 TEST(Verifying, pitchKnockAfterAdoptionIsNeverOk) {
   constexpr int kVerified = 25, kKnock = kVerified + 3;
-  const Transform truth = Corridor().rig().T_camera_left[1];
+  const Transform truth = odometry::test::Corridor().rig().T_camera_left[1];
   SuppliedRig c;
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * truth.R;
   c.drive(kVerified + 9, kKnock, {0.005, 0, 0});
   ASSERT_EQ(c.first(Kind::calibration_verified), kVerified) << c.story;
   EXPECT_EQ(c.first(Kind::rig_changed), kVerified + 6) << c.story;
-  for (const PoseSample& s : c.samples)
-    EXPECT_EQ(s.status == PoseStatus::ok,
-              static_cast<int>(s.frame) > kVerified + 1 && static_cast<int>(s.frame) < kKnock)
-        << s.frame << '\n'
-        << c.story;
+  c.expect_ok(false, 0, kVerified + 1);
+  c.expect_ok(true, kVerified + 1, kKnock);
+  c.expect_ok(false, kKnock);
 }
 
 }  // namespace

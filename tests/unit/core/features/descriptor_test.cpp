@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
@@ -21,15 +19,6 @@ Descriptor of(const Value& value) {
   Patch patch{};
   EXPECT_TRUE(cut_patch(built.pyramid, {60, 60}, &patch));
   return describe(patch);
-}
-
-TEST(Descriptor, distanceCountsBits) {
-  Descriptor a, b;
-  EXPECT_EQ(distance(a, b), 0);
-  b.bits = {1, 3, 0, 1ULL << 63U};
-  EXPECT_EQ(distance(a, b), 4);
-  for (std::uint64_t& w : a.bits) w = ~0ULL;
-  EXPECT_EQ(distance(a, {}), 256);
 }
 
 TEST(Descriptor, changedViewIsNearerThanAnyOtherPlace) {

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "core/features/corners.hpp"
 #include "core/features/surf.hpp"
 #include "tests/unit/core/features/texture.hpp"
@@ -61,40 +59,6 @@ TEST(Mask, emptyMaskAndOutsideHideNothing) {
   EXPECT_FALSE(mask.hides(Vec2(kWidth, 3)));
   EXPECT_FALSE(mask.hides(Vec2(std::nan(""), 3)));
   EXPECT_FALSE(mask.hides(Vec2(1e300, 3)));
-}
-
-TEST(Mask, maskRemovesOnlyItsOwnCorners) {
-  const Image image = draw(kWidth, kHeight, Texture(5));
-  const Image shown = half_hidden(kWidth / 2);
-  Arena arena;
-  const Mask mask(shown.view(), 0, arena);
-  SequentialRunner runner;
-  CornerOptions options;
-  const auto find = [&] {
-    std::vector<Corner> storage(1000);
-    BoundedVector<Corner> corners(storage);
-    find_corners(image.view(), options, {}, runner, &corners);
-    return std::vector<Corner>(corners.begin(), corners.end());
-  };
-  const std::vector<Corner> all = find();
-  options.mask = &mask;
-  const std::vector<Corner> left = find();
-  ASSERT_GT(left.size(), 20U);
-  for (const Corner& c : left) EXPECT_FALSE(mask.hides(Vec2(c.x, c.y)));
-  // Corners nearer to the mask's edge than a cell and the distance kept may have lost a neighbour
-  // that crowded them out.
-  const float clear = static_cast<float>(kWidth / 2 - options.cell) - options.min_distance;
-  const auto same = [](const Corner& a, const Corner& b) {
-    return a.x == b.x && a.y == b.y && a.score == b.score;
-  };
-  std::size_t compared = 0;
-  for (const Corner& c : all) {
-    if (c.x >= clear) continue;
-    ++compared;
-    EXPECT_TRUE(std::any_of(left.begin(), left.end(), [&](const Corner& o) { return same(c, o); }))
-        << c.x << ", " << c.y;
-  }
-  EXPECT_GT(compared, 10U);
 }
 
 TEST(Mask, maskedBlobsTakeNoCapacity) {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <numbers>
 
 #include "tests/unit/core/features/texture.hpp"
 
@@ -179,18 +178,6 @@ TEST(Patch, otherTextureOrNegativeIsNotMatched) {
                      s.patch, s.at, Mat2::Identity(), {.min_zncc = 0.8F})
                 .status,
             AlignStatus::ok);
-}
-
-TEST(Patch, patchIsCutOnLevelsThatContainIt) {
-  const Scene s(1);
-  Patch patch{};
-  EXPECT_TRUE(cut_patch(s.built.pyramid, {90, 80}, &patch));
-  EXPECT_EQ(patch.levels, 3);
-  EXPECT_TRUE(cut_patch(s.built.pyramid, {16, 80}, &patch));
-  EXPECT_EQ(patch.levels, 1);
-  EXPECT_FALSE(cut_patch(s.built.pyramid, {10, 80}, &patch));
-  EXPECT_FALSE(cut_patch(s.built.pyramid, {90, kHeight - 10}, &patch));
-  EXPECT_EQ(patch.levels, 0);
 }
 
 TEST(Patch, noByteOutsideTheImageIsRead) {

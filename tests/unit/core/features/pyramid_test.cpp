@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
@@ -66,13 +65,6 @@ TEST(Pyramid, smallImageHasFewerLevels) {
   // The widths are 70, 35 and 18 px; no side may be below 32 px.
   ASSERT_EQ(b.pyramid.levels(), 2);
   EXPECT_EQ(b.pyramid.level(1).width, 35);
-}
-
-TEST(Pyramid, buildUsesTheArenaAndNoHeap) {
-  const Image image = white_noise(640, 480, 1);
-  Arena arena;
-  Pyramid pyramid(640, 480, 4, arena);
-  vergence::test::expect_no_allocations([&] { pyramid.build(image.view()); });
 }
 
 }  // namespace

@@ -2,13 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "core/features/detail/surf_hessian.hpp"
 #include "core/features/surf_match.hpp"
-#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features {
@@ -16,7 +13,6 @@ namespace {
 
 using test::draw;
 using test::Image;
-using test::Texture;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -67,45 +63,6 @@ double distance(const SurfDescriptor& a, const SurfDescriptor& b) {
 /// 12 … 24, 21 … 45, 39 … 87 px can be a maximum.
 double places_apart(double sigma) { return 5.2 * sigma < 21 ? 1 : 5.2 * sigma < 42 ? 2 : 4; }
 
-TEST(SurfHessian, hessianIsTheSumOverItsBoxes) {
-  const Image image = test::white_noise(70, 60, 3, 5, 255);
-  Arena arena;
-  detail::IntegralImage sums(70, 60, arena);
-  sums.build(image.view());
-  for (const int L : {9, 15, 27, 51}) {
-    for (const auto& [x, y] : {std::pair(35, 30), std::pair(26, 25), std::pair(L / 2, L / 2),
-                               std::pair(69 - L / 2, 59 - L / 2)}) {
-      const int half = L / 2, lobe = L / 3;
-      long xx = 0, yy = 0, xy = 0;
-      for (int v = -half; v <= half; ++v) {
-        for (int u = -half; u <= half; ++u) {
-          if (x + u < 0 || y + v < 0 || x + u >= 70 || y + v >= 60) continue;
-          const int g = image.view().at(x + u, y + v);
-          if (std::abs(v) < lobe) xx += 2 * std::abs(u) < lobe ? -2 * g : g;
-          if (std::abs(u) < lobe) yy += 2 * std::abs(v) < lobe ? -2 * g : g;
-          if (u != 0 && v != 0 && std::abs(u) <= lobe && std::abs(v) <= lobe)
-            xy += (u > 0) == (v > 0) ? g : -g;
-        }
-      }
-      if (x < half || y < half || x + half >= 70 || y + half >= 60) continue;
-      const detail::BoxHessian h = detail::box_hessian(sums, x, y, L);
-      const float area = static_cast<float>(L * L);
-      EXPECT_FLOAT_EQ(h.xx, static_cast<float>(xx) / area) << L;
-      EXPECT_FLOAT_EQ(h.yy, static_cast<float>(yy) / area) << L;
-      EXPECT_FLOAT_EQ(h.xy, static_cast<float>(xy) / area) << L;
-      float row[3];
-      for (const int step : {1, 2}) {
-        const int n = x + step + half < 70 ? 2 : 1;
-        detail::determinant_row(sums, x, y, L, step, n, row);
-        EXPECT_EQ(row[0], h.determinant());
-        if (n == 2) {
-          EXPECT_EQ(row[1], detail::box_hessian(sums, x + step, y, L).determinant());
-        }
-      }
-    }
-  }
-}
-
 // Along one size the determinant of a blob falls like a Gaussian of w² = (σ² + s²)/4, symmetric
 // about its centre. A parabola through three samples h apart of such a top misses it by at most
 // 0.048 h³/w² (from its series, h δ (δ² − 1/4) h²/w², δ h the top's place between the samples);
@@ -144,13 +101,12 @@ Moved match_moved(const Vec2& shift, double degrees, double larger) {
   Moved m;
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     // Waves of many lengths: one length alone has no size of its own.
-    const Texture fine(seed, 9, 40), coarse(seed + 50, 20, 120);
+    const test::Texture fine(seed, 9, 40), coarse(seed + 50, 20, 120);
     const auto brightness = [&](const Vec2& p) { return 0.6 * fine(p) + 0.9 * coarse(p) - 64; };
     const auto again = [&](const Vec2& p) {
       return brightness(middle + turn.transpose() * (p - middle - shift) / larger);
     };
-    SurfOptions options;
-    options.min_response = 1;
+    SurfOptions options{.min_response = 1};
     const Described left(draw(kWhole, kWhole, brightness), 600, options),
         right(draw(kWhole, kWhole, again), 600, options);
     Arena arena;
@@ -298,29 +254,6 @@ TEST(Surf, noByteOutsideTheImageIsRead) {
     ASSERT_EQ(one.size(), two.size());
     for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i].response, two[i].response);
   }
-}
-
-TEST(Surf, detectionUsesTheArenaAndNoHeap) {
-  const Image image = draw(240, 180, Texture(2));
-  constexpr std::size_t kRoom = 200;
-  Arena arena;
-  Surf surf(240, 180, arena);
-  SurfMatcher matcher(kRoom, arena);
-  BoundedVector<SurfPoint> points(arena.make<SurfPoint>(kRoom, "points"));
-  const std::span<SurfDescriptor> descriptors = arena.make<SurfDescriptor>(kRoom, "descriptors");
-  BoundedVector<SurfMatch> matches(arena.make<SurfMatch>(kRoom, "matches"));
-
-  vergence::test::expect_no_allocations([&] {
-    ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);
-    (void)surf.detect({}, &points);
-    surf.describe(points.span(), descriptors.first(points.size()));
-    const SurfView view{points.span(), descriptors.first(points.size())};
-    ASSERT_EQ(matcher.match(view, view, &matches), SurfMatchStatus::ok);
-  });
-  ASSERT_GT(points.size(), 30U);
-  // Everything finds itself.
-  EXPECT_EQ(matches.size(), points.size());
-  for (const SurfMatch& m : matches) EXPECT_EQ(m.left, m.right);
 }
 
 }  // namespace

@@ -1,18 +1,13 @@
 #include <gtest/gtest.h>
 
-#include <span>
 #include <string>
-#include <vector>
 
 #include "core/features/detail/align_kernel.hpp"
 #include "core/features/detail/correlate_kernel.hpp"
-#include "tests/support/simd_targets.hpp"
 #include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::features::detail {
 namespace {
-
-using vergence::test::Fingerprint;
 
 TEST(FeatureTargets, correlationsAreEqualOnEveryTarget) {
   const test::Image image = test::white_noise(200, 40, 8, 64);
@@ -32,7 +27,7 @@ TEST(FeatureTargets, correlationsAreEqualOnEveryTarget) {
   test::on_every_target([&](const char* target) {
     correlate(block, image.bytes.data(), image.stride, offsets.data(),
               static_cast<int>(offsets.size()), scores.data());
-    Fingerprint bits;
+    vergence::test::Fingerprint bits;
     for (std::size_t i = 0; i < offsets.size(); ++i) bits.add(scores[i]);
     EXPECT_EQ(bits.value(), 0xf53deb61411f2590U) << target << std::hex << ": 0x" << bits.value();
   });
@@ -53,7 +48,7 @@ TEST(FeatureTargets, windowsAreBitIdenticalWithFusedProducts) {
     make_window(patch.bytes.data(), 13.7F, 13.2F, turned, &w);
     WindowSums sums{};
     window_sums(w, image.bytes.data() + 20 * image.stride + 20, image.stride, 0.3F, 0.85F, &sums);
-    Fingerprint bits;
+    vergence::test::Fingerprint bits;
     bits.add(std::span<const float>(w.value));
     bits.add(std::span<const float>(w.steep_x));
     bits.add(std::span<const float>(w.steep_y));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <new>
 #include <numbers>
 #include <vector>
@@ -113,6 +112,8 @@ class GuardedImage {
   GuardedImage(const GuardedImage&) = delete;
   GuardedImage& operator=(const GuardedImage&) = delete;
   [[nodiscard]] ImageView view() const { return {data_, width_, height_, width_}; }
+  /// From now on no byte of the image may be touched.
+  void forbid() { mprotect(memory_, length_, PROT_NONE); }
 
  private:
   int width_, height_;

@@ -1,7 +1,5 @@
 #include "core/geometry/triangulate.hpp"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/LU>
 #include <array>
 #include <limits>

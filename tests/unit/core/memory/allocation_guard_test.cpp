@@ -98,16 +98,5 @@ TEST_F(AllocationGuardTest, nestedScopesStaySealed) {
   EXPECT_FALSE(AllocationGuard::thread_sealed());
 }
 
-TEST_F(AllocationGuardTest, allocationAbortsIfRequested) {
-  testing::FLAGS_gtest_death_test_style = "threadsafe";
-  EXPECT_DEATH(
-      {
-        AllocationGuard::abort_on_allocation(true);
-        const SealedScope sealed;
-        sink = malloc(8);
-      },
-      "");
-}
-
 }  // namespace
 }  // namespace vergence

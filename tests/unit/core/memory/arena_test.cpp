@@ -4,9 +4,7 @@
 
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <limits>
-#include <new>
 
 namespace vergence {
 namespace {
@@ -25,16 +23,6 @@ TEST(Arena, piecesAreZeroedAlignedAndApart) {
   std::memset(bytes.data(), 0xff, bytes.size_bytes());
   for (const double d : numbers) EXPECT_EQ(d, 0.0);
   EXPECT_EQ(arena.used(), 64U + 128U + 64U);
-}
-
-TEST(Arena, largePiecesLeaveRoomForSmallOnes) {
-  Arena arena;
-  const auto small = arena.make<std::uint8_t>(64, "small");
-  const auto large = arena.make<std::uint8_t>(std::size_t{1} << 23, "large");
-  const auto next = arena.make<std::uint8_t>(64, "small");
-  EXPECT_EQ(next.data(), small.data() + 64);
-  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(large.data()) % kCacheLine, 0U);
-  EXPECT_EQ(large.back(), 0);
 }
 
 TEST(Arena, overflowingSizeIsRefused) {

@@ -30,18 +30,6 @@ TEST(FramePool, slotsAreAlignedPaddedAndApart) {
   }
 }
 
-TEST(FramePool, exhaustedPoolRefusesUntilARelease) {
-  Arena arena;
-  FramePool pool(8, 8, 2, arena);
-  const auto a = pool.acquire(), b = pool.acquire();
-  ASSERT_TRUE(a && b);
-  EXPECT_NE(*a, *b);
-  EXPECT_FALSE(pool.acquire());
-  EXPECT_EQ(pool.available(), 0U);
-  pool.release(*b);
-  EXPECT_EQ(pool.acquire(), b);
-}
-
 TEST(FramePool, secondReleaseOfASlotIsRefused) {
   Arena arena;
   FramePool pool(8, 8, 2, arena);

@@ -4,7 +4,6 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <thread>

@@ -1,12 +1,6 @@
 #pragma once
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <vector>
 
-#include "core/math/random.hpp"
 #include "core/odometry/odometry.hpp"
-#include "core/types/calibration.hpp"
 #include "core/types/rig_frame.hpp"
 #include "tests/support/parallel_rig.hpp"
 #include "tests/unit/core/features/texture.hpp"

@@ -1,4 +1,3 @@
-#include <gtest/gtest.h>
 
 #include "core/odometry/front_end.hpp"
 #include "tests/support/no_allocations.hpp"
@@ -18,17 +17,14 @@ RigCalibration blank_rig() {
 /// 0: corners, 1: SURF-64.
 class FreeMatches : public ::testing::TestWithParam<int> {
  protected:
-  [[nodiscard]] static OdometryOptions options() {
-    return {.features = 300, .init_features = GetParam()};
-  }
+  OdometryOptions options_{.features = 300, .init_features = GetParam()};
+  RigCalibration rig_ = blank_rig();
+  Arena arena_;
+  SequentialRunner runner_;
+  FrontEnd front_{options_, rig_, arena_, runner_};
 };
 
 TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
-  const OdometryOptions o = options();
-  const RigCalibration rig = blank_rig();
-  Arena arena;
-  SequentialRunner runner;
-  FrontEnd front(o, rig, arena, runner);
   const features::test::Texture fine(3, 7, 24), coarse(4, 20, 80);
   const Vec2 shift(23.3, -8.6);
   const auto brightness = [&](const Vec2& p) { return 0.9 * fine(p) + 0.5 * coarse(p) - 51; };
@@ -41,33 +37,28 @@ TEST_P(FreeMatches, shiftedImageIsMatchedWithoutAllocations) {
   frame.images[1] = right.view();
   std::span<const FreeMatch> matches;
   vergence::test::expect_no_allocations([&] {
-    (void)front.begin(frame);
-    matches = front.match_free(1);
+    (void)front_.begin(frame);
+    matches = front_.match_free(1);
   });
   ASSERT_GE(matches.size(), 30U);
   std::size_t right_ones = 0;
   // Three sigmas of a corner's place: both are the same pixels but for the rounding of grey values.
   for (const FreeMatch& m : matches)
-    right_ones += (m.other - m.left - shift).norm() < 3 * o.pixel_sigma ? 1U : 0U;
+    right_ones += (m.other - m.left - shift).norm() < 3 * options_.pixel_sigma ? 1U : 0U;
   EXPECT_GE(static_cast<double>(right_ones), 0.9 * static_cast<double>(matches.size()));
 }
 
 TEST_P(FreeMatches, missingOrFlatImageHasNoMatch) {
-  const OdometryOptions o = options();
-  const RigCalibration rig = blank_rig();
-  Arena arena;
-  SequentialRunner runner;
-  FrontEnd front(o, rig, arena, runner);
-  EXPECT_TRUE(front.match_free(1).empty());
+  EXPECT_TRUE(front_.match_free(1).empty());
   const features::test::Image flat(kWidth, kHeight, 64),
       noise = features::test::white_noise(kWidth, kHeight, 1, 64);
   RigFrame frame{.cameras = 2};
   frame.images[0] = noise.view();
-  (void)front.begin(frame);
-  EXPECT_TRUE(front.match_free(1).empty());
+  (void)front_.begin(frame);
+  EXPECT_TRUE(front_.match_free(1).empty());
   frame.images[1] = flat.view();
-  (void)front.begin(frame);
-  EXPECT_TRUE(front.match_free(1).empty());
+  (void)front_.begin(frame);
+  EXPECT_TRUE(front_.match_free(1).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(ByCornersAndBlobs, FreeMatches, ::testing::Values(0, 1));

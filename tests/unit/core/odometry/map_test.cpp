@@ -123,17 +123,5 @@ TEST(Map, clearedMapHasItsWholeCapacity) {
   EXPECT_EQ(n, kMaxPoints);
 }
 
-TEST(PointObservation, camerasAreSetAndDroppedByBit) {
-  PointObservation s;
-  s.set(0, {1.5, 2.5}, 0.2F);
-  s.set(3, {7, 8}, 0.3F);
-  EXPECT_TRUE(s.by(0));
-  EXPECT_FALSE(s.by(1));
-  EXPECT_TRUE(s.by(3));
-  s.drop(0);
-  EXPECT_EQ(s.cameras, 8);
-  EXPECT_EQ(s.pixel[3], Eigen::Vector2f(7, 8));
-}
-
 }  // namespace
 }  // namespace vergence::odometry

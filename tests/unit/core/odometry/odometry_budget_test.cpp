@@ -1,8 +1,6 @@
-#include <vector>
 
 #include <gtest/gtest.h>
 
-#include "core/odometry/odometry.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence::odometry {

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include "core/odometry/odometry.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence::odometry {

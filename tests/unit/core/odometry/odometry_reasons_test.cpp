@@ -1,7 +1,6 @@
 // Reasons against a pose are reported from the first frame that shows them, and no longer.
 #include <gtest/gtest.h>
 
-#include "core/odometry/odometry.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence::odometry {

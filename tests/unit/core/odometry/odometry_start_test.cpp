@@ -1,50 +1,20 @@
 // Conditions for starting a scene.
 #include <gtest/gtest.h>
-#include <sys/mman.h>
 
-#include <cstring>
-
-#include "core/odometry/odometry.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence::odometry {
 namespace {
 
-/// An image in memory of its own that can be taken away, as a camera's driver does when it begins
-/// anew.
-class LentImage {
- public:
-  explicit LentImage(const ImageView& from)
-      : bytes_(static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height)),
-        memory_(mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)),
-        view_(from) {
-    for (int y = 0; y < from.height; ++y)
-      std::memcpy(static_cast<std::uint8_t*>(memory_) + y * from.width, from.row(y),
-                  static_cast<std::size_t>(from.width));
-    view_.data = static_cast<const std::uint8_t*>(memory_);
-    view_.stride = from.width;
-  }
-  LentImage(const LentImage&) = delete;
-  LentImage& operator=(const LentImage&) = delete;
-  ~LentImage() { (void)munmap(memory_, bytes_); }
-  [[nodiscard]] const ImageView& view() const { return view_; }
-  void take_back() { (void)mprotect(memory_, bytes_, PROT_NONE); }
-
- private:
-  std::size_t bytes_;
-  void* memory_;
-  ImageView view_;
-};
-
 // A successor that fails is no reason to have nothing: the calibration before it is kept.
 TEST(OdometryStart, failedCalibrationResumesThePreviousOne) {
-  constexpr int kLink = 5, kDark = 8, kBack = 12;
+  constexpr int kLink = 5, kDark = 8, kBack = 30;
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
   RigCalibration wrong = corridor.rig();
   wrong.T_camera_left[1].R = exp_so3({0.3, 0, 0}) * wrong.T_camera_left[1].R;
   bool resumed = false;
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < kBack + 8; ++i) {
     RigFrame frame = corridor.frame(i);
     if (i >= kDark && i < kBack) frame.images = {};
     if (i == kLink) f.odometry.link(wrong);
@@ -63,16 +33,18 @@ TEST(OdometryStart, failedCalibrationResumesThePreviousOne) {
 }
 
 TEST(OdometryStart, disconnectedCameraMemoryIsNotRead) {
+  using Guard = features::test::GuardedImage::Guard;
   constexpr int kGone = 6, kBack = 60;
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
   RigFrame frame;
   for (int i = 0; i < kGone; ++i) {
     frame = corridor.frame(i);
-    LentImage left(frame.images[0]);
+    features::test::GuardedImage left(features::test::copy_of(frame.images[0]), Guard::before);
     frame.images[0] = left.view();
     EXPECT_TRUE(f.odometry.process(frame).posed) << i;
-    left.take_back();
+    // A camera's driver takes the memory back when it begins anew.
+    left.forbid();
   }
   int lost = 0;
   for (int i = kGone; i < kBack; ++i) {

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include "core/odometry/odometry.hpp"
-#include "tests/support/no_allocations.hpp"
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence::odometry {
@@ -131,14 +129,6 @@ TEST(OdometryUnlinked, thirdCameraIsFoundFromTheMap) {
   }
   for (const int k : {1, 2})
     expect_rig(d.odometry, k, d.corridor.rig().T_camera_left[static_cast<std::size_t>(k)], 15);
-}
-
-TEST(OdometryUnlinked, processingUsesTheArenaAndNoHeap) {
-  Drive d(false);
-  for (int i = 0; i < 8; ++i) {
-    const RigFrame frame = d.corridor.frame(i);
-    vergence::test::expect_no_allocations([&] { (void)d.odometry.process(frame); });
-  }
 }
 
 }  // namespace

@@ -31,18 +31,6 @@ struct Pair {
   }
 };
 
-TEST(RepeatedImages, identicalImageIsRepeated) {
-  Pair pair;
-  const Image right = white_noise(kWidth, kHeight, 2);
-  EXPECT_FALSE(pair.give(white_noise(kWidth, kHeight, 1), right).repeated);
-  const ImageCheck again = pair.give(white_noise(kWidth, kHeight, 3), right);
-  EXPECT_TRUE(again.repeated);
-  EXPECT_FALSE(again.left_repeated);
-  EXPECT_TRUE(again.uneven);
-  EXPECT_EQ(again.given, 0b11);
-  EXPECT_EQ(again.structured, 0b01) << "it shows nothing of this frame";
-}
-
 TEST(RepeatedImages, permutedPixelsAreNotRepeated) {
   Pair pair;
   Image right = white_noise(kWidth, kHeight, 2);

@@ -26,37 +26,26 @@ TEST(WorkBudget, zeroBudgetMeansNoLimit) {
   EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
 }
 
-TEST(WorkBudget, sufficientTimeDropsNothing) { EXPECT_TRUE(effort_in(3010).whole()); }
-
-TEST(WorkBudget, pointsAreReducedFirst) {
-  const FrameWorkload e = effort_in(2601);
-  EXPECT_EQ(e.points_percent, 60);
-  EXPECT_EQ(e.window_keyframes, FrameWorkload::kAll);
-  EXPECT_EQ(e.window_steps, FrameWorkload::kAll);
-}
-
-TEST(WorkBudget, windowIsReducedSecond) {
-  // The time is enough for a quarter of the points and seven keyframes.
-  const FrameWorkload e = effort_in(250 + 1401);
-  EXPECT_EQ(e.points_percent, 25);
-  EXPECT_EQ(e.window_keyframes, 7);
-  EXPECT_EQ(e.window_steps, FrameWorkload::kAll);
-}
-
-TEST(WorkBudget, solverStepsAreReducedThird) {
-  // The time is enough for two steps of four keyframes.
-  const FrameWorkload e = effort_in(250 + 321);
-  EXPECT_EQ(e.points_percent, 25);
-  EXPECT_EQ(e.window_keyframes, 4);
-  EXPECT_EQ(e.window_steps, 2);
-}
-
-TEST(WorkBudget, aQuarterOfThePointsAlwaysRemains) {
-  for (const double usable_s : {300.0, 1.0}) {
-    const FrameWorkload e = effort_in(usable_s);
-    EXPECT_EQ(e.points_percent, 25);
-    EXPECT_EQ(e.window_keyframes, 0);
-    EXPECT_EQ(e.window_steps, 0);
+TEST(WorkBudget, pointsThenWindowThenSolverStepsAreReduced) {
+  constexpr auto kAll = FrameWorkload::kAll;
+  struct Row {
+    double usable_s;
+    int points_percent, window_keyframes, window_steps;
+  };
+  for (const Row& row : {
+           Row{3010, 100, kAll, kAll},
+           {2601, 60, kAll, kAll},
+           // A quarter of the points and seven keyframes.
+           {250 + 1401, 25, 7, kAll},
+           // Two steps of four keyframes.
+           {250 + 321, 25, 4, 2},
+           {300, 25, 0, 0},
+           {1, 25, 0, 0},
+       }) {
+    const FrameWorkload e = effort_in(row.usable_s);
+    EXPECT_EQ(e.points_percent, row.points_percent) << row.usable_s;
+    EXPECT_EQ(e.window_keyframes, row.window_keyframes) << row.usable_s;
+    EXPECT_EQ(e.window_steps, row.window_steps) << row.usable_s;
   }
 }
 
