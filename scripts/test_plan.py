@@ -95,8 +95,8 @@ def costs(build):
             by_tier[tier] += seconds[name]
             by_folder[folder] += seconds[name]
     table("slowest tests", largest(tests))
-    table("tests by tier, seconds of one processor", by_tier.max_common())
-    table("tests by folder", by_folder.max_common())
+    table("tests by tier, seconds of one processor", by_tier.most_common())
+    table("tests by folder", by_folder.most_common())
     steps, by_target = {}, collections.Counter()
     for output, time in compile_seconds(build).items():
         if output.endswith((".o", ".gch")) or "CMakeFiles" not in output:
@@ -104,7 +104,7 @@ def costs(build):
             target = output.split(".dir/")[0].replace("CMakeFiles/", "") if ".dir/" in output else output
             by_target[target] += time
     table("slowest compile and link steps", largest(steps))
-    table("build by target", by_target.max_common(SHOWN))
+    table("build by target", by_target.most_common(SHOWN))
     table("in all", [("tests", sum(tests.values())), ("build", sum(steps.values()))])
 
 

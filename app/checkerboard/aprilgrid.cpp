@@ -33,16 +33,11 @@ struct Tag {
   std::array<cv::Point2f, 4> corners;
 };
 
-struct DetectorDeleter {
-  void operator()(apriltag_detector_t* d) const { apriltag_detector_destroy(d); }
+template <auto Destroy>
+struct Deleter {
+  void operator()(auto* held) const { Destroy(held); }
 };
-struct FamilyDeleter {
-  void operator()(apriltag_family_t* f) const { tag36h11_destroy(f); }
-};
-struct DetectionsDeleter {
-  void operator()(zarray_t* d) const { apriltag_detections_destroy(d); }
-};
-using Family = std::unique_ptr<apriltag_family_t, FamilyDeleter>;
+using Family = std::unique_ptr<apriltag_family_t, Deleter<tag36h11_destroy>>;
 
 /// The family with a border of two black cells: the same bits, one cell farther in.
 Family wide_border() {
@@ -72,7 +67,7 @@ class TagDetector {
     const int window = 2 * grow + 1;
     cv::dilate(image, grown_, cv::Mat::ones(window, window, CV_8U));
     image_u8_t pixels{grown_.cols, grown_.rows, static_cast<int>(grown_.step), grown_.data};
-    const std::unique_ptr<zarray_t, DetectionsDeleter> found(
+    const std::unique_ptr<zarray_t, Deleter<apriltag_detections_destroy>> found(
         apriltag_detector_detect(detector_.get(), &pixels));
     std::vector<Tag> narrow = of_family(*found, narrow_.get(), ids),
                      wide = of_family(*found, wide_.get(), ids);
@@ -94,7 +89,7 @@ class TagDetector {
         tag.corners[k] = {static_cast<float>(d->p[k][0]), static_cast<float>(d->p[k][1])};
       tags.push_back(tag);
     }
-    std::sort(tags.begin(), tags.end(), [](const Tag& a, const Tag& b) { return a.id < b.id; });
+    std::ranges::sort(tags, [](const Tag& a, const Tag& b) { return a.id < b.id; });
     // A tag seen twice is a reflection or a second target: neither is used.
     std::vector<Tag> once;
     for (std::size_t i = 0; i < tags.size(); ++i)
@@ -106,7 +101,8 @@ class TagDetector {
 
   cv::Mat grown_;
   Family narrow_{tag36h11_create()}, wide_ = wide_border();
-  std::unique_ptr<apriltag_detector_t, DetectorDeleter> detector_{apriltag_detector_create()};
+  std::unique_ptr<apriltag_detector_t, Deleter<apriltag_detector_destroy>> detector_{
+      apriltag_detector_create()};
 };
 
 /// Numbering of tags and their corners.

@@ -38,8 +38,7 @@ bool determine_a_homography(const BoardCorners& corners, const BoardPattern& boa
   if (corners.size() < std::min(kMinCorners, board.corners())) return false;
   std::map<double, int> in_row;
   for (const BoardCorner& c : corners) ++in_row[board.corner(c.index).y()];
-  return std::count_if(in_row.begin(), in_row.end(),
-                       [](const auto& row) { return row.second >= 2; }) >= 2;
+  return std::ranges::count_if(in_row, [](const auto& row) { return row.second >= 2; }) >= 2;
 }
 
 BoardCorners find_board(const ImageView& image, const BoardPattern& board, BoardSearch search,

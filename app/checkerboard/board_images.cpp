@@ -95,7 +95,7 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns,
                       option, pattern.substr(0, 200), option));
   }
   std::vector<fs::path> sorted(files.begin(), files.end());
-  std::sort(sorted.begin(), sorted.end(), [](const fs::path& a, const fs::path& b) {
+  std::ranges::sort(sorted, [](const fs::path& a, const fs::path& b) {
     return a.filename() != b.filename() ? a.filename() < b.filename() : a < b;
   });
   return sorted;
@@ -107,7 +107,7 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
   numbers.reserve(cameras.size());
   for (const auto& files : cameras) numbers.push_back(numbered(files));
   const bool all_numbered =
-      std::none_of(numbers.begin(), numbers.end(), [](const Numbered& n) { return n.empty(); });
+      std::ranges::none_of(numbers, [](const Numbered& n) { return n.empty(); });
   std::vector<std::vector<fs::path>> views;
   std::vector<fs::path> alone;
   if (all_numbered) {
@@ -124,13 +124,12 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
       for (const auto& [number, file] : numbers[k])
         if (numbers[0].find(number) == numbers[0].end()) alone.push_back(file);
   }
-  const bool same_length = std::all_of(cameras.begin(), cameras.end(), [&](const auto& files) {
-    return files.size() == cameras[0].size();
-  });
+  const bool same_length = std::ranges::all_of(
+      cameras, [&](const auto& files) { return files.size() == cameras[0].size(); });
   if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size())) {
     if (!all_numbered) return by_order(cameras);
     std::vector<std::vector<fs::path>> in_order(numbers.size());
-    std::transform(numbers.begin(), numbers.end(), in_order.begin(), list_files);
+    std::ranges::transform(numbers, in_order.begin(), list_files);
     return by_order(in_order);
   }
   if (views.empty()) {
@@ -180,8 +179,7 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
                                       part_is_enough ? ", or too little of it," : "",
                                       file.string()));
     }
-    const auto with = std::count_if(view.corners.begin(), view.corners.end(),
-                                    [](const auto& c) { return !c.empty(); });
+    const auto with = std::ranges::count_if(view.corners, [](const auto& c) { return !c.empty(); });
     const bool usable = !view.corners[0].empty() && with >= (cameras > 1 ? 2 : 1);
     for (const std::string& message : without)
       images.remarks.push_back(message + (usable ? ""

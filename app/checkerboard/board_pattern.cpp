@@ -15,7 +15,7 @@ namespace {
 // Limits of the number of inner corners per side.
 constexpr int kMin = 3, kMax = 100;
 // The family 36h11 has 587 codes.
-constexpr int kMaxTagsAlong = 24, kFamily = 587;
+constexpr int kMaxTagsAlong = 24;
 // Limits of the square's side in m.
 constexpr double kSmallestSquare = 0.001, kLargest = 10.0;
 // Limits of the gap over the side of a tag.
@@ -28,17 +28,25 @@ bool parse_whole(std::string_view text, int* value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-/// `9x6`.
-bool parse_product(std::string_view text, BoardPattern* board) {
+/// A board whose size is a text like `9x6`: `parts` of `option`, `least` to `most` along each side.
+BoardPattern parse_size(BoardKind kind, const char* option, const char* parts,
+                        std::string_view text, int least, int most, const char* example) {
+  BoardPattern board;
+  board.kind = kind;
   const std::size_t x = text.find('x');
-  return x != std::string_view::npos && parse_whole(text.substr(0, x), &board->columns) &&
-         parse_whole(text.substr(x + 1), &board->rows);
+  if (x == std::string_view::npos || !parse_whole(text.substr(0, x), &board.columns) ||
+      !parse_whole(text.substr(x + 1), &board.rows) ||
+      std::min(board.columns, board.rows) < least || std::max(board.columns, board.rows) > most)
+    throw InputError(
+        fmt::format("{} is \"{}\"; write the {}, columns x rows, {} to {} each, like {}", option,
+                    text.substr(0, 60), parts, least, most, example));
+  return board;
 }
 
 std::string upper(std::string_view text) {
   std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  std::ranges::transform(result, result.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
   return result;
 }
 
@@ -87,13 +95,8 @@ std::string BoardPattern::describe() const {
 }
 
 BoardPattern parse_checkerboard(const std::string& inner_corners, double square) {
-  BoardPattern board;
-  if (!parse_product(inner_corners, &board) || std::min(board.columns, board.rows) < kMin ||
-      std::max(board.columns, board.rows) > kMax)
-    throw InputError(
-        fmt::format("--checkerboard is \"{}\"; write the inner corners, columns x rows, {} to {} "
-                    "each, like 9x6",
-                    inner_corners.substr(0, 60), kMin, kMax));
+  BoardPattern board = parse_size(BoardKind::checkerboard, "--checkerboard", "inner corners",
+                                  inner_corners, kMin, kMax, "9x6");
   if (board.columns == board.rows)
     throw InputError(
         fmt::format("--checkerboard {}: a square board looks the same after a rotation by 90°; use "
@@ -105,13 +108,8 @@ BoardPattern parse_checkerboard(const std::string& inner_corners, double square)
 }
 
 BoardPattern parse_aprilgrid(const std::string& tags, double side, double spacing) {
-  BoardPattern board;
-  board.kind = BoardKind::aprilgrid;
-  if (!parse_product(tags, &board) || std::min(board.columns, board.rows) < 1 ||
-      std::max(board.columns, board.rows) > kMaxTagsAlong || board.columns * board.rows > kFamily)
-    throw InputError(
-        fmt::format("--aprilgrid is \"{}\"; write the tags, columns x rows, 1 to {} each, like 6x6",
-                    tags.substr(0, 60), kMaxTagsAlong));
+  BoardPattern board =
+      parse_size(BoardKind::aprilgrid, "--aprilgrid", "tags", tags, 1, kMaxTagsAlong, "6x6");
   check_side(side);
   if (!(spacing >= kNarrowest && spacing <= kWidest))
     throw InputError(
@@ -125,13 +123,8 @@ BoardPattern parse_aprilgrid(const std::string& tags, double side, double spacin
 
 BoardPattern parse_charuco(const std::string& squares, double square, double marker,
                            const std::string& dictionary) {
-  BoardPattern board;
-  board.kind = BoardKind::charuco;
-  if (!parse_product(squares, &board) || std::min(board.columns, board.rows) < kMin ||
-      std::max(board.columns, board.rows) > kMax)
-    throw InputError(fmt::format(
-        "--charuco is \"{}\"; write the squares, columns x rows, {} to {} each, like 11x8",
-        squares.substr(0, 60), kMin, kMax));
+  BoardPattern board =
+      parse_size(BoardKind::charuco, "--charuco", "squares", squares, kMin, kMax, "11x8");
   check_side(square);
   if (!(marker >= kSmallestMarker * square && marker <= kLargestMarker * square))
     throw InputError(fmt::format(

@@ -107,8 +107,8 @@ std::string baseline_message(const BoardReport& r) {
 
 std::string format_report(const BoardReport& r) {
   const RigCalibration& rig = r.file.rig;
-  const auto refused = std::count_if(r.found.views.begin(), r.found.views.end(),
-                                     [](const BoardViewResult& v) { return !v.used; });
+  const auto refused =
+      std::ranges::count_if(r.found.views, [](const BoardViewResult& v) { return !v.used; });
   std::string text = fmt::format("{} views of a target with {} of {:g} mm: {} used, {} rejected\n",
                                  r.found.views.size(), r.board.describe(), 1e3 * r.board.square,
                                  rig.frames, refused);

@@ -1,4 +1,5 @@
 
+#include <array>
 #include <chrono>
 #include <thread>
 
@@ -22,17 +23,9 @@ namespace {
 namespace fs = std::filesystem;
 
 const char* phrase(OfferResult verdict) {
-  switch (verdict) {
-    case OfferResult::accepted:
-      return "taken";
-    case OfferResult::not_seen:
-      return "target not seen by all cameras";
-    case OfferResult::moving:
-      return "hold it still";
-    case OfferResult::nothing_new:
-      return "already covered";
-  }
-  return "";
+  constexpr std::array kPhrases{"taken", "target not seen by all cameras", "hold it still",
+                                "already covered"};
+  return kPhrases.at(static_cast<std::size_t>(verdict));
 }
 
 /// A folder that is there and has nothing in it yet.

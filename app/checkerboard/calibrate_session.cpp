@@ -1,6 +1,7 @@
 #include "app/checkerboard/calibrate_session.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -10,6 +11,7 @@
 
 #include "app/checkerboard/board_images.hpp"
 #include "app/checkerboard/board_report.hpp"
+#include "app/config/calibration_checks.hpp"
 #include "app/config/calibration_file.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
@@ -52,16 +54,11 @@ void remark(const CalibrationFile& file, Progress* progress) {
 }
 
 const char* how_to_count(BoardKind kind) {
-  switch (kind) {
-    case BoardKind::aprilgrid:
-      return "at least four tags of the family 36h11 must be visible";
-    case BoardKind::charuco:
-      return "count squares of both colours; at least four markers must be visible, and "
-             "--dictionary must match them";
-    case BoardKind::checkerboard:
-      break;
-  }
-  return "count the points where four squares meet";
+  constexpr std::array kTexts{"count the points where four squares meet",
+                              "at least four tags of the family 36h11 must be visible",
+                              "count squares of both colours; at least four markers must be "
+                              "visible, and --dictionary must match them"};
+  return kTexts.at(static_cast<std::size_t>(kind));
 }
 
 /// Views whose boards lie differently: by 2 degrees, or 3 % of their distance. One view many times
@@ -71,7 +68,7 @@ std::size_t distinct_views(const BoardCalibration& found) {
   std::vector<Transform> distinct;
   for (std::size_t v = 0; v < found.views.size(); ++v) {
     const Transform& T = found.T_left_board[v];
-    const bool seen = std::any_of(distinct.begin(), distinct.end(), [&](const Transform& other) {
+    const bool seen = std::ranges::any_of(distinct, [&](const Transform& other) {
       return rotation_angle(T.R * other.R.transpose()) < kTurn &&
              (T.t - other.t).norm() < kShift * T.t.norm();
     });

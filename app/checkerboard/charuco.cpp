@@ -42,7 +42,7 @@ Markers detect(const cv::Mat& image, const cv::Ptr<cv::aruco::Dictionary>& dicti
   Markers found, once;
   cv::aruco::detectMarkers(image, dictionary, found.corners, found.ids);
   for (std::size_t i = 0; i < found.ids.size(); ++i)
-    if (std::count(found.ids.begin(), found.ids.end(), found.ids[i]) == 1) {
+    if (std::ranges::count(found.ids, found.ids[i]) == 1) {
       once.ids.push_back(found.ids[i]);
       once.corners.push_back(found.corners[i]);
     }
@@ -53,7 +53,7 @@ Markers detect(const cv::Mat& image, const cv::Ptr<cv::aruco::Dictionary>& dicti
 double misfit(const Markers& markers, const cv::aruco::CharucoBoard& board, Markers* own) {
   std::vector<cv::Point2d> on_board, in_image;
   for (std::size_t i = 0; i < markers.ids.size(); ++i) {
-    const auto at = std::find(board.ids.begin(), board.ids.end(), markers.ids[i]);
+    const auto at = std::ranges::find(board.ids, markers.ids[i]);
     if (at == board.ids.end()) continue;
     own->ids.push_back(markers.ids[i]);
     own->corners.push_back(markers.corners[i]);

@@ -17,12 +17,6 @@ constexpr int kLargeImage = 1200;
 constexpr int kNarrowestWindow = 2, kWidestWindow = 11;
 // Half window over the smallest distance between two corners.
 constexpr double kWindowOfSquare = 0.3;
-// Blur in px. The interpolation of the refinement shifts corners of sharper images.
-constexpr double kBlur = 0.7;
-constexpr int kRefineSteps = 100;
-// Tolerance in px.
-constexpr double kRefineTolerance = 1e-4;
-
 double smallest_spacing(const std::vector<cv::Point2f>& corners, const BoardPattern& board) {
   const auto n = static_cast<std::size_t>(board.columns);
   double least = 1e9;
@@ -89,14 +83,10 @@ std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
   const int window =
       std::clamp(static_cast<int>(kWindowOfSquare * smallest_spacing(corners, board)),
                  kNarrowestWindow, kWidestWindow);
-  cv::Mat soft;
-  cv::GaussianBlur(pixels, soft, {}, kBlur);
-  cv::cornerSubPix(
-      soft, corners, {window, window}, {-1, -1},
-      {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
+  to_saddles(pixels, window, &corners);
   make_right_handed(board, &corners);
   if (board.is_asymmetric() && first_square_brighter(pixels, board, corners) < 0)
-    std::reverse(corners.begin(), corners.end());
+    std::ranges::reverse(corners);
   std::vector<Vec2> found;
   found.reserve(corners.size());
   for (const cv::Point2f& c : corners) found.emplace_back(c.x, c.y);
@@ -107,7 +97,7 @@ void same_way_up(const std::vector<Vec2>& reference, std::vector<Vec2>* corners)
   if (reference.empty() || corners->empty()) return;
   const Vec2 there = reference.back() - reference.front(),
              here = corners->back() - corners->front();
-  if (there.dot(here) < 0) std::reverse(corners->begin(), corners->end());
+  if (there.dot(here) < 0) std::ranges::reverse(*corners);
 }
 
 }  // namespace vergence::app

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/config/calibration_checks.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 
@@ -31,7 +32,7 @@ bool is_ros_folder(const std::string& out, CalibrationFormat format) {
 
 CalibrationFormat parse_format(const std::string& word) {
   constexpr std::array<std::string_view, 4> kFormatNames{"vergence", "kalibr", "ros", "opencv"};
-  return static_cast<CalibrationFormat>(std::find(kFormatNames.begin(), kFormatNames.end(), word) -
+  return static_cast<CalibrationFormat>(std::ranges::find(kFormatNames, word) -
                                         kFormatNames.begin());
 }
 
@@ -67,17 +68,9 @@ std::vector<fs::path> files_written(const std::string& out, CalibrationFormat fo
 }
 
 const char* describe(CalibrationFormat format) noexcept {
-  switch (format) {
-    case CalibrationFormat::vergence:
-      return "calibration.yaml of this program";
-    case CalibrationFormat::kalibr:
-      return "a Kalibr camchain";
-    case CalibrationFormat::ros:
-      return "camera_info of ROS, left and right";
-    case CalibrationFormat::opencv:
-      return "stereo calibration of OpenCV";
-  }
-  return "";
+  constexpr std::array kTexts{"calibration.yaml of this program", "a Kalibr camchain",
+                              "camera_info of ROS, left and right", "stereo calibration of OpenCV"};
+  return kTexts.at(static_cast<std::size_t>(format));
 }
 
 void write_any_calibration(const std::string& out, CalibrationFormat format,

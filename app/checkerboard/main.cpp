@@ -76,16 +76,10 @@ ExitCode calibrate_target(const CalibrateOptions& a) {
 }
 
 ExitCode run(const CalibrateOptions& a) {
-  switch (a.given) {
-    case CalibrateCommand::target:
-      return calibrate_target(a);
-    case CalibrateCommand::live:
-      return calibrate_live(make_request(a), a.common.configuration(a.configuration));
-    case CalibrateCommand::convert:
-      return convert(a);
-    case CalibrateCommand::sequence:
-      break;
-  }
+  if (a.given == CalibrateCommand::target) return calibrate_target(a);
+  if (a.given == CalibrateCommand::live)
+    return calibrate_live(make_request(a), a.common.configuration(a.configuration));
+  if (a.given == CalibrateCommand::convert) return convert(a);
   throw InputError("calibrate sequence needs no target; 'vergence calibrate sequence' does it");
 }
 

@@ -7,16 +7,6 @@
 #include <opencv2/imgproc.hpp>
 
 namespace vergence::app {
-namespace {
-
-// Blur in px, equal to that used for checkerboards.
-constexpr double kBlur = 0.7;
-constexpr int kRefineSteps = 100;
-// Tolerance in px.
-constexpr double kRefineTolerance = 1e-4;
-
-}  // namespace
-
 double homography_misfit(const std::vector<cv::Point2d>& on_board,
                          const std::vector<cv::Point2d>& in_image) {
   const cv::Mat H = cv::findHomography(on_board, in_image);
@@ -28,10 +18,20 @@ double homography_misfit(const std::vector<cv::Point2d>& on_board,
   return sum / static_cast<double>(back.size());
 }
 
-BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough, int half_window,
-                            double max_moved) {
+void to_saddles(const cv::Mat& image, int half_window, std::vector<cv::Point2f>* corners) {
+  // Blur in px. The interpolation of the refinement shifts corners of sharper images.
+  constexpr double kBlur = 0.7;
+  constexpr int kSteps = 100;
+  // Tolerance in px.
+  constexpr double kTolerance = 1e-4;
   cv::Mat soft;
   cv::GaussianBlur(image, soft, {}, kBlur);
+  cv::cornerSubPix(soft, *corners, {half_window, half_window}, {-1, -1},
+                   {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kSteps, kTolerance});
+}
+
+BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough, int half_window,
+                            double max_moved) {
   const double margin = half_window + 2;
   BoardCorners corners;
   std::vector<cv::Point2f> fine;
@@ -43,15 +43,13 @@ BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough, int
     fine.emplace_back(static_cast<float>(c.pixel.x()), static_cast<float>(c.pixel.y()));
   }
   if (fine.empty()) return {};
-  cv::cornerSubPix(
-      soft, fine, {half_window, half_window}, {-1, -1},
-      {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
+  to_saddles(image, half_window, &fine);
   BoardCorners refined;
   for (std::size_t i = 0; i < fine.size(); ++i)
     if (const Vec2 at(fine[i].x, fine[i].y); (at - corners[i].pixel).norm() <= max_moved)
       refined.push_back({corners[i].index, at});
-  std::sort(refined.begin(), refined.end(),
-            [](const BoardCorner& a, const BoardCorner& b) { return a.index < b.index; });
+  std::ranges::sort(refined,
+                    [](const BoardCorner& a, const BoardCorner& b) { return a.index < b.index; });
   return refined;
 }
 

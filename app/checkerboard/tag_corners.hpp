@@ -14,6 +14,9 @@ namespace vergence::app {
 [[nodiscard]] double homography_misfit(const std::vector<cv::Point2d>& on_board,
                                        const std::vector<cv::Point2d>& in_image);
 
+/// Moves corners to the saddles of the image within the window.
+void to_saddles(const cv::Mat& image, int half_window, std::vector<cv::Point2f>* corners);
+
 /// Refines `rough` corners (pixel centres at integers) to saddle points by OpenCV's cornerSubPix in
 /// windows of 2 `half_window` + 1 px. Drops corners near the image's edge or moved by more than
 /// `max_moved` px. Ordered by index.

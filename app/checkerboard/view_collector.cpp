@@ -39,7 +39,7 @@ bool ViewCollector::still(const BoardView& seen) const {
 }
 
 bool ViewCollector::elsewhere(const BoardView& seen) const {
-  return std::all_of(views_.begin(), views_.end(), [&](const BoardView& v) {
+  return std::ranges::all_of(views_, [&](const BoardView& v) {
     return mean_distance(v.corners[0], seen.corners[0]) > elsewhere_px_;
   });
 }

@@ -78,7 +78,7 @@ std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks) 
     text += "  intrinsics: " + number_list(std::array{lens.fx, lens.fy, lens.cx, lens.cy}) + "\n";
     text += fmt::format("  resolution: [{}, {}]\n", lens.width, lens.height);
     std::string name = calibration.names[k];
-    std::replace(name.begin(), name.end(), '/', '_');
+    std::ranges::replace(name, '/', '_');
     text += "  rostopic: " + double_quoted("/" + name + "/image_raw") + "\n";
   }
   detail::remark_lost(calibration, "a camchain", remarks);

@@ -5,15 +5,10 @@
 #include <cerrno>
 #include <cstring>
 #include <iostream>
-#include <vector>
-
-#include "app/command_line/common_options.hpp"
 
 #include <fmt/format.h>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-
-#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 
@@ -32,9 +27,7 @@ ExitCode run_checkerboard_tool(const ProgramArguments& arguments) {
   if (!tool)
     throw InputError(fmt::format(
         "calibrate: this needs {0}, which is not installed (looked beside the program in {1}, and "
-        "in {2}); install the package "
-        "{0}, or build "
-        "it: scripts/setup",
+        "in {2}); install the package {0}, or build it: scripts/setup",
         kCheckerboardTool, folder.string(), (folder.parent_path() / "libexec/vergence").string()));
   std::vector<char*> argv;
   // execv() only reads its arguments.

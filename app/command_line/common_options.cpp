@@ -14,7 +14,7 @@ const char* const kSessionExitCodes =
 CLI::Validator one_of(std::vector<std::string> values) {
   const std::string list = fmt::format("{}", fmt::join(values, ", "));
   return {[values = std::move(values), list](const std::string& given) {
-            return std::find(values.begin(), values.end(), given) != values.end()
+            return std::ranges::find(values, given) != values.end()
                        ? std::string()
                        : fmt::format("\"{}\" is unknown; use one of {}", given, list);
           },

@@ -42,10 +42,10 @@ std::vector<std::string> option_names(CLI::App& command) {
 
 /// The words of a command: `calibrate target`; of the program: none.
 std::string full_name(const CLI::App& command) {
-  const CLI::App* parent = command.get_parent();
-  if (parent == nullptr) return "";
-  const std::string before = full_name(*parent);
-  return before + (before.empty() ? "" : " ") + command.get_name();
+  std::string words;
+  for (const CLI::App* c = &command; c->get_parent() != nullptr; c = c->get_parent())
+    words = c->get_name() + (words.empty() ? "" : " ") + words;
+  return words;
 }
 
 /// The command that the words given name; of one with subcommands, the one before the first words
@@ -78,7 +78,7 @@ UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
 /// Message for a value that CLI11 cannot convert, as its own names neither the option's unit nor
 /// what is expected.
 std::string conversion_message(const CLI::ParseError& error, const CLI::App& command) {
-  const std::string message = error.what();
+  std::string message = error.what();
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_name(false, false);
     if (message.find(": " + name + " = ") == std::string::npos) continue;
@@ -105,9 +105,10 @@ std::string error_message(const CLI::ParseError& error, CLI::App& root) {
            hint;
   // An option of an earlier version explains the other words.
   std::vector<UnknownArgument> unknown;
+  unknown.reserve(extras.size());
   for (const std::string& extra : extras) unknown.push_back(unknown_argument(extra, command));
   const auto explained = [&](bool option) {
-    return std::find_if(unknown.begin(), unknown.end(), [&](const UnknownArgument& argument) {
+    return std::ranges::find_if(unknown, [&](const UnknownArgument& argument) {
       return argument.option == option && !argument.why.empty();
     });
   };
@@ -127,7 +128,7 @@ void check_command(CLI::App& root, int argc, const char* const* argv) {
   if (!argument.empty() && argument.front() == '-') return;
   auto words = command_names(root);
   words.insert(words.end(), {"help", "version"});
-  if (std::find(words.begin(), words.end(), argument) != words.end()) return;
+  if (std::ranges::find(words, argument) != words.end()) return;
   throw InputError("unknown command \"" + argument + "\"" + did_you_mean(argument, words) +
                    " ('vergence --help' lists the commands)");
 }

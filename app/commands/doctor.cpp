@@ -32,8 +32,8 @@ ExitCode examine_machine(const DoctorArguments& a) {
       run_checks({machine, inventory, drive ? &*drive : nullptr, a.out});
   std::cout << (a.json ? doctor_json(findings)
                        : doctor_text(findings, drive.has_value(), Terminal::of_stdout()));
-  const bool any = std::any_of(findings.begin(), findings.end(),
-                               [](const Finding& f) { return f.state == FindingState::problem; });
+  const bool any = std::ranges::any_of(
+      findings, [](const Finding& f) { return f.state == FindingState::problem; });
   return any ? ExitCode::not_usable : ExitCode::done;
 }
 

@@ -106,6 +106,56 @@ void segment_rows(std::string* out, const SegmentErrors& segments) {
   row("all", segments.count, segments.translation, segments.rotation);
 }
 
+/// Nothing: no three finite numbers.
+std::optional<Vec3> read_vector(const Json& mount, const char* key) {
+  const auto found = mount.find(key);
+  if (found == mount.end() || !found->is_array() || found->size() != 3) return std::nullopt;
+  Vec3 v;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!(*found)[k].is_number()) return std::nullopt;
+    v[static_cast<int>(k)] = (*found)[k].get<double>();
+  }
+  return v.allFinite() ? std::optional(v) : std::nullopt;
+}
+
+/// The mount of a session's summary. Nothing: there is none, as of a drive without an INS or one
+/// that was cut off.
+std::optional<InsMount> mount_in(const std::filesystem::path& summary) {
+  constexpr std::size_t kLargest = std::size_t{1} << 26U;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(summary, ignored)) return std::nullopt;
+  const Json all = Json::parse(read_text(summary, kLargest), nullptr, false);
+  const Json mount = all.is_object() ? all.value("/enu/mount"_json_pointer, Json()) : Json();
+  if (!mount.is_object()) return std::nullopt;
+  const auto arm = read_vector(mount, "lever_arm_m"), turn = read_vector(mount, "boresight_deg");
+  if (!arm || !turn) return std::nullopt;
+  std::string source = summary.string();
+  if (const auto said = mount.find("source"); said != mount.end() && said->is_string())
+    source += ": " + said->get<std::string>();
+  return InsMount{mount_of(*arm, *turn * kRadiansPerDegree), source, false};
+}
+
+Json value_json(const MountValue& v, double unit) {
+  return {{"value", v.observable ? Json(v.value * unit) : Json(nullptr)},
+          {"sigma", v.sigma * unit}};
+}
+
+std::string row(const char* what, const MountValue& v, double unit, const char* name) {
+  if (!v.observable)
+    return fmt::format("  {:<34}not_observable (sigma {:.3g} {})\n", what, v.sigma * unit, name);
+  return fmt::format("  {:<34}{:>11.4f} ± {:.4f} {}\n", what, v.value * unit, v.sigma * unit, name);
+}
+
+/// Value for `ins.boresight_deg`: roll, pitch, yaw. Nullopt: it is no INS's mount, or a part of
+/// it does not show.
+std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
+  const auto& r = found.mount.rotation;
+  if (!found.of_ins || !std::ranges::all_of(r, [](const MountValue& v) { return v.observable; }))
+    return std::nullopt;
+  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegreesPerRadian;
+  return std::array{turn.x(), turn.y(), turn.z()};
+}
+
 }  // namespace
 
 nlohmann::ordered_json evaluation_json(const TrajectoryEvaluation& e,
@@ -193,7 +243,7 @@ std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& o
 
 std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOptions& options,
                                Duration interval) {
-  const std::string holes = gap_remark(e, options, interval);
+  std::string holes = gap_remark(e, options, interval);
   switch (e.status) {
     case EvaluationStatus::no_match:
       if (!holes.empty()) return holes;
@@ -214,39 +264,6 @@ std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOp
   return {};
 }
 
-namespace {
-
-/// Nothing: no three finite numbers.
-std::optional<Vec3> read_vector(const Json& mount, const char* key) {
-  const auto found = mount.find(key);
-  if (found == mount.end() || !found->is_array() || found->size() != 3) return std::nullopt;
-  Vec3 v;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (!(*found)[k].is_number()) return std::nullopt;
-    v[static_cast<int>(k)] = (*found)[k].get<double>();
-  }
-  return v.allFinite() ? std::optional(v) : std::nullopt;
-}
-
-/// The mount of a session's summary. Nothing: there is none, as of a drive without an INS or one
-/// that was cut off.
-std::optional<InsMount> mount_in(const std::filesystem::path& summary) {
-  constexpr std::size_t kLargest = std::size_t{1} << 26U;
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(summary, ignored)) return std::nullopt;
-  const Json all = Json::parse(read_text(summary, kLargest), nullptr, false);
-  const Json mount = all.is_object() ? all.value("/enu/mount"_json_pointer, Json()) : Json();
-  if (!mount.is_object()) return std::nullopt;
-  const auto arm = read_vector(mount, "lever_arm_m"), turn = read_vector(mount, "boresight_deg");
-  if (!arm || !turn) return std::nullopt;
-  std::string source = summary.string();
-  if (const auto said = mount.find("source"); said != mount.end() && said->is_string())
-    source += ": " + said->get<std::string>();
-  return InsMount{mount_of(*arm, *turn * kRadiansPerDegree), source, false};
-}
-
-}  // namespace
-
 InsMount load_ins_mount(const std::filesystem::path& estimate,
                         const std::filesystem::path& readings) {
   std::error_code ignored;
@@ -263,32 +280,6 @@ std::string ins_mount_text(const InsMount& mount) {
            "looking along its x axis; --estimate-ins-extrinsics estimates both\n";
   return fmt::format("the INS is brought to the left camera by {}\n", mount.source);
 }
-
-namespace {
-
-Json value_json(const MountValue& v, double unit) {
-  return {{"value", v.observable ? Json(v.value * unit) : Json(nullptr)},
-          {"sigma", v.sigma * unit}};
-}
-
-std::string row(const char* what, const MountValue& v, double unit, const char* name) {
-  if (!v.observable)
-    return fmt::format("  {:<34}not_observable (sigma {:.3g} {})\n", what, v.sigma * unit, name);
-  return fmt::format("  {:<34}{:>11.4f} ± {:.4f} {}\n", what, v.value * unit, v.sigma * unit, name);
-}
-
-/// Value for `ins.boresight_deg`: roll, pitch, yaw. Nullopt: it is no INS's mount, or a part of
-/// it does not show.
-std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
-  const auto& r = found.mount.rotation;
-  if (!found.of_ins ||
-      !std::all_of(r.begin(), r.end(), [](const MountValue& v) { return v.observable; }))
-    return std::nullopt;
-  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegreesPerRadian;
-  return std::array{turn.x(), turn.y(), turn.z()};
-}
-
-}  // namespace
 
 const char* mount_problem(MountStatus status) {
   switch (status) {
@@ -312,7 +303,7 @@ std::vector<MountReference> ins_moments(std::span<const InsRecord> readings) {
            (r.sample.fix == FixStatus::fix_2d || r.sample.fix == FixStatus::fix_3d);
   };
   std::vector<MountReference> moments;
-  const auto first = std::find_if(readings.begin(), readings.end(), placed);
+  const auto first = std::ranges::find_if(readings, placed);
   if (first == readings.end()) return moments;
   const LocalTangentPlane plane(first->sample.position);
   moments.reserve(readings.size());

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "app/config/calibration_checks.hpp"
 #include "app/config/calibration_covariance.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -65,7 +66,7 @@ class Section {
   void optional_numbers(const char* key, std::array<double, N>* values) const {
     if (!has(key)) return;
     const auto given = numbers(key, N, N);
-    std::copy(given.begin(), given.end(), values->begin());
+    std::ranges::copy(given, values->begin());
   }
 
  private:
@@ -100,12 +101,12 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
   if (camera.gives("distortion")) {
     const auto d = camera.numbers("distortion", 4, max_coefficients(k));
-    std::copy(d.begin(), d.end(), k.distortion.begin());
+    std::ranges::copy(d, k.distortion.begin());
   }
   camera.optional_numbers("intrinsics_sigma", &k.sigma);
   if (camera.has("distortion_sigma")) {
     const auto sigma = camera.numbers("distortion_sigma", 4, max_coefficients(k));
-    std::copy(sigma.begin(), sigma.end(), k.distortion_sigma.begin());
+    std::ranges::copy(sigma, k.distortion_sigma.begin());
   }
   return k;
 }
@@ -275,8 +276,8 @@ std::string scalar(const std::string& text) {
   for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   const bool letter_first =
       !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
-  if (letter_first && std::all_of(text.begin(), text.end(), plain) &&
-      std::find(kChoices.begin(), kChoices.end(), lower) == kChoices.end())
+  if (letter_first && std::ranges::all_of(text, plain) &&
+      std::ranges::find(kChoices, lower) == kChoices.end())
     return text;
   return double_quoted(text);
 }
@@ -286,7 +287,7 @@ std::string list(std::span<const double> values) {
 }
 
 bool any(std::span<const double> values) {
-  return std::any_of(values.begin(), values.end(), [](double v) { return v != 0; });
+  return std::ranges::any_of(values, [](double v) { return v != 0; });
 }
 
 std::string format_camera(const CalibrationFile& calibration, std::size_t k) {

@@ -78,14 +78,14 @@ std::string mismatch(const CalibrationFile& found, const CalibrationFile& expect
 
 std::map<std::string, std::string> configured_rig(const Configuration& configuration) {
   std::map<std::string, std::string> values;
-  for (const auto& [key, value] : changed_settings(configuration)) {
+  for (const auto& setting : changed_settings(configuration)) {
+    const std::string& key = setting.first;
     const auto begins = [&key](std::string_view part) { return key.starts_with(part); };
     const auto has = [&key](std::string_view part) {
       return key.starts_with("cameras.") && key.find(part) != std::string::npos;
     };
-    if (std::any_of(kOfRig.begin(), kOfRig.end(), begins) ||
-        std::any_of(kOfCamera.begin(), kOfCamera.end(), has))
-      values.emplace(key, value);
+    if (std::ranges::any_of(kOfRig, begins) || std::ranges::any_of(kOfCamera, has))
+      values.insert(setting);
   }
   return values;
 }

@@ -3,7 +3,6 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <map>
 #include <set>
@@ -99,8 +98,8 @@ void add_argument(const std::string& argument, std::vector<Entry>* entries) {
 
 bool is_group(const std::string& name) {
   const auto& groups = schema();
-  return std::any_of(groups.begin(), groups.end(),
-                     [&](const Group& g) { return !g.name.empty() && g.name == name; });
+  return std::ranges::any_of(groups,
+                             [&](const Group& g) { return !g.name.empty() && g.name == name; });
 }
 
 const Key* find_key(const std::string& name) {
@@ -143,7 +142,7 @@ std::string suggestion(const std::string& name) {
   const auto near = nearest(name, names);
   // A key of another group with exactly this name is more likely meant than one spelled similarly.
   const std::string part = last_part(name);
-  const auto same = std::find(last_parts.begin(), last_parts.end(), part);
+  const auto same = std::ranges::find(last_parts, part);
   if (same != last_parts.end() && !(near && edit_distance(name, *near) <= 1) &&
       part.find_first_not_of("0123456789") != std::string::npos) {
     std::string found;
@@ -153,8 +152,7 @@ std::string suggestion(const std::string& name) {
   }
   if (near) return "; did you mean \"" + *near + "\"?";
   if (const auto near_part = nearest(part, last_parts)) {
-    const auto index =
-        std::find(last_parts.begin(), last_parts.end(), *near_part) - last_parts.begin();
+    const auto index = std::ranges::find(last_parts, *near_part) - last_parts.begin();
     return "; did you mean \"" + names[static_cast<std::size_t>(index)] + "\"?";
   }
   return "; docs/configuration.md lists all keys";
@@ -209,11 +207,11 @@ Number parse_number(const Entry& entry, const Key& key, const char* kind) {
 /// Maps YAML 1.1 booleans to the keywords on and off.
 std::string as_switch(const std::string& value, const std::vector<std::string>& words) {
   const auto is_choice = [&words](const char* word) {
-    return std::find(words.begin(), words.end(), word) != words.end();
+    return std::ranges::find(words, word) != words.end();
   };
   if (!is_choice("on") || !is_choice("off")) return value;
   std::string lower = value;
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
+  std::ranges::transform(lower, lower.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
   if (lower == "true" || lower == "yes" || lower == "on") return "on";
@@ -244,7 +242,7 @@ void apply(const Entry& entry, Configuration* configuration) {
       if (!key->words.empty()) {
         const std::string value = as_switch(entry.value, key->words);
         const bool unset = value.empty() && to_text(key->get(Configuration{})).empty();
-        if (!unset && std::find(key->words.begin(), key->words.end(), value) == key->words.end())
+        if (!unset && std::ranges::find(key->words, value) == key->words.end())
           throw InputError(fmt::format("{}: {} is \"{}\"; it must be one of {}{}", entry.origin,
                                        key->name, entry.value.substr(0, 60), range_text(*key),
                                        value_suggestion(entry.value, *key)));
@@ -343,7 +341,7 @@ std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
         entry.name.starts_with(kGroup) && entry.name.size() > kGroup.size() &&
         entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos;
     if (!item) continue;
-    if (!entry.scalar || std::find(words.begin(), words.end(), entry.value) == words.end())
+    if (!entry.scalar || std::ranges::find(words, entry.value) == words.end())
       throw InputError(fmt::format("{}: record lists \"{}\"; its values are {}{}", entry.origin,
                                    entry.value.substr(0, 60), fmt::join(words, ", "),
                                    did_you_mean(entry.value, words)));
@@ -389,6 +387,16 @@ Configuration load(const std::optional<YamlFile>& file, const std::vector<std::s
   return from_entries(entries, file ? file->name() : "--set");
 }
 
+// Maximum number of bytes of an input text that a message repeats.
+constexpr std::size_t kMaxShown = 60;
+
+std::string no_such_option(const std::string& name, const CameraSettings& camera) {
+  std::vector<std::string> names;
+  for (const OptionRow& row : option_rows(camera.options)) names.push_back(row.name);
+  return fmt::format("there is no option \"{}\"; {} cameras have {}{}", name.substr(0, kMaxShown),
+                     camera.driver, fmt::join(names, ", "), did_you_mean(name, names));
+}
+
 }  // namespace
 
 Configuration load_configuration(const std::optional<std::filesystem::path>& file,
@@ -419,7 +427,7 @@ std::string canonical_text(const Configuration& configuration) {
   for (const Group& group : schema())
     for (const Key& key : group.keys)
       lines.push_back(key.name + "=" + to_text(key.get(configuration)) + "\n");
-  std::sort(lines.begin(), lines.end());
+  std::ranges::sort(lines);
   std::string text;
   for (const std::string& line : lines) text += line;
   return text;
@@ -433,20 +441,6 @@ std::string configuration_hash(const Configuration& configuration) {
   return fmt::format("{:016x}", hash);
 }
 
-namespace {
-
-// Maximum number of bytes of an input text that a message repeats.
-constexpr std::size_t kShown = 60;
-
-std::string no_such_option(const std::string& name, const CameraSettings& camera) {
-  std::vector<std::string> names;
-  for (const OptionRow& row : option_rows(camera.options)) names.push_back(row.name);
-  return fmt::format("there is no option \"{}\"; {} cameras have {}{}", name.substr(0, kShown),
-                     camera.driver, fmt::join(names, ", "), did_you_mean(name, names));
-}
-
-}  // namespace
-
 std::string set_camera_option(const std::string& name, const std::string& value,
                               CameraSettings* camera) {
   if (std::holds_alternative<std::monostate>(camera->options)) {
@@ -457,8 +451,8 @@ std::string set_camera_option(const std::string& name, const std::string& value,
   if (set_option(name, value, &camera->options)) return {};
   const OptionRow* row = find_option(camera->options, name);
   if (row == nullptr) return no_such_option(name, *camera);
-  return fmt::format("{} is \"{}\"; it takes {}", name.substr(0, kShown), value.substr(0, kShown),
-                     row->values);
+  return fmt::format("{} is \"{}\"; it takes {}", name.substr(0, kMaxShown),
+                     value.substr(0, kMaxShown), row->values);
 }
 
 std::string set_camera_options(const std::string& text, CameraSettings* camera) {
@@ -470,7 +464,7 @@ std::string set_camera_options(const std::string& text, CameraSettings* camera) 
       return fmt::format(
           "\"{}\" is not an option; write NAME=VALUE, as in packet_size=9000, or a group "
           "{{packet_size: 9000}}",
-          word.substr(0, kShown));
+          word.substr(0, kMaxShown));
     if (std::string why =
             set_camera_option(word.substr(0, equals), word.substr(equals + 1), camera);
         !why.empty())

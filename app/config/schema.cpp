@@ -125,7 +125,8 @@ class Rows {
     return *this;
   }
 
-  [[nodiscard]] Group done() { return std::move(group_); }
+  /// The rows, which are then empty.
+  operator Group() { return std::move(group_); }
 
  private:
   /// `access` gives the field, of Settings const or not.
@@ -172,16 +173,14 @@ Group general() {
   return Rows<Configuration>("", "Keys that belong to no group.", whole)
       .integer(
           "threads", &Configuration::threads, 1, 2, "",
-          "Threads of the estimator: 2 processes both images in parallel; the poses are the same.")
-      .done();
+          "Threads of the estimator: 2 processes both images in parallel; the poses are the same.");
 }
 
 Group kitti_raw() {
   using K = KittiRawSettings;
   return Rows("kitti_raw", "Replays of KITTI raw drives.", &Configuration::kitti_raw)
       .integer("left", &K::left, 0, 3, "", "Left camera of a drive, `image_NN`: 0 grey, 2 colour.")
-      .integer("right", &K::right, 0, 3, "", "Right camera: 1 grey, 3 colour.")
-      .done();
+      .integer("right", &K::right, 0, 3, "", "Right camera: 1 grey, 3 colour.");
 }
 
 Group record() {
@@ -198,8 +197,7 @@ Group record() {
           "All images of the estimator, with camera_info; `replay --format session` needs them.")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
       .integer("split_mb", &R::split_mb, 0, 10'000'000, "MB",
-               "Size at which a new file starts; 0: one file.")
-      .done();
+               "Size at which a new file starts; 0: one file.");
 }
 
 Group publish() {
@@ -214,9 +212,8 @@ Group publish() {
             "HOST:PORT of the live page, e.g. `127.0.0.1:8080`; viewers on other machines need the "
             "token. Empty: off.")
       .text("token_file", &P::token_file, 400,
-            "File whose first line is the page's token, 16 to 128 letters and digits; empty: a "
-            "new one each session, shown when it starts.")
-      .done();
+            "File whose first line is the page's token, 16 to 128 letters and digits; empty: a new "
+            "one each session, shown when it starts.");
 }
 
 Group sessions() {
@@ -225,8 +222,7 @@ Group sessions() {
               &Configuration::sessions)
       .integer(
           "quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
-          "Maximum total size: before a run the oldest sessions beyond it are removed. 0: never.")
-      .done();
+          "Maximum total size: before a run the oldest sessions beyond it are removed. 0: never.");
 }
 
 Group realtime() {
@@ -246,8 +242,7 @@ Group realtime() {
               "`on`: lock memory before the first frame (mlockall), so that it is never paged out.")
       .number("frame_budget_ms", &R::frame_budget_ms, 0, 10000, "ms",
               "Time per live frame beyond which the estimator omits work other than the pose. 0: "
-              "the frame interval.")
-      .done();
+              "the frame interval.");
 }
 
 std::vector<std::pair<std::string, trigger_board::Edge>> edges() {
@@ -279,10 +274,8 @@ Group rig() {
               "Second radial distortion coefficient of every camera.")
       .text("state_dir", &R::state_dir, 400,
             "Directory of `calibration_state.yaml`, the last calibration accepted or verified, "
-            "with which the next `run` starts. Empty: "
-            "`$XDG_STATE_HOME/vergence/NAME`, without that variable "
-            "`~/.local/state/vergence/NAME`; `none`: no state file.")
-      .done();
+            "with which the next `run` starts. Empty: `$XDG_STATE_HOME/vergence/NAME`, without "
+            "that variable `~/.local/state/vergence/NAME`; `none`: no state file.");
 }
 
 Group cameras() {
@@ -322,16 +315,15 @@ Group cameras() {
                 "Trigger source: `hardware`, a pulse at its input; `software`, a command at "
                 "`trigger.rate`; `free`, its own clock. Equal for all cameras.")
             .options("options", &C::options, 400,
-                     "Options of this driver (drivers/*/README.md): `NAME=VALUE …`, or "
-                     "a group: "
+                     "Options of this driver (drivers/*/README.md): `NAME=VALUE …`, or a group: "
                      "`{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
                     "Exposure time; 8000 suits daylight on the simulated rig.")
-            .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
-                    "From a pulse's edge to the start of the exposure: of the input (10 to 100 µs "
-                    "if it is opto-coupled) and of the camera. "
-                    "With `sync.mode` `board`, `ins_syncout` or `master_strobe` it goes into every "
-                    "stamp, unless `trigger.feedback` measures it.")
+            .number(
+                "trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
+                "From a pulse's edge to the start of the exposure: of the input (10 to 100 µs if "
+                "it is opto-coupled) and of the camera. With `sync.mode` `board`, `ins_syncout` or "
+                "`master_strobe` it goes into every stamp, unless `trigger.feedback` measures it.")
             .number("stamp_jitter_us", &C::stamp_jitter_us, 0, 5000, "µs",
                     "Maximum deviation of its stamps from the pulses; 0: the default of the driver "
                     "(20; 1000 for host stamps). Above half of `trigger.dither_us` only a pause "
@@ -345,16 +337,15 @@ Group cameras() {
                 "model", &C::model,
                 {{"pinhole-radtan", CameraModelKind::pinhole_radtan},
                  {"pinhole-equidistant", CameraModelKind::pinhole_equidistant}},
-                "Lens model: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a "
-                "fisheye lens, k1 k2 k3 k4.")
+                "Lens model: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a fisheye "
+                "lens, k1 k2 k3 k4.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
                      "fx, fy, cx, cy; all four 0: the intrinsics are those of `rig.nominal`.")
             .numbers("distortion", &C::distortion, -2, 2, "",
                      "With `intrinsics`: k1, k2, p1, p2, k3; of an equidistant lens k1 to k4.")
             .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
                      "Extrinsics, X_camera = R X_left + t, as rows r11 r12 r13 t1, r21 … of [R t]. "
-                     "All zero: parallel, N baselines to the right.")
-            .done();
+                     "All zero: parallel, N baselines to the right.");
     all.name = one.name;
     all.meaning = one.meaning;
     std::move(one.keys.begin(), one.keys.end(), std::back_inserter(all.keys));
@@ -379,8 +370,7 @@ Group exposure() {
               "Maximum exposure, limits motion blur; beyond it the gain is raised.")
       .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Maximum gain.")
       .integer("settle_frames", &E::settle_frames, 2, 60, "frames",
-               "Images skipped after a change: one more than the cameras need to apply it.")
-      .done();
+               "Images skipped after a change: one more than the cameras need to apply it.");
 }
 
 Group trigger() {
@@ -416,8 +406,7 @@ Group trigger() {
               "`falling`; `none`: not wired.")
       .choice("ins", &T::ins, edges(),
               "Edge of the INS's SyncOut at the trigger board, `rising` or `falling`; `none`: not "
-              "wired.")
-      .done();
+              "wired.");
 }
 
 Group sync() {
@@ -436,8 +425,7 @@ Group sync() {
               "Maximum wait for a late image of a pulse.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
               "With `approximate_time`, `ieee1394_cycle_time`, `ptp` and `side_by_side`: maximum "
-              "difference of the exposure times of one set.")
-      .done();
+              "difference of the exposure times of one set.");
 }
 
 Group ins() {
@@ -465,8 +453,7 @@ Group ins() {
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
                "Position of the left camera in the INS body: forward, left, up.")
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
-               "Rotation of the rig's forward-left-up axes relative to the INS: roll, pitch, yaw.")
-      .done();
+               "Rotation of the rig's forward-left-up axes relative to the INS: roll, pitch, yaw.");
 }
 
 Group comparison() {
@@ -486,16 +473,15 @@ Group comparison() {
       .number("jump_m", &C::jump_m, 0.1, 1e6, "m",
               "A step of the INS's position beyond this (and 60 m/s) is a jump.")
       .number("scale_tolerance", &C::scale_tolerance, 0.001, 1, "",
-              "Relative difference of the path lengths that is reported.")
-      .done();
+              "Relative difference of the path lengths that is reported.");
 }
 
 Group odometry() {
   using O = OdometryOptions;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   Rows<O> rows("odometry",
-               "Motion estimation. The defaults suit road vehicles and hand-held rigs; "
-               "change one at a time.",
+               "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one "
+               "at a time.",
                &Configuration::odometry);
   rows.integer("features", &O::features, 50, 1000, "points",
                "Points tracked in each image, spread over a grid: more cost time and constrain the "
@@ -514,7 +500,6 @@ Group odometry() {
       .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
               "Added in quadrature to `pixel_sigma`, times the sideways motion since the patch was "
               "extracted divided by its depth, because the slope of the surface is unknown.")
-      .number("huber", &O::huber, 1, 10, "sigmas", "Huber threshold of the residuals.")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
                "Keyframes in the sliding window.")
       .number("extrinsic_rotation_sigma_rad", &O::extrinsic_rotation_sigma_rad, 0, 0.05, "rad",
@@ -537,15 +522,12 @@ Group odometry() {
                "Maximum MLESAC hypotheses per frame.")
       .integer("seed", &O::seed, 0, kLargestSeed, "",
                "Seed of that sampling: the same seed gives the same poses.");
-  return rows
-      .also(Rows<Configuration>("odometry", "", whole)
-                .choice("preset", &Configuration::preset, {"default", "small"},
-                        "`small`, for small single-board computers: `odometry.features` 250, "
-                        "`odometry.window_keyframes` 8, `calibration.max_frames` 100 and "
-                        "`calibration.max_observations` 50000 unless these are set; see "
-                        "docs/deployment.md.")
-                .done())
-      .done();
+  return rows.also(Rows<Configuration>("odometry", "", whole)
+                       .choice("preset", &Configuration::preset, {"default", "small"},
+                               "`small`, for small single-board computers: `odometry.features` "
+                               "250, `odometry.window_keyframes` 8, `calibration.max_frames` 100 "
+                               "and `calibration.max_observations` 50000 unless these are set; see "
+                               "docs/deployment.md."));
 }
 
 Group calibration_options() {
@@ -601,16 +583,13 @@ Group calibration_options() {
               "than that.")
       .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
               "Predicted depth error at 20 m up to which the calibration is rated `good`.")
-      .number(
-          "usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
-          "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is `poor`. A "
-          "solution with a larger one at `reference_depth_m` is not adopted.")
+      .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
+              "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is "
+              "`poor`. A solution with a larger one at `reference_depth_m` is not adopted.")
       .also(Rows<Configuration>("calibration", "", whole)
                 .choice("online", &Configuration::online, {"off", "on"},
                         "`off`: the rig is not monitored, and the initial calibration is used "
-                        "throughout.")
-                .done())
-      .done();
+                        "throughout."));
 }
 
 Group monitor() {
@@ -638,8 +617,7 @@ Group monitor() {
       .number("collapse_share", &M::collapse_share, 0.01, 0.9, "",
               "Share of the expected matches below which a frame counts towards a collapse.")
       .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",
-               "Minimum expected matches for a frame to count.")
-      .done();
+               "Minimum expected matches for a frame to count.");
 }
 
 Group intrinsics_error() {
@@ -652,8 +630,7 @@ Group intrinsics_error() {
           "Sigma of the error of each supplied principal-point coordinate; rendering stays exact.")
       .number("focal_percent", &E::focal_percent, 0, 10, "%",
               "Sigma of the error of the supplied focal length, drawn per camera.")
-      .integer("seed", &E::seed, 0, kLargestSeed, "", "Seed of these errors.")
-      .done();
+      .integer("seed", &E::seed, 0, kLargestSeed, "", "Seed of these errors.");
 }
 
 Group calibration_error() {
@@ -671,8 +648,7 @@ Group calibration_error() {
       .number("z_m", &E::z_m, -1, 1, "m", "The same along its z axis.")
       .number("length_percent", &E::length_percent, -60, 200, "%",
               "Scale error of the supplied lengths including the baseline; images alone cannot "
-              "show it.")
-      .done();
+              "show it.");
 }
 
 Group mock() {
@@ -711,8 +687,7 @@ Group mock() {
       .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm",
               "Largest drift of the devices' clocks; each has its own.")
       .also(intrinsics_error())
-      .also(calibration_error())
-      .done();
+      .also(calibration_error());
 }
 
 Group faults() {
@@ -752,12 +727,12 @@ namespace {
 std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
   const auto given = [](double v) { return v != 0; };
   const auto& numbers = camera.intrinsics;
-  const bool none = std::none_of(numbers.begin(), numbers.end(), given);
-  if (!none && !std::all_of(numbers.begin(), numbers.end(), given))
+  const bool none = std::ranges::none_of(numbers, given);
+  if (!none && !std::ranges::all_of(numbers, given))
     return fmt::format(
         "cameras.{}.intrinsics is [{}]; set all of fx, fy, cx, cy in pixels, or none", k,
         fmt::join(numbers, ", "));
-  if (none && std::any_of(camera.distortion.begin(), camera.distortion.end(), given))
+  if (none && std::ranges::any_of(camera.distortion, given))
     return fmt::format(
         "cameras.{}.distortion is set without cameras.{}.intrinsics; set both, or use "
         "rig.nominal.k1 and rig.nominal.k2",
@@ -815,37 +790,6 @@ std::string range_text(const Key& key) {
 
 namespace {
 
-constexpr std::string_view kOpening = R"(# Configuration
-
-All keys of the configuration with their defaults. No key is required: without a configuration the defaults apply.
-This page is written from the table that the program checks its input with (`app/config/schema.cpp`).
-
-A configuration is a YAML file. Keys are in groups:
-
-```yaml
-rig: {name: van}
-odometry:
-  features: 400
-  band_px: 3
-threads: 2
-```
-
-`--set` sets a key on the command line and is repeatable. It overrides the file; the last `--set` of a key wins.
-Dots separate groups; numbers are indices of list items:
-
-```sh
-vergence replay DATA --format folder --out session --set odometry.features=400 --set odometry.band_px=3
-```
-
-`--threads N` and `--seed N` are abbreviations of `--set threads=N` and `--set odometry.seed=N`.
-
-Errors are: an unknown key (the message suggests the nearest one), a value of the wrong type or outside its range, a key that is given
-twice, and keys that contradict each other. The message names the file and the line; the exit code is 2.
-
-Units are in the column `unit`; pixels are those of the captured image. `summary.json` of a session has `configuration_hash`, which is
-equal if all keys have equal values, however they were set.
-)";
-
 std::string cell(const std::string& text) { return text.empty() ? "–" : text; }
 
 std::string default_text(const Key& key) {
@@ -854,15 +798,8 @@ std::string default_text(const Key& key) {
 }
 
 std::string_view type_text(KeyType type) {
-  switch (type) {
-    case KeyType::integer:
-      return "integer";
-    case KeyType::number:
-      return "number";
-    case KeyType::text:
-      return "text";
-  }
-  return "";
+  constexpr std::array kTexts{"integer", "number", "text"};
+  return kTexts.at(static_cast<std::size_t>(type));
 }
 
 /// The items of a list have the same keys: item 0 stands for all, as N.
@@ -875,8 +812,8 @@ std::string documented_name(const Group& group, const Key& key) {
 
 }  // namespace
 
-std::string configuration_document() {
-  std::string page(kOpening);
+std::string configuration_tables() {
+  std::string page;
   for (const Group& group : schema()) {
     page += group.name.empty() ? std::string("\n## Without a group\n\n")
                                : "\n## `" + group.name + "`\n\n";

@@ -54,7 +54,7 @@ struct Group {
 /// Range such as `50 … 1000` or `hold, estimate`.
 [[nodiscard]] std::string range_text(const Key& key);
 
-/// Text of docs/configuration.md.
-[[nodiscard]] std::string configuration_document();
+/// Text of docs/configuration.md behind its opening.
+[[nodiscard]] std::string configuration_tables();
 
 }  // namespace vergence::app

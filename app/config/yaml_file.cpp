@@ -124,9 +124,8 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
   constexpr std::array kExplanations{
       Explanation{
           "illegal map value",
-          "a second `key: value` on one line, or a line that is indented too far; write one "
-          "key per line, indented as its neighbours are, and put a text with a colon in "
-          "quotes"},
+          "a second `key: value` on one line, or a line that is indented too far; write one key "
+          "per line, indented as its neighbours are, and put a text with a colon in quotes"},
       Explanation{"end of map not found", kIndentation},
       Explanation{"end of sequence not found", kIndentation},
       Explanation{"illegal block entry", kIndentation},
@@ -135,18 +134,16 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
       Explanation{"illegal flow end", "a `}` or `]` that nothing opens; remove it"},
       Explanation{"the referenced anchor is not defined",
                   "a value that begins with `*` is a reference; put the value in quotes"},
-      Explanation{
-          "unknown token",
-          "a value begins with a character that YAML reserves, such as @ or %; put the value "
-          "in quotes"}};
+      Explanation{"unknown token",
+                  "a value begins with a character that YAML reserves, such as @ or %; put the "
+                  "value in quotes"}};
   if (!error.mark.is_null()) {
     const std::string line = line_of(text, error.mark.line);
     if (line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos)
       return "the line is indented by a tab; use spaces";
   }
-  const auto* const known =
-      std::find_if(kExplanations.begin(), kExplanations.end(),
-                   [&](const Explanation& e) { return e.message == error.msg; });
+  const auto* const known = std::ranges::find_if(
+      kExplanations, [&](const Explanation& e) { return e.message == error.msg; });
   return known != kExplanations.end()
              ? std::string(known->meaning)
              : error.msg + "; check indentation, quotes, brackets and the space after each colon";
@@ -191,10 +188,10 @@ void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
     if (!item.first.IsScalar())
       fail(item.first, what + " has a list or a group as a key; write `key: value`");
     const std::string& key = item.first.Scalar();
-    if (std::find(known.begin(), known.end(), key) == known.end())
+    if (std::ranges::find(known, key) == known.end())
       fail(item.first, fmt::format("{} has the unknown key \"{}\"{}", what, shown(key),
                                    did_you_mean(key, known)));
-    if (std::find(seen.begin(), seen.end(), key) != seen.end())
+    if (std::ranges::find(seen, key) != seen.end())
       fail(item.first, fmt::format("{} has the key \"{}\" twice; remove one", what, key));
     seen.push_back(key);
   }

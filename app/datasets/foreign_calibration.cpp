@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "app/config/calibration_checks.hpp"
 #include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/settings_tree.hpp"
@@ -89,12 +90,11 @@ bool is_lens(const Fact& fact) {
 /// have intrinsics without a camera.
 std::vector<Fact> with_cameras(const std::vector<YamlFile>& files) {
   const auto nameless = [](const std::vector<Fact>& facts) {
-    return std::any_of(facts.begin(), facts.end(),
-                       [](const Fact& f) { return is_lens(f) && !f.camera; });
+    return std::ranges::any_of(facts, [](const Fact& f) { return is_lens(f) && !f.camera; });
   };
   std::vector<std::vector<Fact>> of_files(files.size());
-  std::transform(files.begin(), files.end(), of_files.begin(), find_facts);
-  const bool one_each = std::count_if(of_files.begin(), of_files.end(), nameless) > 1;
+  std::ranges::transform(files, of_files.begin(), find_facts);
+  const bool one_each = std::ranges::count_if(of_files, nameless) > 1;
   std::vector<Fact> all;
   int camera = 0;
   for (std::vector<Fact>& facts : of_files) {
@@ -191,7 +191,7 @@ class RigReader {
     if (const Fact* matrix = find("matrix", k)) {
       const auto v = read_numbers(*matrix);
       if (v.size() == 4)
-        std::copy(v.begin(), v.end(), fx_fy_cx_cy.begin());
+        std::ranges::copy(v, fx_fy_cx_cy.begin());
       else if (v.size() == 9 && v[1] == 0 && v[3] == 0 && v[6] == 0 && v[7] == 0 && v[8] == 1)
         fx_fy_cx_cy = {v[0], v[4], v[2], v[5]};
       else
@@ -338,7 +338,7 @@ class RigReader {
   bool from_between() {
     for (const Fact& fact : facts_)
       if (fact.part == "between") {
-        const Transform T = to_transform(fact);
+        Transform T = to_transform(fact);
         place(1) = fact.index == 1 ? T : T.inverse();
         return true;
       }
@@ -506,7 +506,7 @@ std::vector<std::filesystem::path> split_files(const std::string& text, bool fol
 
 bool is_own_calibration(const fs::path& file) {
   const auto trees = settings_trees(read_text(file, kLargestYaml), file.string());
-  return std::any_of(trees.begin(), trees.end(), is_own);
+  return std::ranges::any_of(trees, is_own);
 }
 
 CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
@@ -545,7 +545,7 @@ Transform read_body_mount(const fs::path& file) {
   for (const YamlFile& tree : trees)
     for (const Fact& fact : find_facts(tree)) {
       if (fact.part != "to_body") continue;
-      const Transform T = to_transform(fact);
+      Transform T = to_transform(fact);
       if (!accept_rotation(T.R)) fail(fact, " is not a rigid transform");
       return T;
     }

@@ -20,16 +20,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 const char* skip_kind(ImageFileStatus status) noexcept {
-  switch (status) {
-    case ImageFileStatus::missing:
-      return "image_missing";
-    case ImageFileStatus::truncated:
-      return "image_truncated";
-    case ImageFileStatus::wrong_size:
-      return "image_size";
-    default:
-      return "image_unreadable";
-  }
+  if (status == ImageFileStatus::missing) return "image_missing";
+  if (status == ImageFileStatus::truncated) return "image_truncated";
+  return status == ImageFileStatus::wrong_size ? "image_size" : "image_unreadable";
 }
 
 void set_issue(DecodedPair* pair, const char* kind, const std::string& message) {

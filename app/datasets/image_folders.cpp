@@ -51,7 +51,7 @@ std::vector<std::string> list_entries(const fs::path& folder, bool folders) {
     if (folders ? it->is_directory(other) && !name.starts_with('.') : is_image_name(name))
       names.push_back(name);
   }
-  std::sort(names.begin(), names.end(), in_name_order);
+  std::ranges::sort(names, in_name_order);
   return names;
 }
 
@@ -211,14 +211,12 @@ std::vector<StereoPair> pair_by_key(const Cameras& cameras, const Key& key) {
   std::vector<StereoPair> pairs;
   std::size_t l = 0, r = 0;
   while (l < left.size() || r < right.size()) {
-    const auto before = [&] {
-      return in_name_order(key(cameras[0], left[l]), key(cameras[1], right[r]));
-    };
-    const auto behind = [&] {
-      return in_name_order(key(cameras[1], right[r]), key(cameras[0], left[l]));
-    };
-    const bool have_left = l < left.size() && (r == right.size() || !behind());
-    const bool have_right = r < right.size() && (l == left.size() || !before());
+    const std::string left_key = l < left.size() ? key(cameras[0], left[l]) : "",
+                      right_key = r < right.size() ? key(cameras[1], right[r]) : "";
+    const bool have_left =
+        l < left.size() && (r == right.size() || !in_name_order(right_key, left_key));
+    const bool have_right =
+        r < right.size() && (l == left.size() || !in_name_order(left_key, right_key));
     StereoPair pair;
     pair.file[0] = have_left ? left[l] : missing(0, right[r]);
     pair.file[1] = have_right ? right[r] : missing(1, left[l]);
@@ -240,14 +238,12 @@ std::optional<std::vector<StereoPair>> pair_by_names(Cameras* cameras) {
   if (2 * met(*cameras, pairs) >= least) return pairs;
   Cameras numbered = *cameras;
   for (Camera& camera : numbered) {
-    std::stable_sort(camera.names.begin(), camera.names.end(),
-                     [&](const std::string& a, const std::string& b) {
-                       return in_name_order(number_key(camera, a), number_key(camera, b));
-                     });
-    if (std::adjacent_find(camera.names.begin(), camera.names.end(),
-                           [&](const std::string& a, const std::string& b) {
-                             return number_key(camera, a) == number_key(camera, b);
-                           }) != camera.names.end())
+    std::ranges::stable_sort(camera.names, [&](const std::string& a, const std::string& b) {
+      return in_name_order(number_key(camera, a), number_key(camera, b));
+    });
+    if (std::ranges::adjacent_find(camera.names, [&](const std::string& a, const std::string& b) {
+          return number_key(camera, a) == number_key(camera, b);
+        }) != camera.names.end())
       return std::nullopt;
   }
   pairs = pair_by_key(numbered, number_key);
@@ -293,8 +289,8 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
   std::vector<std::size_t> alone;
   for (std::size_t r = 0; r < right.size(); ++r)
     if (!paired[r]) alone.push_back(r);
-  std::stable_sort(alone.begin(), alone.end(),
-                   [&](std::size_t a, std::size_t b) { return right[a] < right[b]; });
+  std::ranges::stable_sort(alone,
+                           [&](std::size_t a, std::size_t b) { return right[a] < right[b]; });
   std::vector<StereoPair> pairs;
   auto next = alone.begin();
   const auto pair_alone = [&] {
@@ -351,8 +347,7 @@ TimesFile read_list(const fs::path& file, const Lists& lists, StereoSequence* se
   TimesFile times = read_times_file(file, lists.unit);
   auto& assumptions = sequence->assumptions;
   for (const std::string& remark : times.remarks)
-    if (std::find(assumptions.begin(), assumptions.end(), remark) == assumptions.end())
-      assumptions.push_back(remark);
+    if (std::ranges::find(assumptions, remark) == assumptions.end()) assumptions.push_back(remark);
   return times;
 }
 
@@ -415,8 +410,8 @@ std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<Ti
     pairs[i] = {times[i].stamp,
                 {named(cameras[0], times[i].name[0]), named(cameras[1], times[i].name[1])}};
   for (std::size_t k = 0; k < 2; ++k)
-    if (std::none_of(pairs.begin(), pairs.end(),
-                     [&](const StereoPair& pair) { return holds(cameras[k], pair.file[k]); }))
+    if (std::ranges::none_of(
+            pairs, [&](const StereoPair& pair) { return holds(cameras[k], pair.file[k]); }))
       refuse(file, 0,
              "names no existing image; its first name is " + pairs.front().file[k] +
                  ", the directory has " + cameras[k].names.front());
@@ -570,6 +565,7 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
     sensors[k] = (folder / cameras[k].below).parent_path() / "sensor.yaml";
   if (sensors[0] != sensors[1] && present(sensors[0]) && present(sensors[1])) {
     std::vector<CalibrationText> texts;
+    texts.reserve(sensors.size());
     for (const fs::path& file : sensors)
       texts.push_back({file.string(), read_text(file, kLargestYaml)});
     sequence->calibration = parse_any_calibration(texts, std::nullopt, &sequence->remarks).rig;

@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 

@@ -162,10 +162,10 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
   add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are skipped");
   add_remark(disordered, "stamps do not increase; their packets are skipped");
   const auto fixed = [](const InsRecord& r) { return r.sample.fix == FixStatus::fix_3d; };
-  add_remark(ins->readings.size() - static_cast<std::size_t>(std::count_if(
-                                        ins->readings.begin(), ins->readings.end(), fixed)),
-             fmt::format("of {} packets have no satellite fix: poses are not compared there",
-                         ins->readings.size()));
+  add_remark(
+      ins->readings.size() - static_cast<std::size_t>(std::ranges::count_if(ins->readings, fixed)),
+      fmt::format("of {} packets have no satellite fix: poses are not compared there",
+                  ins->readings.size()));
 }
 
 /// True for a directory with a camera's images and their list, or with the INS's packets.
@@ -208,7 +208,7 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
            "is not a KITTI raw drive; a directory with image_00, image_01 and oxts is expected");
   if (found.size() > 1) {
     constexpr std::size_t kMaxNamed = 8;
-    std::sort(found.begin(), found.end());
+    std::ranges::sort(found);
     std::string names;
     for (std::size_t i = 0; i < std::min(kMaxNamed, found.size()); ++i)
       names += (i > 0 ? ", " : "") + found[i].filename().string();

@@ -202,10 +202,9 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
            "has a recording without a complete frame: the run was too short, or the file is "
            "truncated; record again");
   const auto has_image = [](const RecordedFrame& f) {
-    return std::any_of(f.images.begin(), f.images.end(),
-                       [](const RecordedImage& i) { return i.offset != 0; });
+    return std::ranges::any_of(f.images, [](const RecordedImage& i) { return i.offset != 0; });
   };
-  if (std::none_of(session.frames_.begin(), session.frames_.end(), has_image))
+  if (std::ranges::none_of(session.frames_, has_image))
     refuse(folder, 0,
            "has a recording without images; record with record: [images] (docs/session_files.md)");
   if (reader.broken > 0)

@@ -61,8 +61,8 @@ std::optional<CameraModelKind> lens_model(std::string_view word) {
 bool is_rectified(const RosCamera& c) {
   const Intrinsics& k = c.lens;
   const auto zero = [](double d) { return d == 0; };
-  return std::all_of(k.distortion.begin(), k.distortion.end(), zero) && c.P(0, 0) == k.fx &&
-         c.P(1, 1) == k.fy && c.P(0, 2) == k.cx && c.P(1, 2) == k.cy;
+  return std::ranges::all_of(k.distortion, zero) && c.P(0, 0) == k.fx && c.P(1, 1) == k.fy &&
+         c.P(0, 2) == k.cx && c.P(1, 2) == k.cy;
 }
 
 std::string apply_crop(const RosCrop& crop, const std::optional<ImageSize>& image, RosCamera* c) {
@@ -106,10 +106,10 @@ std::string set_ros_distortion(std::string_view model, std::span<const double> d
     return fmt::format("has {} numbers", d.size());
   const auto used = d.first(std::min<std::size_t>(5, d.size()));
   const auto zero = [](double v) { return v == 0; };
-  if (const auto rest = d.subspan(used.size()); !std::all_of(rest.begin(), rest.end(), zero))
+  if (const auto rest = d.subspan(used.size()); !std::ranges::all_of(rest, zero))
     return "has k4 to k6 of a rational polynomial, which are not supported; calibrate as plumb_bob";
   lens->kind = equidistant ? CameraModelKind::pinhole_equidistant : CameraModelKind::pinhole_radtan;
-  std::copy(used.begin(), used.end(), lens->distortion.begin());
+  std::ranges::copy(used, lens->distortion.begin());
   return "";
 }
 

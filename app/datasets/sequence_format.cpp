@@ -20,7 +20,7 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
       "(.bag), sessions with a recording (drive.mcap)";
   const std::vector<std::string> words{"kitti", "kitti-raw", "euroc", "folder", "st-lucia",
                                        "mcap",  "rosbag",    "db3",   "session"};
-  if (const auto at = std::find(words.begin(), words.end(), word); at != words.end())
+  if (const auto at = std::ranges::find(words, word); at != words.end())
     return static_cast<SequenceFormat>(at - words.begin());
   if (word != "auto")
     throw InputError(fmt::format("--format \"{}\": unknown format; use auto, {}{}", word,

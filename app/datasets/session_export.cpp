@@ -10,7 +10,6 @@
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/datasets/reference_track.hpp"
-#include "app/datasets/text_file.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 
@@ -75,7 +74,7 @@ std::string sensor_yaml(const RigCalibration& rig, std::size_t k) {
   const auto& d = lens.distortion;
   const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
   std::string matrix = rows(rig.T_camera_left[k].inverse());
-  std::replace(matrix.begin(), matrix.end(), ' ', ',');
+  std::ranges::replace(matrix, ' ', ',');
   return fmt::format(
       "sensor_type: camera\ncomment: {} camera; the body is the left camera\nT_BS:\n  cols: 4\n"
       "  rows: 4\n  data: [{},0,0,0,1]\nresolution: [{}, {}]\ncamera_model: pinhole\n"
@@ -217,7 +216,7 @@ bool has_pair(const RecordedFrame& frame) {
 /// First frame with both images.
 const RecordedFrame& first_complete_frame(const RecordedSession& session) {
   const auto& frames = session.frames();
-  const auto first = std::find_if(frames.begin(), frames.end(), has_pair);
+  const auto first = std::ranges::find_if(frames, has_pair);
   if (first == frames.end())
     throw InputError(
         "the recording has no frame with both images, so nothing is exported; record with record: "

@@ -19,8 +19,8 @@ bool begins_number(std::string_view word) {
 
 /// Converts numbers separated by blanks, commas or semicolons to a YAML list.
 std::string as_list(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
+  std::ranges::replace_if(
+      text, [](char c) { return c == ',' || c == ';'; }, ' ');
   std::istringstream words(text);
   std::string list;
   for (std::string word; words >> word;) list += (list.empty() ? "[" : ", ") + word;
@@ -112,7 +112,7 @@ void replace_invalid_yaml(std::string* text) {
     std::fill(text->begin(),
               text->begin() + static_cast<std::ptrdiff_t>(std::min(text->find('\n'), text->size())),
               ' ');
-  std::replace(text->begin(), text->end(), '\t', ' ');
+  std::ranges::replace(*text, '\t', ' ');
 }
 
 }  // namespace
@@ -140,8 +140,7 @@ std::vector<YamlFile> settings_trees(std::string text, const std::string& name) 
     YamlFile tree = YamlFile::parse(document, name);
     if (!tree.root().IsNull()) trees.push_back(std::move(tree));
     if (end == rest.size()) return trees;
-    document.assign(
-        static_cast<std::size_t>(std::count(document.begin(), document.end(), '\n')) + 1, '\n');
+    document.assign(static_cast<std::size_t>(std::ranges::count(document, '\n')) + 1, '\n');
     rest.remove_prefix(std::min(rest.find('\n', end + 1), rest.size()));
   }
 }

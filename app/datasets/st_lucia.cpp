@@ -25,7 +25,7 @@ std::optional<std::filesystem::path> find_log(const std::filesystem::path& folde
   if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (found.empty()) return std::nullopt;
   if (found.size() > 1) {
-    std::sort(found.begin(), found.end());
+    std::ranges::sort(found);
     refuse(folder, 0,
            "holds " + std::to_string(found.size()) + " files that end in " + std::string(ending) +
                " (" + found[0].filename().string() + ", …); use one directory per sequence");
@@ -188,10 +188,9 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   if (broken > 0)
     remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers are skipped",
                                    log.filename().string(), broken));
-  const bool ordered = std::is_sorted(
-      out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
-  std::stable_sort(out.begin(), out.end(),
-                   [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  const bool ordered =
+      std::ranges::is_sorted(out, [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  std::ranges::stable_sort(out, [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
   const auto twice = std::unique(out.begin(), out.end(),
                                  [](const Line& a, const Line& b) { return a.stamp == b.stamp; });
   if (!ordered) remarks->push_back("the samples of the INS are sorted by their stamps");
@@ -205,9 +204,8 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
 /// Swaps the columns if latitude exceeds 90 in all lines.
 void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
                   std::vector<std::string>* remarks) {
-  const bool exchanged = std::all_of(lines->begin(), lines->end(), [](const Line& l) {
-    return std::abs(l.place.latitude_deg) > 90;
-  });
+  const bool exchanged = std::ranges::all_of(
+      *lines, [](const Line& l) { return std::abs(l.place.latitude_deg) > 90; });
   for (Line& line : *lines) {
     if (exchanged) std::swap(line.place.latitude_deg, line.place.longitude_deg);
     if (!line.place.plausible())

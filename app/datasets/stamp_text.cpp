@@ -86,7 +86,7 @@ std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> time
     values.push_back(std::abs(v));
   }
   if (values.empty()) return std::nullopt;
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const std::size_t n = values.size();
   const double middle = values[n / 2];
   if (values[3 * n / 4] - values[n / 4] > kSpread * middle) return std::nullopt;

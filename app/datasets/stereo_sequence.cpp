@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <system_error>
 
-#include "app/config/calibration_file.hpp"
+#include "app/config/calibration_checks.hpp"
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/runtime/terminal_text.hpp"
 
 namespace vergence::app {
@@ -97,6 +96,18 @@ void check(const std::filesystem::path& source, const CalibrationUse& use, Stere
     for (std::string& message : *messages) message = harmless(message);
 }
 
+/// A directory with bags of both kinds is read as ROS 2, regardless of the order of its entries.
+std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& folder) {
+  std::optional<SequenceFormat> found;
+  std::error_code ignored;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored))
+    if (const auto format = bag_format(it->path());
+        format && found != SequenceFormat::mcap && (!found || *found != SequenceFormat::db3))
+      found = format;
+  return found;
+}
+
 }  // namespace
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
@@ -132,28 +143,12 @@ std::string unpack_advice(const std::filesystem::path& file) {
                                Packed{".zip", "unzip"},      Packed{".7z", "7z x"},
                                Packed{".tar", "tar -xf"},    Packed{".tgz", "tar -xf"}};
   const std::string name = file.filename().string();
-  const auto packed = std::find_if(kPacked.begin(), kPacked.end(),
-                                   [&](const Packed& p) { return name.ends_with(p.ending); });
+  const auto packed =
+      std::ranges::find_if(kPacked, [&](const Packed& p) { return name.ends_with(p.ending); });
   if (packed == kPacked.end()) return "";
   return "is compressed (" + std::string(packed->ending.substr(1)) + "); unpack it with `" +
          std::string(packed->command) + " " + name + "` and pass the result";
 }
-
-namespace {
-
-/// A directory with bags of both kinds is read as ROS 2, regardless of the order of its entries.
-std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& folder) {
-  std::optional<SequenceFormat> found;
-  std::error_code ignored;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored))
-    if (const auto format = bag_format(it->path());
-        format && found != SequenceFormat::mcap && (!found || *found != SequenceFormat::db3))
-      found = format;
-  return found;
-}
-
-}  // namespace
 
 std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   std::error_code ignored;

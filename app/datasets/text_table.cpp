@@ -6,6 +6,7 @@
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/stamp_text.hpp"
+#include "app/datasets/text_file.hpp"
 
 namespace vergence::app {
 namespace {
@@ -106,9 +107,8 @@ void put_decimal_points(std::string* text) {
     return [sign](std::string_view field) { return field.find(sign) != std::string_view::npos; };
   };
   const auto& fields = table.fields();
-  if (std::any_of(fields.begin(), fields.end(), has(',')) &&
-      std::none_of(fields.begin(), fields.end(), has('.')))
-    std::replace(text->begin(), text->end(), ',', '.');
+  if (std::ranges::any_of(fields, has(',')) && std::ranges::none_of(fields, has('.')))
+    std::ranges::replace(*text, ',', '.');
 }
 
 }  // namespace vergence::app

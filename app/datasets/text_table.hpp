@@ -4,8 +4,6 @@
 #include <string_view>
 #include <vector>
 
-#include "app/datasets/text_file.hpp"
-
 /// Tables of numbers as programs write them.
 namespace vergence::app {
 

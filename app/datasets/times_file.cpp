@@ -1,9 +1,7 @@
 #include "app/datasets/times_file.hpp"
 
-#include <fmt/format.h>
-
 #include "app/datasets/decimal.hpp"
-#include "app/datasets/image_file.hpp"
+#include "app/datasets/text_file.hpp"
 #include "app/datasets/text_table.hpp"
 
 namespace vergence::app {
@@ -30,7 +28,7 @@ TimeColumns find_time_columns(std::span<const Fields> rows) {
   TimeColumns c;
   const Fields& first = rows.front();
   const auto all = [&](const auto& is) {
-    return std::all_of(rows.begin(), rows.end(), [&](const Fields& fields) {
+    return std::ranges::all_of(rows, [&](const Fields& fields) {
       return fields.size() > c.time + 1 && is(fields, &fields - rows.data());
     });
   };

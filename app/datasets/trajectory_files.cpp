@@ -10,6 +10,7 @@
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
+#include "app/datasets/text_file.hpp"
 #include "app/datasets/text_table.hpp"
 #include "app/datasets/times_file.hpp"
 #include "core/math/robust.hpp"
@@ -53,7 +54,7 @@ struct Columns {
   [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(layout); }
   [[nodiscard]] std::size_t needed() const {
     std::size_t last =
-        layout == Layout::pose ? *std::max_element(pose.begin(), pose.end()) : first + count() - 1;
+        layout == Layout::pose ? *std::ranges::max_element(pose) : first + count() - 1;
     if (time) last = std::max(last, time->last());
     return last + 1;
   }
@@ -68,8 +69,8 @@ std::string plain(std::string_view heading) {
 }
 
 bool contains(const std::string& word, std::initializer_list<const char*> parts) {
-  return std::any_of(parts.begin(), parts.end(),
-                     [&](const char* part) { return word.find(part) != std::string::npos; });
+  return std::ranges::any_of(
+      parts, [&](const char* part) { return word.find(part) != std::string::npos; });
 }
 
 /// True if the heading is an axis of a quaternion, in the words of common programs.
@@ -245,15 +246,14 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
 /// Returns true if the file is EuRoC ground truth, by its headings or name.
 bool is_euroc_truth(const fs::path& file, const Sample& sample) {
   return file.filename() == "data.csv" ||
-         std::any_of(sample.names.begin(), sample.names.end(),
-                     [](std::string_view name) { return plain(name) == "prsrx"; });
+         std::ranges::any_of(sample.names,
+                             [](std::string_view name) { return plain(name) == "prsrx"; });
 }
 
 /// Keeps the first of the rows that repeat a stamp.
 void sort_by_stamp(Trajectory* poses) {
   const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; };
-  if (!std::is_sorted(poses->begin(), poses->end(), earlier))
-    std::stable_sort(poses->begin(), poses->end(), earlier);
+  if (!std::ranges::is_sorted(*poses, earlier)) std::ranges::stable_sort(*poses, earlier);
   const auto same = [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; };
   poses->erase(std::unique(poses->begin(), poses->end(), same), poses->end());
 }
@@ -331,7 +331,7 @@ class Reader {
   [[nodiscard]] std::size_t max_rows() const {
     // Minimum length of eight numbers in bytes.
     constexpr std::size_t kShortest = 15;
-    const auto ends = static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n'));
+    const auto ends = static_cast<std::size_t>(std::ranges::count(text_, '\n'));
     return std::min(ends, text_.size() / kShortest) + 1;
   }
 

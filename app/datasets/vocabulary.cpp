@@ -122,17 +122,15 @@ std::string joined(const std::vector<std::string>& tokens) {
 
 const Vocabulary* find_part(const std::string& word) {
   const std::string whole = " " + word + " ";
-  return std::find_if(kWords.begin(), kWords.end(), [&](const Vocabulary& w) {
-    return w.words.find(whole) != std::string_view::npos;
-  });
+  return std::ranges::find_if(
+      kWords, [&](const Vocabulary& w) { return w.words.find(whole) != std::string_view::npos; });
 }
 
 /// k1 to k6, p1 or p2 of a scalar, whose number is not that of a camera; empty for other keys.
 std::string_view find_coefficient(const std::vector<std::string>& tokens) {
   if (tokens.size() < 2) return {};
   constexpr std::array<std::string_view, 8> kNames{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
-  const auto at =
-      std::find(kNames.begin(), kNames.end(), tokens[tokens.size() - 2] + tokens.back());
+  const auto at = std::ranges::find(kNames, tokens[tokens.size() - 2] + tokens.back());
   return at == kNames.end() ? std::string_view() : *at;
 }
 
@@ -149,8 +147,8 @@ class Walk {
   std::vector<Fact> facts() {
     visit(file_.root(), "", {}, 0);
     // Cameras are counted from 0 if one of them is.
-    const bool from_one = std::none_of(counted_.begin(), counted_.end(),
-                                       [&](std::size_t i) { return facts_[i].camera == 0; });
+    const bool from_one =
+        std::ranges::none_of(counted_, [&](std::size_t i) { return facts_[i].camera == 0; });
     for (const std::size_t i : counted_)
       if (from_one) --*facts_[i].camera;
     std::erase_if(facts_,

@@ -20,8 +20,8 @@ namespace {
 /// The schema has checked the name.
 const CameraDriverRow& find_row(const std::string& driver) {
   const auto& rows = camera_driver_rows();
-  return *std::find_if(rows.begin(), rows.end(),
-                       [&](const CameraDriverRow& row) { return driver == row.name; });
+  return *std::ranges::find_if(rows,
+                               [&](const CameraDriverRow& row) { return driver == row.name; });
 }
 
 std::string format_list(const std::vector<DeviceInfo>& found) {
@@ -64,9 +64,8 @@ bool are_one_camera(const CameraSettings& a, const CameraSettings& b) {
 void check_half(const Configuration& c, std::size_t k) {
   const CameraSettings& camera = c.cameras[k];
   if (camera.half == ImageHalf::whole) return;
-  const auto other = std::find_if(c.cameras.begin(), c.cameras.end(), [&](const CameraSettings& s) {
-    return are_one_camera(s, camera);
-  });
+  const auto other = std::ranges::find_if(
+      c.cameras, [&](const CameraSettings& s) { return are_one_camera(s, camera); });
   const bool left = camera.half == ImageHalf::left;
   if (other == c.cameras.end())
     throw InputError(fmt::format(
@@ -97,7 +96,7 @@ class Openings {
       if (!camera.serial.empty()) reserved_.emplace_back(camera.driver, camera.serial);
     }
     for (const auto& [name, serial] : reserved_)
-      if (std::count(reserved_.begin(), reserved_.end(), std::pair(name, serial)) > 1)
+      if (std::ranges::count(reserved_, std::pair(name, serial)) > 1)
         throw InputError(fmt::format(
             "two entries of cameras have the serial \"{}\"; set the serial of the second camera",
             serial));
@@ -151,7 +150,7 @@ class Openings {
     const std::vector<DeviceInfo> found = driver.enumerate();
     for (const DeviceInfo& d : found) {
       const std::pair who(name, d.serial);
-      if (std::find(reserved_.begin(), reserved_.end(), who) != reserved_.end()) continue;
+      if (std::ranges::find(reserved_, who) != reserved_.end()) continue;
       reserved_.push_back(who);
       return d.serial;
     }

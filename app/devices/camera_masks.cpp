@@ -50,7 +50,7 @@ std::vector<std::uint8_t> read_mask(const std::string& key, const std::filesyste
                     "these images (vergence snap)",
                     size.width, size.height, requested.width, requested.height));
   if (status != ImageFileStatus::ok) fail(to_phrase(status));
-  if (std::all_of(pixels.begin(), pixels.end(), [](std::uint8_t v) { return v == 0; }))
+  if (std::ranges::all_of(pixels, [](std::uint8_t v) { return v == 0; }))
     fail("is 0 everywhere, so no pixel is used; paint 0 only where the image must not be used");
   return pixels;
 }

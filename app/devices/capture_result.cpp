@@ -30,8 +30,6 @@ constexpr double kFlat = 1.5;
 // Minimum sharpness relative to the sharpest camera.
 constexpr double kBlurred = 0.2;
 
-ImageIssue remark(bool unusable, std::string message) { return {unusable, std::move(message)}; }
-
 std::optional<std::string> why_unusable(const ImageStatistics& f, const std::string& who) {
   if (f.mean < kBlack) return who + " is black; check the lens cap, the light and exposure_us";
   if (f.saturated > kMuch)
@@ -43,6 +41,12 @@ std::optional<std::string> why_unusable(const ImageStatistics& f, const std::str
            " is one uniform grey; check for a lens cap, fog on the glass, or a missing sensor "
            "signal";
   return std::nullopt;
+}
+
+void on_event(const DeviceEvent& event, CaptureResult* capture) {
+  const auto k = static_cast<std::size_t>(event.camera);
+  if (event.kind == DeviceEvent::Kind::camera_disconnected) capture->disconnected[k] = true;
+  if (event.kind == DeviceEvent::Kind::camera_reconnected) capture->disconnected[k] = false;
 }
 
 }  // namespace
@@ -77,6 +81,9 @@ ImageStatistics image_statistics(const ImageView& image) noexcept {
 std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
                                         std::span<const ImageStatistics> statistics) {
   std::vector<ImageIssue> remarks;
+  const auto add = [&](bool unusable, std::string message) {
+    remarks.push_back({unusable, std::move(message)});
+  };
   double sharpest = 0;
   std::size_t sharpest_at = 0;
   for (std::size_t k = 0; k < statistics.size(); ++k)
@@ -85,23 +92,21 @@ std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
     const ImageStatistics& f = statistics[k];
     const std::string& who = names[k];
     if (const auto reason = why_unusable(f, who)) {
-      remarks.push_back(remark(true, *reason));
+      add(true, *reason);
       continue;
     }
     if (f.saturated > kSome)
-      remarks.push_back(
-          remark(false, fmt::format("{} is partly overexposed: {:.0f} % of it is white, where "
-                                    "nothing can be tracked; a shorter exposure_us may help",
-                                    who, 100 * f.saturated)));
+      add(false, fmt::format("{} is partly overexposed: {:.0f} % of it is white, where "
+                             "nothing can be tracked; a shorter exposure_us may help",
+                             who, 100 * f.saturated));
     if (f.mean < kDim)
-      remarks.push_back(
-          remark(false, fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up "
-                                    "to what motion allows, then gain_db",
-                                    who, f.mean)));
+      add(false, fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up "
+                             "to what motion allows, then gain_db",
+                             who, f.mean));
     if (k != sharpest_at && f.sharpness < kBlurred * sharpest)
-      remarks.push_back(remark(false, fmt::format("{} is much less sharp than {} ({:.0f} against "
-                                                  "{:.0f}); check focus, dirt and near obstacles",
-                                                  who, names[sharpest_at], f.sharpness, sharpest)));
+      add(false, fmt::format("{} is much less sharp than {} ({:.0f} against "
+                             "{:.0f}); check focus, dirt and near obstacles",
+                             who, names[sharpest_at], f.sharpness, sharpest));
   }
   return remarks;
 }
@@ -123,26 +128,15 @@ std::vector<std::string> camera_names(const Configuration& c, int cameras) {
   std::vector<std::string> names;
   for (int k = 0; k < cameras; ++k) {
     std::string name = c.cameras[static_cast<std::size_t>(k)].name;
-    std::replace_if(
-        name.begin(), name.end(),
-        [](unsigned char ch) { return std::isalnum(ch) == 0 && ch != '_' && ch != '-'; }, '_');
+    std::ranges::replace_if(
+        name, [](unsigned char ch) { return std::isalnum(ch) == 0 && ch != '_' && ch != '-'; },
+        '_');
     if (name.empty()) name = "camera" + std::to_string(k);
-    while (std::find(names.begin(), names.end(), name) != names.end())
-      name += "_" + std::to_string(k);
+    while (std::ranges::find(names, name) != names.end()) name += "_" + std::to_string(k);
     names.push_back(std::move(name));
   }
   return names;
 }
-
-namespace {
-
-void on_event(const DeviceEvent& event, CaptureResult* capture) {
-  const auto k = static_cast<std::size_t>(event.camera);
-  if (event.kind == DeviceEvent::Kind::camera_disconnected) capture->disconnected[k] = true;
-  if (event.kind == DeviceEvent::Kind::camera_reconnected) capture->disconnected[k] = false;
-}
-
-}  // namespace
 
 CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
                            const SignalGuard& signals,

@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <iterator>
 #include <optional>
 #include <set>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -32,32 +35,6 @@ double bytes_per_pixel(const CameraSettings& s) {
   if (has("RGB8") || has("444")) return 3;
   return 1;
 }
-
-}  // namespace
-
-const char* to_string(FindingState state) noexcept {
-  constexpr std::array kNames{"ok", "advice", "problem"};
-  return kNames.at(static_cast<std::size_t>(state));
-}
-
-const Configuration& CheckContext::needs() const {
-  static const Configuration kNothing;
-  return drive != nullptr ? *drive : kNothing;
-}
-
-bool is_real_driver(const std::string& driver) {
-  return !driver.empty() && driver != "none" && driver != "mock";
-}
-
-std::vector<Finding> run_checks(const CheckContext& context) {
-  std::vector<Finding> findings;
-  for (const auto check : {check_devices, check_network, check_system}) check(context, &findings);
-  std::stable_sort(findings.begin(), findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.state > b.state; });
-  return findings;
-}
-
-namespace {
 
 const std::vector<std::string> kInstallRules{
     "vergence devices --write-udev | sudo tee /etc/udev/rules.d/98-vergence-rig.rules",
@@ -85,86 +62,13 @@ std::string format_list(const DriverFindings* d) {
   return fmt::format("found: {}", fmt::join(names, ", "));
 }
 
-void check_cameras(const CheckContext& p, std::vector<Finding>* findings) {
-  for (const DriverFindings& d : p.inventory.drivers)
-    if (!d.answered)
-      findings->push_back({"cameras",
-                           FindingState::problem,
-                           d.name + ": " + d.explanation,
-                           {"sudo dmesg | tail -30"}});
-  const auto matched = match_cameras(p);
-  std::vector<std::string> present;
-  for (std::size_t k = 0; k < matched.size(); ++k) {
-    const CameraSettings& n = p.needs().cameras[k];
-    if (n.driver == "mock") continue;
-    const std::string who =
-        fmt::format("cameras.{}{}", k, n.name.empty() ? "" : " (" + n.name + ")");
-    if (matched[k] != nullptr)
-      present.push_back(fmt::format("{} is {} {}", who, n.driver, matched[k]->serial));
-    else if (n.driver == "gige" && std::count(n.serial.begin(), n.serial.end(), '.') == 3)
-      findings->push_back({"cameras",
-                           FindingState::advice,
-                           who + ": no camera at " + n.serial +
-                               " answers a broadcast; this is normal behind a router, else check "
-                               "cable, power and address",
-                           {"ping -c 3 " + n.serial}});
-    else
-      findings->push_back({"cameras",
-                           FindingState::problem,
-                           fmt::format("{}: the {} camera{} was not found ({}); check cable, power "
-                                       "and serial",
-                                       who, n.driver, n.serial.empty() ? "" : " " + n.serial,
-                                       format_list(find_driver(p.inventory, n.driver))),
-                           {}});
-  }
-  if (!present.empty())
-    findings->push_back(
-        {"cameras", FindingState::ok, fmt::format("{}", fmt::join(present, ", ")), {}});
-}
-
-/// Nodes of one kind, and the group that should own them.
-struct NodesToOpen {
-  std::string check, group;
-  std::vector<std::string> nodes;
-};
-
-/// Checks that this user may read and write the nodes; if not, the cause is another login,
-/// membership, or a rule that gives the node to the group.
-void check_nodes(const CheckContext& p, const NodesToOpen& o, std::vector<Finding>* findings) {
-  std::vector<std::string> closed;
-  std::copy_if(o.nodes.begin(), o.nodes.end(), std::back_inserter(closed),
-               [&](const std::string& node) { return !p.machine.may_use(node); });
-  if (o.nodes.empty()) return;
-  Finding f{
-      o.check, FindingState::ok, fmt::format("{} can be opened", fmt::join(o.nodes, ", ")), {}};
-  if (!closed.empty()) {
-    f.state = FindingState::problem;
-    f.message = fmt::format("{} cannot be opened: ", fmt::join(closed, ", "));
-    const bool of_group = std::all_of(closed.begin(), closed.end(), [&](const std::string& node) {
-      return p.machine.group_of(node) == o.group;
-    });
-    if (!of_group || p.machine.in_group(o.group)) {
-      f.message += fmt::format(
-          "group {} has no access (mode 0660); install the udev rules, or stop a serial console "
-          "that uses the port (sudo systemctl mask --now serial-getty@NAME)",
-          o.group);
-      f.fix = kInstallRules;
-    } else {
-      f.message += fmt::format("{} is not in group {}; add the user, then log out and in again",
-                               p.machine.user, o.group);
-      f.fix = {fmt::format("sudo usermod -aG {} {}", o.group, p.machine.user)};
-    }
-  }
-  findings->push_back(std::move(f));
-}
-
 /// Nodes of everything that looks like a camera of a kind that is asked for; without a
 /// configuration of every kind.
 std::vector<std::string> camera_nodes(const CheckContext& p) {
   const auto asked = [&p](const char* driver) {
     const auto& cameras = p.needs().cameras;
-    return p.drive == nullptr || std::any_of(cameras.begin(), cameras.end(),
-                                             [&](const auto& c) { return c.driver == driver; });
+    return p.drive == nullptr ||
+           std::ranges::any_of(cameras, [&](const auto& c) { return c.driver == driver; });
   };
   std::vector<std::string> nodes;
   if (asked("v4l2"))
@@ -179,103 +83,20 @@ std::vector<std::string> camera_nodes(const CheckContext& p) {
   return nodes;
 }
 
-/// Serial ports that matter: those of the configuration, without one all on USB.
-std::vector<const FoundPort*> find_ports(const CheckContext& p, bool ins, bool trigger) {
+/// Serial ports that matter: those of the configuration, with `trigger` also that of the trigger
+/// board, without one all on USB.
+std::vector<const FoundPort*> find_ports(const CheckContext& p, bool trigger) {
   const Configuration& n = p.needs();
   std::vector<const FoundPort*> some;
   for (const FoundPort& port : p.inventory.ports)
     if (p.drive != nullptr
-            ? (ins && is_real_driver(n.ins.driver) && names_port(p.machine, n.ins.port, port)) ||
+            ? (is_real_driver(n.ins.driver) && names_port(p.machine, n.ins.port, port)) ||
                   (trigger && is_real_driver(n.trigger.driver) &&
                    names_port(p.machine, n.trigger.port, port))
             : port.info.usb_vendor != 0)
       some.push_back(&port);
   return some;
 }
-
-/// The configuration means one serial port that is there.
-void check_port(const CheckContext& p, const std::string& group, const std::string& driver,
-                const std::string& key, std::vector<Finding>* findings) {
-  if (!is_real_driver(driver) || (!key.empty() && p.machine.exists(key))) return;
-  const auto meant = std::count_if(p.inventory.ports.begin(), p.inventory.ports.end(),
-                                   [&](const auto& f) { return names_port(p.machine, key, f); });
-  if (meant == 0 || (meant > 1 && group == "ins"))
-    findings->push_back({group,
-                         FindingState::problem,
-                         fmt::format("{}.port: {}: {} serial ports match, one is needed; set one "
-                                     "that `vergence devices` lists",
-                                     group, key.empty() ? "empty" : key, meant),
-                         {}});
-}
-
-void check_serial_permission(const CheckContext& p, std::vector<Finding>* findings) {
-  std::set<std::string> nodes;
-  for (const FoundPort* port : find_ports(p, true, true)) nodes.insert(port->info.port);
-  // A port that the list lacks, for instance of the board itself, is checked all the same.
-  const auto add = [&](const std::string& driver, const std::string& port) {
-    if (is_real_driver(driver) && port.starts_with("/") && p.machine.exists(port))
-      nodes.insert(p.machine.target(port));
-  };
-  add(p.needs().ins.driver, p.needs().ins.port);
-  add(p.needs().trigger.driver, p.needs().trigger.port);
-  check_nodes(p, {"serial_permission", "dialout", {nodes.begin(), nodes.end()}}, findings);
-}
-
-void check_latency(const CheckContext& p, std::vector<Finding>* findings) {
-  // Recommended latency in ms, see docs/ins.md.
-  constexpr int kAdvisedLatency = 16;
-  for (const FoundPort* port : find_ports(p, true, false)) {
-    const bool ins = port->kind == SerialKind::ins || port->kind == SerialKind::ftdi;
-    if (!port->info.latency_timer_ms || !ins) continue;
-    const int ms = *port->info.latency_timer_ms;
-    Finding f{"latency_timer",
-              FindingState::ok,
-              fmt::format("{}: the converter's latency timer is {} ms", port->info.port, ms),
-              {}};
-    if (ms != kAdvisedLatency) {
-      f.state = FindingState::advice;
-      f.message +=
-          fmt::format("; the INS's stamps are best with {} ms (docs/ins.md)", kAdvisedLatency);
-      f.fix = {
-          fmt::format("echo {} | sudo tee /sys/bus/usb-serial/devices/{}/latency_timer",
-                      kAdvisedLatency, std::filesystem::path(port->info.port).filename().string()),
-          kInstallRules.front()};
-    }
-    findings->push_back(std::move(f));
-  }
-}
-
-}  // namespace
-
-std::vector<const DeviceInfo*> match_cameras(const CheckContext& p) {
-  std::vector<const DeviceInfo*> matched(static_cast<std::size_t>(camera_count(p.needs())),
-                                         nullptr);
-  // Entries that name a camera come first; the others take what is left.
-  for (const bool named : {true, false})
-    for (std::size_t k = 0; k < matched.size(); ++k) {
-      const CameraSettings& n = p.needs().cameras[k];
-      const DriverFindings* d = find_driver(p.inventory, n.driver);
-      if (d == nullptr || n.serial.empty() == named) continue;
-      for (const DeviceInfo& c : d->cameras)
-        if (std::find(matched.begin(), matched.end(), &c) == matched.end() &&
-            (!named || means(p.machine, n.serial, c))) {
-          matched[k] = &c;
-          break;
-        }
-    }
-  return matched;
-}
-
-void check_devices(const CheckContext& p, std::vector<Finding>* findings) {
-  check_cameras(p, findings);
-  check_nodes(p, {"camera_permission", "video", camera_nodes(p)}, findings);
-  check_port(p, "ins", p.needs().ins.driver, p.needs().ins.port, findings);
-  check_port(p, "trigger", p.needs().trigger.driver, p.needs().trigger.port, findings);
-  check_serial_permission(p, findings);
-  check_latency(p, findings);
-}
-
-namespace {
 
 // As the driver asks for its sockets: eight images, 4 MiB at least; with less than two, images are
 // lost.
@@ -329,170 +150,300 @@ std::vector<Reached> gige_cameras(const CheckContext& p) {
   return all;
 }
 
-void check_receive_buffer(const CheckContext& p, std::vector<Finding>* findings) {
-  const auto limit = p.machine.number("/proc/sys/net/core/rmem_max");
-  if (!limit) return;
-  double image = 0;
-  for (const CameraSettings& c : p.needs().cameras)
-    if (c.driver == "gige") image = std::max(image, bytes_per_pixel(c) * c.width * c.height);
-  const auto requested = std::max(kMinBuffer, static_cast<std::int64_t>(kBufferedImages * image));
-  const std::int64_t advised = std::max(kRecommendedBuffer, requested);
-  Finding f{
-      "receive_buffer",
-      FindingState::ok,
-      fmt::format("net.core.rmem_max is {} KiB; the receive buffer of a GigE camera needs {} KiB",
-                  *limit / 1024, requested / 1024),
-      {}};
-  if (*limit < requested && !p.machine.has_capability(CAP_NET_ADMIN)) {
+/// The checks of a context; each appends its findings in any order.
+class Checks {
+ public:
+  explicit Checks(const CheckContext& context) : p_(context) {
+    check_cameras();
+    check_nodes("camera_permission", "video", camera_nodes(p_));
+    check_port("ins", p_.needs().ins.driver, p_.needs().ins.port);
+    check_port("trigger", p_.needs().trigger.driver, p_.needs().trigger.port);
+    check_serial_permission();
+    check_latency();
+    check_network();
+    check_limits();
+    check_clock();
+    check_disk();
+  }
+  [[nodiscard]] std::vector<Finding>& findings() noexcept { return findings_; }
+
+ private:
+  void add(const char* check, FindingState state, std::string message,
+           std::vector<std::string> fix = {}) {
+    findings_.push_back({check, state, std::move(message), std::move(fix)});
+  }
+
+  void check_cameras() {
+    for (const DriverFindings& d : p_.inventory.drivers)
+      if (!d.answered)
+        add("cameras", FindingState::problem, d.name + ": " + d.explanation,
+            {"sudo dmesg | tail -30"});
+    const auto matched = match_cameras(p_);
+    std::vector<std::string> present;
+    for (std::size_t k = 0; k < matched.size(); ++k) {
+      const CameraSettings& n = p_.needs().cameras[k];
+      if (n.driver == "mock") continue;
+      const std::string who =
+          fmt::format("cameras.{}{}", k, n.name.empty() ? "" : " (" + n.name + ")");
+      if (matched[k] != nullptr)
+        present.push_back(fmt::format("{} is {} {}", who, n.driver, matched[k]->serial));
+      else if (n.driver == "gige" && std::ranges::count(n.serial, '.') == 3)
+        add("cameras", FindingState::advice,
+            who + ": no camera at " + n.serial +
+                " answers a broadcast; this is normal behind a router, else check cable, power "
+                "and address",
+            {"ping -c 3 " + n.serial});
+      else
+        add("cameras", FindingState::problem,
+            fmt::format("{}: the {} camera{} was not found ({}); check cable, power and serial",
+                        who, n.driver, n.serial.empty() ? "" : " " + n.serial,
+                        format_list(find_driver(p_.inventory, n.driver))));
+    }
+    if (!present.empty())
+      add("cameras", FindingState::ok, fmt::format("{}", fmt::join(present, ", ")));
+  }
+
+  /// Checks that this user may read and write the nodes, which `group` should own; if not, the
+  /// cause is another login, membership, or a rule that gives the node to the group.
+  void check_nodes(const char* check, const char* group, const std::vector<std::string>& nodes) {
+    std::vector<std::string> closed;
+    std::ranges::copy_if(nodes, std::back_inserter(closed),
+                         [&](const std::string& node) { return !p_.machine.may_use(node); });
+    if (nodes.empty()) return;
+    if (closed.empty())
+      return add(check, FindingState::ok, fmt::format("{} can be opened", fmt::join(nodes, ", ")));
+    const std::string message = fmt::format("{} cannot be opened: ", fmt::join(closed, ", "));
+    const bool of_group = std::ranges::all_of(
+        closed, [&](const std::string& node) { return p_.machine.group_of(node) == group; });
+    if (!of_group || p_.machine.in_group(group))
+      return add(check, FindingState::problem,
+                 fmt::format("{}group {} has no access (mode 0660); install the udev rules, or "
+                             "stop a serial console that uses the port (sudo systemctl mask "
+                             "--now serial-getty@NAME)",
+                             message, group),
+                 kInstallRules);
+    add(check, FindingState::problem,
+        fmt::format("{}{} is not in group {}; add the user, then log out and in again", message,
+                    p_.machine.user, group),
+        {fmt::format("sudo usermod -aG {} {}", group, p_.machine.user)});
+  }
+
+  /// The configuration means one serial port that is there.
+  void check_port(const char* group, const std::string& driver, const std::string& key) {
+    if (!is_real_driver(driver) || (!key.empty() && p_.machine.exists(key))) return;
+    const auto meant = std::ranges::count_if(
+        p_.inventory.ports, [&](const auto& f) { return names_port(p_.machine, key, f); });
+    if (meant == 0 || (meant > 1 && group == std::string_view("ins")))
+      add(group, FindingState::problem,
+          fmt::format("{}.port: {}: {} serial ports match, one is needed; set one that `vergence "
+                      "devices` lists",
+                      group, key.empty() ? "empty" : key, meant));
+  }
+
+  void check_serial_permission() {
+    std::set<std::string> nodes;
+    for (const FoundPort* port : find_ports(p_, true)) nodes.insert(port->info.port);
+    // A port that the list lacks, for instance of the board itself, is checked all the same.
+    const auto add_port = [&](const std::string& driver, const std::string& port) {
+      if (is_real_driver(driver) && port.starts_with("/") && p_.machine.exists(port))
+        nodes.insert(p_.machine.target(port));
+    };
+    add_port(p_.needs().ins.driver, p_.needs().ins.port);
+    add_port(p_.needs().trigger.driver, p_.needs().trigger.port);
+    check_nodes("serial_permission", "dialout", {nodes.begin(), nodes.end()});
+  }
+
+  void check_latency() {
+    // Recommended latency in ms, see docs/ins.md.
+    constexpr int kAdvised = 16;
+    for (const FoundPort* port : find_ports(p_, false)) {
+      const bool ins = port->kind == SerialKind::ins || port->kind == SerialKind::ftdi;
+      if (!port->info.latency_timer_ms || !ins) continue;
+      const int ms = *port->info.latency_timer_ms;
+      const std::string message =
+          fmt::format("{}: the converter's latency timer is {} ms", port->info.port, ms);
+      if (ms == kAdvised)
+        add("latency_timer", FindingState::ok, message);
+      else
+        add("latency_timer", FindingState::advice,
+            fmt::format("{}; the INS's stamps are best with {} ms (docs/ins.md)", message,
+                        kAdvised),
+            {fmt::format("echo {} | sudo tee /sys/bus/usb-serial/devices/{}/latency_timer",
+                         kAdvised, std::filesystem::path(port->info.port).filename().string()),
+             kInstallRules.front()});
+    }
+  }
+
+  void check_receive_buffer() {
+    const auto limit = p_.machine.number("/proc/sys/net/core/rmem_max");
+    if (!limit) return;
+    double image = 0;
+    for (const CameraSettings& c : p_.needs().cameras)
+      if (c.driver == "gige") image = std::max(image, bytes_per_pixel(c) * c.width * c.height);
+    const auto requested = std::max(kMinBuffer, static_cast<std::int64_t>(kBufferedImages * image));
+    const std::int64_t advised = std::max(kRecommendedBuffer, requested);
+    const std::string message =
+        fmt::format("net.core.rmem_max is {} KiB; the receive buffer of a GigE camera needs {} KiB",
+                    *limit / 1024, requested / 1024);
+    if (*limit >= requested || p_.machine.has_capability(CAP_NET_ADMIN))
+      return add("receive_buffer", FindingState::ok, message);
     const bool lost = static_cast<double>(*limit) < kMinImages * image;
-    f.state = lost ? FindingState::problem : FindingState::advice;
-    if (lost) f.message += ": images will be lost";
     // The last file by name counts, and the package's own is 10-vergence.conf.
-    f.fix = {fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
-             fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-vergence-rmem.conf",
-                         advised)};
+    add("receive_buffer", lost ? FindingState::problem : FindingState::advice,
+        lost ? message + ": images will be lost" : message,
+        {fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
+         fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-vergence-rmem.conf",
+                     advised)});
   }
-  findings->push_back(std::move(f));
-}
 
-void check_reach(const std::vector<Reached>& cameras, std::vector<Finding>* findings) {
-  std::vector<std::string> reached;
-  for (const Reached& r : cameras) {
-    const auto address = ipv4(r.place);
-    if (!address) continue;
-    if (r.through != nullptr) {
-      reached.push_back(r.place + " through " + r.through->name);
-      continue;
+  void check_reach(const std::vector<Reached>& cameras) {
+    std::vector<std::string> reached;
+    for (const Reached& r : cameras) {
+      const auto address = ipv4(r.place);
+      if (!address) continue;
+      if (r.through != nullptr) {
+        reached.push_back(r.place + " through " + r.through->name);
+        continue;
+      }
+      const bool link_local = *address >> 16U == 0xA9FEU;
+      const std::uint32_t own = (*address & ~255U) | ((*address & 255U) == 1 ? 2U : 1U);
+      add("camera_network", r.found ? FindingState::problem : FindingState::advice,
+          fmt::format("the camera at {} is not in a network of this host: it {}", r.place,
+                      r.found ? "answers only broadcasts" : "may be reachable through a router"),
+          {fmt::format("sudo ip addr add {}/{} dev INTERFACE", dotted(own), link_local ? 16 : 24)});
     }
-    const bool link_local = *address >> 16U == 0xA9FEU;
-    const std::uint32_t own = (*address & ~255U) | ((*address & 255U) == 1 ? 2U : 1U);
-    findings->push_back(
-        {"camera_network",
-         r.found ? FindingState::problem : FindingState::advice,
-         fmt::format("the camera at {} is not in a network of this host: it {}", r.place,
-                     r.found ? "answers only broadcasts" : "may be reachable through a router"),
-         {fmt::format("sudo ip addr add {}/{} dev INTERFACE", dotted(own), link_local ? 16 : 24)}});
+    if (!reached.empty())
+      add("camera_network", FindingState::ok, fmt::format("{}", fmt::join(reached, ", ")));
   }
-  if (!reached.empty())
-    findings->push_back(
-        {"camera_network", FindingState::ok, fmt::format("{}", fmt::join(reached, ", ")), {}});
-}
 
-void check_mtu(const std::string& name, int mtu, std::vector<Finding>* findings) {
-  Finding f{"mtu", FindingState::ok, fmt::format("{} has an MTU of {}", name, mtu), {}};
-  if (mtu < kJumbo) {
-    f.state = FindingState::advice;
-    f.message += fmt::format(
-        "; with {} (on the interface and every switch) a camera needs a quarter of the CPU time",
-        kJumbo);
-    f.fix = {fmt::format("sudo ip link set dev {} mtu {}", name, kJumbo),
-             fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", name, kJumbo)};
+  void check_mtu(const std::string& name) {
+    const auto read = p_.machine.number("/sys/class/net/" + name + "/mtu").value_or(kStandard);
+    const auto mtu = std::clamp<std::int64_t>(read, 68, 65536);
+    const std::string message = fmt::format("{} has an MTU of {}", name, mtu);
+    if (mtu >= kJumbo) return add("mtu", FindingState::ok, message);
+    add("mtu", FindingState::advice,
+        fmt::format("{}; with {} (on the interface and every switch) a camera needs a quarter of "
+                    "the CPU time",
+                    message, kJumbo),
+        {fmt::format("sudo ip link set dev {} mtu {}", name, kJumbo),
+         fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", name, kJumbo)});
   }
-  findings->push_back(std::move(f));
-}
 
-}  // namespace
-
-void check_network(const CheckContext& p, std::vector<Finding>* findings) {
-  const std::vector<Reached> cameras = gige_cameras(p);
-  if (cameras.empty()) return;
-  check_receive_buffer(p, findings);
-  check_reach(cameras, findings);
-  std::set<std::string> links;
-  for (const Reached& r : cameras)
-    if (r.through != nullptr) links.insert(r.through->name);
-  for (const std::string& name : links) {
-    const auto mtu = p.machine.number("/sys/class/net/" + name + "/mtu").value_or(kStandard);
-    check_mtu(name, static_cast<int>(std::clamp<std::int64_t>(mtu, 68, 65536)), findings);
+  /// Checks the network for GigE Vision cameras.
+  void check_network() {
+    const std::vector<Reached> cameras = gige_cameras(p_);
+    if (cameras.empty()) return;
+    check_receive_buffer();
+    check_reach(cameras);
+    std::set<std::string> links;
+    for (const Reached& r : cameras)
+      if (r.through != nullptr) links.insert(r.through->name);
+    for (const std::string& name : links) check_mtu(name);
   }
-}
 
-namespace {
-
-/// Limits of this process, where threads or memory ask for them.
-void check_limits(const CheckContext& p, std::vector<Finding>* findings) {
-  // Locked memory in bytes that two cameras and the threads need.
-  constexpr std::int64_t kLockedMemory = std::int64_t{512} << 20;
-  struct Limit {
-    const char* check;
-    const char* key;
-    // Name of the limit in /proc/self/limits.
-    const char* name;
-    unsigned capability;
-    // 0 if the limit is not checked.
-    std::int64_t wanted;
-    FindingState refused;
-    std::string item;
-  };
-  const int priority = p.needs().realtime.priority;
-  const std::array limits{
-      Limit{"realtime", "realtime.priority", "Max realtime priority", CAP_SYS_NICE, priority,
-            FindingState::problem, fmt::format("rtprio {}", std::max(20, priority))},
-      Limit{"memory_lock", "realtime.lock_memory", "Max locked memory", CAP_IPC_LOCK,
-            p.needs().realtime.lock_memory != 0 ? kLockedMemory : 0, FindingState::advice,
-            "memlock unlimited"}};
-  for (const Limit& l : limits) {
-    const auto limit = p.machine.limit(l.name);
-    if (l.wanted <= 0 || !limit) continue;
-    const bool enough = *limit < 0 || *limit >= l.wanted || p.machine.has_capability(l.capability);
-    Finding f{l.check,
-              FindingState::ok,
-              fmt::format("{} needs a limit of {}, {} has {}", l.key, l.wanted, p.machine.user,
-                          *limit < 0 ? "none" : std::to_string(*limit)),
-              {}};
-    if (!enough) {
-      f.state = l.refused;
-      f.fix = {fmt::format("echo '{} - {}' | sudo tee -a /etc/security/limits.d/60-vergence.conf",
-                           p.machine.user, l.item)};
-    }
-    findings->push_back(std::move(f));
+  /// Checks a limit of this process, where threads or memory ask for it. `name` is that in
+  /// /proc/self/limits, `item` is the line of limits.conf.
+  void check_limit(const char* check, const char* key, const char* name, unsigned capability,
+                   std::int64_t wanted, FindingState refused, const std::string& item) {
+    const auto limit = p_.machine.limit(name);
+    if (wanted <= 0 || !limit) return;
+    const std::string message =
+        fmt::format("{} needs a limit of {}, {} has {}", key, wanted, p_.machine.user,
+                    *limit < 0 ? "none" : std::to_string(*limit));
+    if (*limit < 0 || *limit >= wanted || p_.machine.has_capability(capability))
+      add(check, FindingState::ok, message);
+    else
+      add(check, refused, message,
+          {fmt::format("echo '{} - {}' | sudo tee -a /etc/security/limits.d/60-vergence.conf",
+                       p_.machine.user, item)});
   }
-}
 
-void check_clock(const CheckContext& p, std::vector<Finding>* findings) {
-  Finding f{"clock", FindingState::ok, "the system clock is synchronised", {}};
-  if (!p.machine.clock_synchronised.value_or(false)) {
-    f.state = FindingState::advice;
-    f.message =
-        "the system clock is not synchronised: session dates may be wrong; intervals are correct";
+  void check_limits() {
+    // Locked memory in bytes that two cameras and the threads need.
+    constexpr std::int64_t kLockedMemory = std::int64_t{512} << 20;
+    const int priority = p_.needs().realtime.priority;
+    check_limit("realtime", "realtime.priority", "Max realtime priority", CAP_SYS_NICE, priority,
+                FindingState::problem, fmt::format("rtprio {}", std::max(20, priority)));
+    check_limit("memory_lock", "realtime.lock_memory", "Max locked memory", CAP_IPC_LOCK,
+                p_.needs().realtime.lock_memory != 0 ? kLockedMemory : 0, FindingState::advice,
+                "memlock unlimited");
+  }
+
+  void check_clock() {
+    if (p_.machine.clock_synchronised.value_or(false))
+      return add("clock", FindingState::ok, "the system clock is synchronised");
     // Without a clock with a battery a start begins with an old date; timesyncd remembers the last.
-    f.fix = {p.machine.exists("/dev/rtc0") ? "sudo apt-get install chrony"
-                                           : "sudo apt-get install systemd-timesyncd"};
+    add("clock", FindingState::advice,
+        "the system clock is not synchronised: session dates may be wrong; intervals are correct",
+        {p_.machine.exists("/dev/rtc0") ? "sudo apt-get install chrony"
+                                        : "sudo apt-get install systemd-timesyncd"});
   }
-  findings->push_back(std::move(f));
-}
 
-void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
-  constexpr std::uint64_t kMin = std::uint64_t{200} << 20, kComfortable = std::uint64_t{2} << 30;
-  const auto room = p.machine.room_at(p.out);
-  if (!room) return;
-  const std::string where = p.out == "." ? "the current directory" : p.out.string();
-  Finding f{"disk",
-            FindingState::ok,
-            fmt::format("{:.1f} GB are free in {}", static_cast<double>(room->bytes) / 1e9, where),
-            {}};
-  if (room->read_only) {
-    f.state = FindingState::problem;
-    f.message = fmt::format("the file system of {} is read-only: no session can be written", where);
-    f.fix = {fmt::format("findmnt -T '{}'", p.out.string())};
-  } else if (!room->may_write && p.drive != nullptr) {
-    f.state = FindingState::problem;
-    f.message = fmt::format("{} cannot write to {}; use a directory of your own with --out",
-                            p.machine.user, where);
-  } else if (room->bytes < kComfortable) {
-    f.state = room->bytes < kMin ? FindingState::problem : FindingState::advice;
-    f.message += "; an hour needs about 100 MB, recordings of images much more";
-    f.fix = {"df -h"};
+  void check_disk() {
+    constexpr std::uint64_t kMin = std::uint64_t{200} << 20, kComfortable = std::uint64_t{2} << 30;
+    const auto room = p_.machine.room_at(p_.out);
+    if (!room) return;
+    const std::string where = p_.out == "." ? "the current directory" : p_.out.string();
+    const std::string free =
+        fmt::format("{:.1f} GB are free in {}", static_cast<double>(room->bytes) / 1e9, where);
+    if (room->read_only)
+      add("disk", FindingState::problem,
+          fmt::format("the file system of {} is read-only: no session can be written", where),
+          {fmt::format("findmnt -T '{}'", p_.out.string())});
+    else if (!room->may_write && p_.drive != nullptr)
+      add("disk", FindingState::problem,
+          fmt::format("{} cannot write to {}; use a directory of your own with --out",
+                      p_.machine.user, where));
+    else if (room->bytes < kComfortable)
+      add("disk", room->bytes < kMin ? FindingState::problem : FindingState::advice,
+          free + "; an hour needs about 100 MB, recordings of images much more", {"df -h"});
+    else
+      add("disk", FindingState::ok, free);
   }
-  findings->push_back(std::move(f));
-}
+
+  const CheckContext& p_;
+  std::vector<Finding> findings_{};
+};
 
 }  // namespace
 
-void check_system(const CheckContext& p, std::vector<Finding>* findings) {
-  check_limits(p, findings);
-  check_clock(p, findings);
-  check_disk(p, findings);
+const char* to_string(FindingState state) noexcept {
+  constexpr std::array kNames{"ok", "advice", "problem"};
+  return kNames.at(static_cast<std::size_t>(state));
+}
+
+const Configuration& CheckContext::needs() const {
+  static const Configuration kNothing;
+  return drive != nullptr ? *drive : kNothing;
+}
+
+bool is_real_driver(const std::string& driver) {
+  return !driver.empty() && driver != "none" && driver != "mock";
+}
+
+std::vector<const DeviceInfo*> match_cameras(const CheckContext& p) {
+  std::vector<const DeviceInfo*> matched(static_cast<std::size_t>(camera_count(p.needs())),
+                                         nullptr);
+  // Entries that name a camera come first; the others take what is left.
+  for (const bool named : {true, false})
+    for (std::size_t k = 0; k < matched.size(); ++k) {
+      const CameraSettings& n = p.needs().cameras[k];
+      const DriverFindings* d = find_driver(p.inventory, n.driver);
+      if (d == nullptr || n.serial.empty() == named) continue;
+      for (const DeviceInfo& c : d->cameras)
+        if (std::ranges::find(matched, &c) == matched.end() &&
+            (!named || means(p.machine, n.serial, c))) {
+          matched[k] = &c;
+          break;
+        }
+    }
+  return matched;
+}
+
+std::vector<Finding> run_checks(const CheckContext& context) {
+  std::vector<Finding> findings = std::move(Checks(context).findings());
+  std::ranges::stable_sort(findings, std::greater<>(), &Finding::state);
+  return findings;
 }
 
 }  // namespace vergence::app

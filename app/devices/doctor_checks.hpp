@@ -7,7 +7,7 @@
 #include "app/config/configuration.hpp"
 #include "app/devices/inventory.hpp"
 
-/// The checks of `vergence doctor`. Each is a function of the context and of the machine's files.
+/// The checks of `vergence doctor`, of the context and of the machine's files.
 namespace vergence::app {
 
 enum class FindingState : std::uint8_t {
@@ -46,12 +46,6 @@ struct CheckContext {
 /// Runs all checks. Devices that are neither present nor required cause no finding. Problems come
 /// first, then advice.
 [[nodiscard]] std::vector<Finding> run_checks(const CheckContext& context);
-
-// The checks by topic; each appends its findings in any order.
-void check_devices(const CheckContext& context, std::vector<Finding>* findings);
-// Checks the network for GigE Vision cameras.
-void check_network(const CheckContext& context, std::vector<Finding>* findings);
-void check_system(const CheckContext& context, std::vector<Finding>* findings);
 
 /// The found camera that a configuration means: by serial or place; an empty serial is the next
 /// that no other entry names. Null: none. One for each camera of the configuration.

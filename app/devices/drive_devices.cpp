@@ -13,9 +13,8 @@ namespace vergence::app {
 namespace {
 
 bool all_mock(const Configuration& c) {
-  return std::all_of(c.cameras.begin(), c.cameras.end(), [](const CameraSettings& s) {
-    return s.driver.empty() || s.driver == "mock";
-  });
+  return std::ranges::all_of(
+      c.cameras, [](const CameraSettings& s) { return s.driver.empty() || s.driver == "mock"; });
 }
 
 /// Checks that a configuration suits real devices before opening them.

@@ -57,6 +57,7 @@ std::vector<std::string> own_groups() {
   (void)::getgroups(static_cast<int>(ids.size()), ids.data());
   ids.push_back(::getegid());
   std::vector<std::string> names;
+  names.reserve(ids.size());
   for (const gid_t id : ids) names.push_back(group_name(id));
   return names;
 }
@@ -144,8 +145,8 @@ std::optional<std::string> Machine::line(const std::string& path) const {
   const std::optional<std::string> all = text(path);
   if (!all) return std::nullopt;
   std::string first(trimmed(std::string_view(*all).substr(0, all->find('\n'))));
-  std::replace_if(
-      first.begin(), first.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7f; }, '?');
+  std::ranges::replace_if(
+      first, [](unsigned char c) { return c < 0x20 || c >= 0x7f; }, '?');
   return first;
 }
 
@@ -159,7 +160,7 @@ std::vector<std::string> Machine::names(const std::string& path) const {
   for (fs::directory_iterator it(at(path), error), end;
        !error && it != end && all.size() < kMaxNames; it.increment(error))
     all.push_back(it->path().filename().string());
-  std::sort(all.begin(), all.end());
+  std::ranges::sort(all);
   return all;
 }
 
@@ -204,10 +205,9 @@ std::optional<std::int64_t> Machine::limit(const std::string& name) const {
 }
 
 bool Machine::in_group(const std::string& group) const {
-  return std::find(groups.begin(), groups.end(), group) != groups.end();
+  return std::ranges::find(groups, group) != groups.end();
 }
 
-namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
@@ -306,8 +306,7 @@ SerialKind serial_kind(std::uint16_t vendor, std::uint16_t product) noexcept {
   if (vendor == kFtdi) return SerialKind::ftdi;
   // The vendors are Silicon Labs and Prolific.
   if (vendor == 0x10C4 || vendor == 0x067B) return SerialKind::converter;
-  if (std::find(kBoardVendors.begin(), kBoardVendors.end(), vendor) != kBoardVendors.end())
-    return SerialKind::board;
+  if (std::ranges::find(kBoardVendors, vendor) != kBoardVendors.end()) return SerialKind::board;
   return SerialKind::unknown;
 }
 
@@ -327,8 +326,8 @@ Inventory make_inventory(const Machine& machine, const InventoryOptions& options
   Inventory inventory;
   std::vector<std::pair<const CameraDriverRow*, std::future<Search>>> searches;
   for (const CameraDriverRow& row : camera_driver_rows())
-    if (options.drivers.empty() || std::find(options.drivers.begin(), options.drivers.end(),
-                                             row.name) != options.drivers.end())
+    if (options.drivers.empty() ||
+        std::ranges::find(options.drivers, row.name) != options.drivers.end())
       searches.emplace_back(&row, begin_search(row));
   inventory.usb = list_usb_devices(machine);
   inventory.firewire = iidc::list_firewire_cameras(machine.root / "sys");

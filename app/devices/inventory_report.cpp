@@ -20,8 +20,8 @@ bool plain(char c) {
 /// At most 64 letters; those that mean something in a rule or a path become `other`.
 std::string plain_text(const std::string& text, char other) {
   std::string out = text.substr(0, 64);
-  std::replace_if(
-      out.begin(), out.end(), [](char c) { return !plain(c); }, other);
+  std::ranges::replace_if(
+      out, [](char c) { return !plain(c); }, other);
   return out;
 }
 
@@ -34,8 +34,8 @@ std::string part_of_name(const std::string& text) { return plain_text(text, '_')
 /// For a comment: one line.
 std::string comment(const std::string& text) {
   std::string out = text.substr(0, 80);
-  std::replace_if(
-      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+  std::ranges::replace_if(
+      out, [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
   return out;
 }
 
@@ -98,50 +98,9 @@ std::string usb_camera_rules(const UsbDevice& d) {
 std::string firewire_rules(const iidc::FirewireNode& node) {
   return fmt::format(
       "\n# camera on IEEE 1394, {}: {}\nSUBSYSTEM==\"firewire\", ATTR{{guid}}==\"0x{:016x}\", "
-      "GROUP=\"video\", MODE=\"0660\", "
-      "SYMLINK+=\"vergence/camera-{:016x}\"\n",
+      "GROUP=\"video\", MODE=\"0660\", SYMLINK+=\"vergence/camera-{:016x}\"\n",
       node.device, comment(node.rom.model.data()), node.rom.guid, node.rom.guid);
 }
-
-}  // namespace
-
-std::string udev_rules(const Inventory& inventory) {
-  std::string rules;
-  for (const FoundPort& port : inventory.ports)
-    if (port.info.usb_vendor != 0) rules += port_rules(port);
-  for (const UsbDevice& d : inventory.usb)
-    if (d.vendor == kPointGreyVendor || !d.video.empty()) rules += usb_camera_rules(d);
-  for (const iidc::FirewireNode& node : inventory.firewire) rules += firewire_rules(node);
-
-  const std::string head =
-      "# Devices of this rig for members of the groups dialout (serial lines) and video (cameras), "
-      "by `vergence devices --write-udev`.\n"
-      "# Install: copy to /etc/udev/rules.d/98-vergence-rig.rules, then: udevadm control --reload "
-      "&& udevadm trigger\n";
-  if (rules.empty())
-    return head + "# Nothing that needs a rule is plugged in. Network cameras need none.\n";
-  return head + "\nACTION==\"remove\", GOTO=\"vergence_rig_end\"\n" + rules +
-         "\nLABEL=\"vergence_rig_end\"\n";
-}
-
-Inventory ports_of_rig(Inventory inventory, const Configuration& drive, const Machine& machine) {
-  std::vector<FoundPort> ports;
-  const auto add = [&](const std::string& driver, const std::string& key, SerialKind kind) {
-    if (!is_real_driver(driver)) return;
-    for (FoundPort port : inventory.ports) {
-      const bool likely = port.kind == kind || port.kind == SerialKind::ftdi;
-      if (!names_port(machine, key, port) || (key.empty() && !likely)) continue;
-      port.kind = kind;
-      ports.push_back(std::move(port));
-    }
-  };
-  add(drive.ins.driver, drive.ins.port, SerialKind::ins);
-  add(drive.trigger.driver, drive.trigger.port, SerialKind::board);
-  inventory.ports = std::move(ports);
-  return inventory;
-}
-
-namespace {
 
 using Json = nlohmann::ordered_json;
 using Row = std::vector<std::string>;
@@ -228,11 +187,47 @@ std::string state_text(FindingState state, const Terminal& t) {
 }
 
 std::size_t count(const std::vector<Finding>& findings, FindingState state) {
-  return static_cast<std::size_t>(std::count_if(
-      findings.begin(), findings.end(), [state](const Finding& f) { return f.state == state; }));
+  return static_cast<std::size_t>(
+      std::ranges::count_if(findings, [state](const Finding& f) { return f.state == state; }));
 }
 
 }  // namespace
+
+std::string udev_rules(const Inventory& inventory) {
+  std::string rules;
+  for (const FoundPort& port : inventory.ports)
+    if (port.info.usb_vendor != 0) rules += port_rules(port);
+  for (const UsbDevice& d : inventory.usb)
+    if (d.vendor == kPointGreyVendor || !d.video.empty()) rules += usb_camera_rules(d);
+  for (const iidc::FirewireNode& node : inventory.firewire) rules += firewire_rules(node);
+
+  const std::string head =
+      "# Devices of this rig for members of the groups dialout (serial lines) and video (cameras), "
+      "by `vergence devices --write-udev`.\n"
+      "# Install: copy to /etc/udev/rules.d/98-vergence-rig.rules, then: udevadm control --reload "
+      "&& udevadm trigger\n";
+  if (rules.empty())
+    return head + "# Nothing that needs a rule is plugged in. Network cameras need none.\n";
+  return head + "\nACTION==\"remove\", GOTO=\"vergence_rig_end\"\n" + rules +
+         "\nLABEL=\"vergence_rig_end\"\n";
+}
+
+Inventory ports_of_rig(Inventory inventory, const Configuration& drive, const Machine& machine) {
+  std::vector<FoundPort> ports;
+  const auto add = [&](const std::string& driver, const std::string& key, SerialKind kind) {
+    if (!is_real_driver(driver)) return;
+    for (FoundPort port : inventory.ports) {
+      const bool likely = port.kind == kind || port.kind == SerialKind::ftdi;
+      if (!names_port(machine, key, port) || (key.empty() && !likely)) continue;
+      port.kind = kind;
+      ports.push_back(std::move(port));
+    }
+  };
+  add(drive.ins.driver, drive.ins.port, SerialKind::ins);
+  add(drive.trigger.driver, drive.trigger.port, SerialKind::board);
+  inventory.ports = std::move(ports);
+  return inventory;
+}
 
 std::string devices_text(const Inventory& inventory, const Terminal& t) {
   std::string text = cameras_text(inventory, t) + ports_text(inventory, t) +

@@ -18,7 +18,7 @@ namespace {
 /// Checks a key that takes fewer words where cameras are the mock's.
 void require_choice(const char* key, const std::string& value,
                     const std::vector<std::string>& words) {
-  if (std::find(words.begin(), words.end(), value) == words.end())
+  if (std::ranges::find(words, value) == words.end())
     throw InputError(fmt::format("{} is \"{}\"; with mock cameras set it to {}", key, value,
                                  fmt::join(words, ", ")));
 }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "app/config/calibration_checks.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
@@ -39,7 +40,7 @@ Intrinsics read_intrinsics(const Configuration& c, const CameraSettings& camera)
 Transform camera_transform(const Configuration& c, std::size_t k) {
   const auto& rows = c.cameras[k].T_camera_left;
   Transform T;
-  if (std::all_of(rows.begin(), rows.end(), [](double v) { return v == 0; })) {
+  if (std::ranges::all_of(rows, [](double v) { return v == 0; })) {
     T.t = {-static_cast<double>(k) * c.rig.baseline_m, 0, 0};
     return T;
   }
@@ -70,6 +71,10 @@ void add_calibration_error(const CalibrationErrorSettings& e, RigCalibration* ri
     rig->T_camera_left[static_cast<std::size_t>(k)].t *= longer;
   rig->baseline *= longer;
 }
+
+Vec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+Duration microseconds(double us) { return Duration::seconds(us * 1e-6); }
 
 }  // namespace
 
@@ -125,12 +130,6 @@ RigCalibration nominal_rig(const Configuration& c) {
   return rig;
 }
 
-namespace {
-
-Vec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
-}  // namespace
-
 ComparisonOptions comparison_options(const Configuration& c) {
   ComparisonOptions o;
   o.T_ins_left =
@@ -149,12 +148,6 @@ ComparisonOptions comparison_options(const Configuration& c) {
   o.scale_tolerance = c.comparison.scale_tolerance;
   return o;
 }
-
-namespace {
-
-Duration microseconds(double us) { return Duration::seconds(us * 1e-6); }
-
-}  // namespace
 
 bool exposes_by_itself(const Configuration& c) { return c.exposure.mode != 0; }
 

@@ -45,21 +45,146 @@ class Snap {
       : request_(request),
         configuration_(capture_configuration(request.configuration)),
         names_(camera_names(request.configuration, camera_count(request.configuration))) {}
-  ExitCode run();
+  ExitCode run() {
+    const CaptureResult capture = attempt();
+    if (!sets_.empty()) write_report();
+    return verdict(capture);
+  }
 
  private:
-  [[nodiscard]] CaptureResult attempt();
+  [[nodiscard]] CaptureResult attempt() {
+    const Configuration& c = configuration_;
+    // A mock: in virtual time, as long as the sets need and a second more.
+    const std::optional<double> duration =
+        is_mock(c) ? std::optional(1 + request_.count / c.trigger.rate) : std::nullopt;
+    devices_ = std::make_unique<DriveDevices>(c, std::vector<std::string>{}, is_mock(c), duration);
+    trigger_ = is_mock(c) ? "mock" : to_string(c.cameras[0].trigger);
+    for (const std::string& remark : devices_->remarks()) add_remark(remark);
+    CaptureOptions o;
+    o.count = request_.count;
+    o.limit = Duration::seconds(request_.wait_s);
+    o.skip = is_mock(c) || c.cameras[0].trigger == CameraTrigger::hardware ? 0 : 2;
+    return capture_sets(*devices_, o, signals_, [this](const CapturedSet& set) { keep(set); });
+  }
   void add_remark(const std::string& message) {
     remarks_.push_back(message);
     warn(message);
   }
-  void keep(const CapturedSet& set);
-  [[nodiscard]] std::vector<ImageIssue> check(const CapturedSet& set,
-                                              const std::vector<ImageStatistics>& statistics) const;
-  [[nodiscard]] std::string file_name(std::size_t camera, int set) const;
-  void print(const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const;
-  void write_report() const;
-  [[nodiscard]] ExitCode verdict(const CaptureResult& capture) const;
+  void keep(const CapturedSet& set) {
+    std::vector<ImageStatistics> statistics;
+    Json images = Json::array();
+    for (std::size_t k = 0; k < set.images.size(); ++k) {
+      const std::string file = file_name(k, set.index);
+      write_png(request_.out / file, set.images[k]);
+      const ImageStatistics f = image_statistics(set.images[k]);
+      statistics.push_back(f);
+      const DeviceInfo& who = devices_->cameras()[k]->info();
+      const CameraSettings& s = configuration_.cameras[k];
+      const auto& opened = devices_->opened();
+      images.push_back(
+          {{"camera", names_[k]},
+           {"file", file},
+           {"driver", who.driver},
+           {"serial", who.serial},
+           {"size", {set.images[k].width, set.images[k].height}},
+           {"exposure_us", opened.empty()
+                               ? s.exposure_us
+                               : rounded(opened[k].actual.exposure.to_seconds() * 1e6, 1)},
+           {"gain_db", opened.empty() ? s.gain_db : rounded(opened[k].actual.gain_db, 2)},
+           {"mean", rounded(f.mean, 2)},
+           {"contrast", rounded(f.contrast, 2)},
+           {"saturated_percent", rounded(kPercent * f.saturated, 2)},
+           {"dark_percent", rounded(kPercent * f.dark, 2)},
+           {"sharpness", rounded(f.sharpness, 2)}});
+    }
+    Json findings = Json::array();
+    print(set, statistics);
+    for (const ImageIssue& r : check(set, statistics)) {
+      unusable_ = unusable_ || r.unusable;
+      findings.push_back({{"unusable", r.unusable}, {"message", r.message}});
+      warn(r.message);
+    }
+    if (set.proof == SyncProof::ambiguous)
+      warn("the stamps of the cameras do not agree; simultaneous exposure is not verified");
+    sets_.push_back({{"stamp_ns", set.stamp.ns()},
+                     {"stamp_error_ms", rounded(set.stamp_error.to_seconds() * kMilli, 4)},
+                     {"spread_ms", rounded(set.spread.to_seconds() * kMilli, 4)},
+                     {"proof", to_string(set.proof)},
+                     {"images", images},
+                     {"findings", findings}});
+  }
+  [[nodiscard]] std::vector<ImageIssue> check(
+      const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const {
+    std::vector<ImageIssue> remarks = evaluate_images(names_, statistics);
+    for (std::size_t k = 1; k < set.images.size(); ++k)
+      for (std::size_t i = 0; i < k; ++i)
+        if (are_identical(set.images[i], set.images[k]))
+          remarks.push_back({true, fmt::format("{} and {} are identical images; if one camera is "
+                                               "used twice, set cameras.N.serial",
+                                               names_[i], names_[k])});
+    return remarks;
+  }
+  [[nodiscard]] std::string file_name(std::size_t camera, int set) const {
+    return request_.count == 1 ? names_[camera] + ".png"
+                               : fmt::format("{}_{:04}.png", names_[camera], set);
+  }
+  void print(const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const {
+    std::size_t width = 6;
+    for (const std::string& name : names_) width = std::max(width, name.size());
+    const std::string title = request_.count == 1 ? "camera" : fmt::format("set {}", set.index);
+    if (set.index == 0 || request_.count > 1)
+      std::cout << fmt::format(
+          "{:<{}}  {:>6} {:>8} {:>8} {:>8} {:>9}  {}\n", title, width, "mean", "contrast",
+          "white %", "black %", "sharpness",
+          fmt::format("exposed within {:.3f} ms", set.spread.to_seconds() * kMilli));
+    for (std::size_t k = 0; k < statistics.size(); ++k) {
+      const ImageStatistics& f = statistics[k];
+      std::cout << fmt::format("{:<{}}  {:>6.1f} {:>8.1f} {:>8.2f} {:>8.2f} {:>9.1f}  {}\n",
+                               names_[k], width, f.mean, f.contrast, kPercent * f.saturated,
+                               kPercent * f.dark, f.sharpness,
+                               (request_.out / file_name(k, set.index)).string());
+    }
+    std::cout.flush();
+  }
+  void write_report() const {
+    const Json all{{"schema_version", kSchemaVersion},
+                   {"version", std::string(version())},
+                   {"trigger", trigger_},
+                   {"notes", remarks_},
+                   {"sets", sets_}};
+    const auto file = request_.out / "snap.json";
+    std::ofstream out(file, std::ios::binary);
+    out << all.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+    out.close();
+    if (!out)
+      throw InputError(file.string() +
+                       ": cannot be written; check the free space and the permissions");
+  }
+  [[nodiscard]] ExitCode verdict(const CaptureResult& capture) const {
+    if (capture.end == CaptureResult::End::interrupted)
+      return signals_.stop_code().value_or(ExitCode::interrupted);
+    if (capture.end == CaptureResult::End::done)
+      return unusable_ ? ExitCode::not_usable : ExitCode::done;
+    bool silent = false;
+    for (std::size_t k = 0; k < capture.delivered.size(); ++k) {
+      if (capture.delivered[k] > 0) continue;
+      silent = true;
+      warn(fmt::format(
+          "{} {}; check its cable, its power and its trigger ({}.trigger; `free` needs no pulse)",
+          camera_title(names_[k], devices_->cameras()[k]->info()),
+          capture.disconnected[k] ? "is disconnected"
+                                  : fmt::format("sent no image within {:g} s", request_.wait_s),
+          fmt::format("cameras.{}", k)));
+    }
+    if (!silent)
+      warn(fmt::format(
+          "every camera sent images, but there are {}: {} of {} sets were captured; cameras that "
+          "are not triggered together need sync.mode: approximate_time and a sync.tolerance_ms of "
+          "half their period",
+          sets_.empty() ? "no images within the tolerance" : "too few within the tolerance",
+          capture.sets, request_.count));
+    return ExitCode::device_failed;
+  }
 
   const SignalGuard signals_;
   const SnapRequest& request_;
@@ -71,147 +196,6 @@ class Snap {
   Json sets_ = Json::array();
   bool unusable_ = false;
 };
-
-CaptureResult Snap::attempt() {
-  const Configuration& c = configuration_;
-  // A mock: in virtual time, as long as the sets need and a second more.
-  const std::optional<double> duration =
-      is_mock(c) ? std::optional(1 + request_.count / c.trigger.rate) : std::nullopt;
-  devices_ = std::make_unique<DriveDevices>(c, std::vector<std::string>{}, is_mock(c), duration);
-  trigger_ = is_mock(c) ? "mock" : to_string(c.cameras[0].trigger);
-  for (const std::string& remark : devices_->remarks()) add_remark(remark);
-  CaptureOptions o;
-  o.count = request_.count;
-  o.limit = Duration::seconds(request_.wait_s);
-  o.skip = is_mock(c) || c.cameras[0].trigger == CameraTrigger::hardware ? 0 : 2;
-  return capture_sets(*devices_, o, signals_, [this](const CapturedSet& set) { keep(set); });
-}
-
-ExitCode Snap::run() {
-  const CaptureResult capture = attempt();
-  if (!sets_.empty()) write_report();
-  return verdict(capture);
-}
-
-std::string Snap::file_name(std::size_t camera, int set) const {
-  return request_.count == 1 ? names_[camera] + ".png"
-                             : fmt::format("{}_{:04}.png", names_[camera], set);
-}
-
-std::vector<ImageIssue> Snap::check(const CapturedSet& set,
-                                    const std::vector<ImageStatistics>& statistics) const {
-  std::vector<ImageIssue> remarks = evaluate_images(names_, statistics);
-  for (std::size_t k = 1; k < set.images.size(); ++k)
-    for (std::size_t i = 0; i < k; ++i)
-      if (are_identical(set.images[i], set.images[k]))
-        remarks.push_back({true, fmt::format("{} and {} are identical images; if one camera is "
-                                             "used twice, set cameras.N.serial",
-                                             names_[i], names_[k])});
-  return remarks;
-}
-
-void Snap::keep(const CapturedSet& set) {
-  std::vector<ImageStatistics> statistics;
-  Json images = Json::array();
-  for (std::size_t k = 0; k < set.images.size(); ++k) {
-    const std::string file = file_name(k, set.index);
-    write_png(request_.out / file, set.images[k]);
-    const ImageStatistics f = image_statistics(set.images[k]);
-    statistics.push_back(f);
-    const DeviceInfo& who = devices_->cameras()[k]->info();
-    const CameraSettings& s = configuration_.cameras[k];
-    const auto& opened = devices_->opened();
-    images.push_back(
-        {{"camera", names_[k]},
-         {"file", file},
-         {"driver", who.driver},
-         {"serial", who.serial},
-         {"size", {set.images[k].width, set.images[k].height}},
-         {"exposure_us", opened.empty() ? s.exposure_us
-                                        : rounded(opened[k].actual.exposure.to_seconds() * 1e6, 1)},
-         {"gain_db", opened.empty() ? s.gain_db : rounded(opened[k].actual.gain_db, 2)},
-         {"mean", rounded(f.mean, 2)},
-         {"contrast", rounded(f.contrast, 2)},
-         {"saturated_percent", rounded(kPercent * f.saturated, 2)},
-         {"dark_percent", rounded(kPercent * f.dark, 2)},
-         {"sharpness", rounded(f.sharpness, 2)}});
-  }
-  Json findings = Json::array();
-  print(set, statistics);
-  for (const ImageIssue& r : check(set, statistics)) {
-    unusable_ = unusable_ || r.unusable;
-    findings.push_back({{"unusable", r.unusable}, {"message", r.message}});
-    warn(r.message);
-  }
-  if (set.proof == SyncProof::ambiguous)
-    warn("the stamps of the cameras do not agree; simultaneous exposure is not verified");
-  sets_.push_back({{"stamp_ns", set.stamp.ns()},
-                   {"stamp_error_ms", rounded(set.stamp_error.to_seconds() * kMilli, 4)},
-                   {"spread_ms", rounded(set.spread.to_seconds() * kMilli, 4)},
-                   {"proof", to_string(set.proof)},
-                   {"images", images},
-                   {"findings", findings}});
-}
-
-void Snap::print(const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const {
-  std::size_t width = 6;
-  for (const std::string& name : names_) width = std::max(width, name.size());
-  const std::string title = request_.count == 1 ? "camera" : fmt::format("set {}", set.index);
-  if (set.index == 0 || request_.count > 1)
-    std::cout << fmt::format(
-        "{:<{}}  {:>6} {:>8} {:>8} {:>8} {:>9}  {}\n", title, width, "mean", "contrast", "white %",
-        "black %", "sharpness",
-        fmt::format("exposed within {:.3f} ms", set.spread.to_seconds() * kMilli));
-  for (std::size_t k = 0; k < statistics.size(); ++k) {
-    const ImageStatistics& f = statistics[k];
-    std::cout << fmt::format("{:<{}}  {:>6.1f} {:>8.1f} {:>8.2f} {:>8.2f} {:>9.1f}  {}\n",
-                             names_[k], width, f.mean, f.contrast, kPercent * f.saturated,
-                             kPercent * f.dark, f.sharpness,
-                             (request_.out / file_name(k, set.index)).string());
-  }
-  std::cout.flush();
-}
-
-void Snap::write_report() const {
-  const Json all{{"schema_version", kSchemaVersion},
-                 {"version", std::string(version())},
-                 {"trigger", trigger_},
-                 {"notes", remarks_},
-                 {"sets", sets_}};
-  const auto file = request_.out / "snap.json";
-  std::ofstream out(file, std::ios::binary);
-  out << all.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-  out.close();
-  if (!out)
-    throw InputError(file.string() +
-                     ": cannot be written; check the free space and the permissions");
-}
-
-ExitCode Snap::verdict(const CaptureResult& capture) const {
-  if (capture.end == CaptureResult::End::interrupted)
-    return signals_.stop_code().value_or(ExitCode::interrupted);
-  if (capture.end == CaptureResult::End::done)
-    return unusable_ ? ExitCode::not_usable : ExitCode::done;
-  bool silent = false;
-  for (std::size_t k = 0; k < capture.delivered.size(); ++k) {
-    if (capture.delivered[k] > 0) continue;
-    silent = true;
-    warn(fmt::format(
-        "{} {}; check its cable, its power and its trigger ({}.trigger; `free` needs no pulse)",
-        camera_title(names_[k], devices_->cameras()[k]->info()),
-        capture.disconnected[k] ? "is disconnected"
-                                : fmt::format("sent no image within {:g} s", request_.wait_s),
-        fmt::format("cameras.{}", k)));
-  }
-  if (!silent)
-    warn(fmt::format(
-        "every camera sent images, but there are {}: {} of {} sets were captured; cameras that are "
-        "not triggered together need sync.mode: approximate_time and a sync.tolerance_ms of half "
-        "their period",
-        sets_.empty() ? "no images within the tolerance" : "too few within the tolerance",
-        capture.sets, request_.count));
-  return ExitCode::device_failed;
-}
 
 }  // namespace
 

@@ -13,7 +13,6 @@
 
 #include <fmt/format.h>
 
-#include "app/publish/line_socket.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

@@ -14,7 +14,6 @@
 #include <charconv>
 #include <cstring>
 #include <span>
-#include <string>
 
 #include <fmt/format.h>
 
@@ -31,62 +30,6 @@ std::string machine_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 && name[0] != 0 ? name.data()
                                                                           : "localhost";
 }
-
-}  // namespace
-
-bool HostPort::loopback() const {
-  return host == "localhost" || host == "::1" ||
-         (host.starts_with("127.") && host.find_first_not_of("0123456789.") == std::string::npos);
-}
-
-std::string HostPort::text() const {
-  return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
-                                             : fmt::format("[{}]:{}", host, port);
-}
-
-HostPort HostPort::link() const {
-  return host == "0.0.0.0" || host == "::" ? HostPort{machine_name(), port} : *this;
-}
-
-HostPort parse_host_port(std::string_view text, std::string_view key) {
-  const auto colon = std::min(text.rfind(':'), text.size());
-  std::string_view host = text.substr(0, colon);
-  const std::string_view digits = text.substr(std::min(colon + 1, text.size()));
-  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
-  if (bracketed) host = host.substr(1, host.size() - 2);
-  std::uint16_t port = 0;
-  const char* end = digits.data() + digits.size();
-  const auto [read, error] = std::from_chars(digits.data(), end, port);
-  if (host.empty() || bracketed != (host.find(':') != std::string_view::npos) ||
-      error != std::errc() || read != end || port == 0)
-    throw InputError(fmt::format(
-        "{}: \"{}\" is not an address; write HOST:PORT, e.g. 127.0.0.1:8080 or [::1]:8080", key,
-        text.substr(0, 120)));
-  return {std::string(host), port};
-}
-
-LineAddress parse_line_address(std::string_view text, std::string_view key) {
-  constexpr std::string_view kUnix = "unix://", kUdp = "udp://";
-  LineAddress out;
-  if (text.starts_with(kUdp)) {
-    out.kind = LineAddress::Kind::udp;
-    out.udp = parse_host_port(text.substr(kUdp.size()), key);
-    return out;
-  }
-  if (!text.starts_with(kUnix))
-    throw InputError(
-        fmt::format("{}: \"{}\" is not an address; write unix:///PATH or udp://HOST:PORT", key,
-                    text.substr(0, 120)));
-  out.path = text.substr(kUnix.size());
-  if (!out.path.starts_with('/') || out.path.find('\0') != std::string::npos ||
-      out.path.size() >= sizeof(sockaddr_un::sun_path))
-    throw InputError(
-        fmt::format("{}: the path of the socket must begin with / and have at most {} bytes", key,
-                    sizeof(sockaddr_un::sun_path) - 1));
-  return out;
-}
-
-namespace {
 
 // Robots have a handful of programs that read the pose.
 constexpr std::size_t kReaders = 8;
@@ -173,7 +116,9 @@ class UnixLineSocket final : public LineSocket {
       if (reader.copies_images() && !reader.rest.empty() && now - reader.progress >= kPatience)
         close(&reader);
       // A reader's next request is read after the response to the previous one was sent.
-      const short event = !reader.rest.empty() ? POLLOUT : reader.asks ? POLLIN : short{0};
+      const short event = !reader.rest.empty() ? short{POLLOUT}
+                          : reader.asks        ? short{POLLIN}
+                                               : short{0};
       events[2 + i] = {reader.socket.get(), event, 0};
     }
     wait_for(events, timeout);
@@ -187,8 +132,8 @@ class UnixLineSocket final : public LineSocket {
   }
   [[nodiscard]] bool wants_images() const noexcept override {
     const HostStamp now = monotonic_now();
-    return std::any_of(readers_.begin(), readers_.end(),
-                       [now](const Reader& reader) { return reader.image_due(now); });
+    return std::ranges::any_of(readers_,
+                               [now](const Reader& reader) { return reader.image_due(now); });
   }
   void send_images(std::string_view bytes) noexcept override {
     const HostStamp now = monotonic_now();
@@ -375,6 +320,58 @@ class UdpLineSocket final : public LineSocket {
 };
 
 }  // namespace
+
+bool HostPort::loopback() const {
+  return host == "localhost" || host == "::1" ||
+         (host.starts_with("127.") && host.find_first_not_of("0123456789.") == std::string::npos);
+}
+
+std::string HostPort::text() const {
+  return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
+                                             : fmt::format("[{}]:{}", host, port);
+}
+
+HostPort HostPort::link() const {
+  return host == "0.0.0.0" || host == "::" ? HostPort{machine_name(), port} : *this;
+}
+
+HostPort parse_host_port(std::string_view text, std::string_view key) {
+  const auto colon = std::min(text.rfind(':'), text.size());
+  std::string_view host = text.substr(0, colon);
+  const std::string_view digits = text.substr(std::min(colon + 1, text.size()));
+  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
+  if (bracketed) host = host.substr(1, host.size() - 2);
+  std::uint16_t port = 0;
+  const char* end = digits.data() + digits.size();
+  const auto [read, error] = std::from_chars(digits.data(), end, port);
+  if (host.empty() || bracketed != (host.find(':') != std::string_view::npos) ||
+      error != std::errc() || read != end || port == 0)
+    throw InputError(fmt::format(
+        "{}: \"{}\" is not an address; write HOST:PORT, e.g. 127.0.0.1:8080 or [::1]:8080", key,
+        text.substr(0, 120)));
+  return {std::string(host), port};
+}
+
+LineAddress parse_line_address(std::string_view text, std::string_view key) {
+  constexpr std::string_view kUnix = "unix://", kUdp = "udp://";
+  LineAddress out;
+  if (text.starts_with(kUdp)) {
+    out.kind = LineAddress::Kind::udp;
+    out.udp = parse_host_port(text.substr(kUdp.size()), key);
+    return out;
+  }
+  if (!text.starts_with(kUnix))
+    throw InputError(
+        fmt::format("{}: \"{}\" is not an address; write unix:///PATH or udp://HOST:PORT", key,
+                    text.substr(0, 120)));
+  out.path = text.substr(kUnix.size());
+  if (!out.path.starts_with('/') || out.path.find('\0') != std::string::npos ||
+      out.path.size() >= sizeof(sockaddr_un::sun_path))
+    throw InputError(
+        fmt::format("{}: the path of the socket must begin with / and have at most {} bytes", key,
+                    sizeof(sockaddr_un::sun_path) - 1));
+  return out;
+}
 
 std::unique_ptr<LineSocket> open_line_socket(const LineAddress& address, std::string_view key) {
   if (address.kind == LineAddress::Kind::udp)

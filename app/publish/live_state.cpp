@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -46,6 +45,21 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
 constexpr double kSilenceSeconds = 1, kMaxIntervals = 3;
 // In frames.
 constexpr double kSmoothing = 8;
+
+json enu_alignment_json(const PublishedEnuAlignment& alignment) {
+  const Transform& T = alignment.alignment.T_enu_world;
+  json rows = json::array();
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 4; ++j) rows.push_back(j < 3 ? T.R(i, j) : T.t(i));
+  return rows;
+}
+
+// In m. With longer steps a map no longer shows the path.
+constexpr float kMaxStep = 16;
+
+float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
 
 }  // namespace
 
@@ -184,18 +198,6 @@ json LiveState::calibration_json() const {
   return out;
 }
 
-namespace {
-
-json enu_alignment_json(const PublishedEnuAlignment& alignment) {
-  const Transform& T = alignment.alignment.T_enu_world;
-  json rows = json::array();
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 4; ++j) rows.push_back(j < 3 ? T.R(i, j) : T.t(i));
-  return rows;
-}
-
-}  // namespace
-
 json LiveState::place_json(const LiveTrail::Place& p) {
   json out{rounded(static_cast<double>(p.world[0]), 2), rounded(static_cast<double>(p.world[1]), 2),
            rounded(static_cast<double>(p.world[2]), 2), p.status};
@@ -224,17 +226,6 @@ json LiveState::since(std::uint64_t version, HostStamp now, double line_age_ms) 
   if (alignment_version_ > version) out["enu_alignment"] = enu_alignment_json(*alignment_);
   return out;
 }
-
-namespace {
-
-// In m. With longer steps a map no longer shows the path.
-constexpr float kMaxStep = 16;
-
-float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-}
-
-}  // namespace
 
 void LiveTrail::add(const Place& place) {
   if (places_.size() == kMax) thin(place.version);

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,7 +15,6 @@
 #include "app/session/session_totals.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
-#include "drivers/clock.hpp"
 
 namespace vergence::app {
 

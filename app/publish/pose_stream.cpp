@@ -43,8 +43,7 @@ void write_covariance(const char* key, const Covariance6& covariance, std::strin
 }
 
 bool finite(const Covariance6& covariance) {
-  return std::all_of(covariance.begin(), covariance.end(),
-                     [](float c) { return std::isfinite(c); });
+  return std::ranges::all_of(covariance, [](float c) { return std::isfinite(c); });
 }
 
 void write_covariances(const PoseSample& pose, std::string* line) {
@@ -56,6 +55,29 @@ void write_covariances(const PoseSample& pose, std::string* line) {
   write_covariance("covariance", pose.covariance, line);
   write_covariance("motion_covariance", pose.motion_covariance, line);
   fmt::format_to(std::back_inserter(*line), R"(,"length_sigma":{:.5f})", pose.length_sigma);
+}
+
+using nlohmann::json;
+
+/// A line of its type with `fields`. Names may contain invalid UTF-8.
+std::string format_line(const char* type, const json& fields) {
+  json line{{"version", kPoseStreamVersion}, {"type", type}};
+  line.update(fields);
+  return line.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+json rows(const Transform& T) {
+  json out = json::array();
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 4; ++j) out.push_back(j < 3 ? T.R(i, j) : T.t(i));
+  return out;
+}
+
+json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+const char* fix_name(FixStatus fix) noexcept {
+  constexpr std::array kNames{"none", "dead_reckoning", "2d", "3d"};
+  return kNames[static_cast<std::size_t>(fix)];
 }
 
 }  // namespace
@@ -101,33 +123,6 @@ void write_pose_line(const PoseSample& pose, const std::optional<EnuPose>& earth
   write_number(age_ms.value_or(std::numeric_limits<double>::quiet_NaN()), 3, line);
   fmt::format_to(out, ",\"dropped\":{}}}\n", dropped);
 }
-
-namespace {
-
-using nlohmann::json;
-
-/// A line of its type with `fields`. Names may contain invalid UTF-8.
-std::string format_line(const char* type, const json& fields) {
-  json line{{"version", kPoseStreamVersion}, {"type", type}};
-  line.update(fields);
-  return line.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
-}
-
-json rows(const Transform& T) {
-  json out = json::array();
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 4; ++j) out.push_back(j < 3 ? T.R(i, j) : T.t(i));
-  return out;
-}
-
-json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
-
-const char* fix_name(FixStatus fix) noexcept {
-  constexpr std::array kNames{"none", "dead_reckoning", "2d", "3d"};
-  return kNames[static_cast<std::size_t>(fix)];
-}
-
-}  // namespace
 
 std::string calibration_line(const CalibrationRecord& record, std::span<const std::string> names,
                              const calibration::CalibrationOptions& options) {

@@ -39,7 +39,7 @@ std::string read_token(const std::filesystem::path& file) {
         file.string()));
   in.getline(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(std::strlen(line.c_str()));
-  const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
+  const bool plain = std::ranges::all_of(line, [](char c) {
     return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' ||
            c == '_';
   });

@@ -63,15 +63,6 @@ class SystemDisk final : public Disk {
   void remove(const char* path) noexcept override { (void)::unlink(path); }
 };
 
-}  // namespace
-
-Disk& system_disk() noexcept {
-  static SystemDisk disk;
-  return disk;
-}
-
-namespace {
-
 constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
 // Opcode u8, length u64.
 constexpr std::size_t kRecordHead = 9;
@@ -104,6 +95,11 @@ void put_record(ByteWriter* out, Opcode opcode, const Content& content) noexcept
 }
 
 }  // namespace
+
+Disk& system_disk() noexcept {
+  static SystemDisk disk;
+  return disk;
+}
 
 void McapMessageHead::write(std::span<std::uint8_t, kSize> out) const noexcept {
   ByteWriter w(out);
@@ -293,7 +289,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   chunk.index.fill(kNone);
   for (std::size_t channel = 1; channel <= topics_.size(); ++channel) {
     const auto mine = [channel](const Entry& e) { return e.channel == channel; };
-    if (std::none_of(entries_.begin(), entries_.end(), mine)) continue;
+    if (std::ranges::none_of(entries_, mine)) continue;
     chunk.index[channel - 1] = static_cast<std::uint32_t>(index.size());
     put_record(&index, Opcode::message_index, [&](ByteWriter* out) {
       out->put(static_cast<std::uint16_t>(channel));

@@ -22,6 +22,30 @@ namespace {
   throw std::system_error(errno, std::generic_category(), what);
 }
 
+using namespace std::chrono_literals;
+
+// Interval of checking the queues.
+constexpr auto kPollInterval = 20ms;
+// Maximum time that a message waits for its chunk. With the polling interval and the write it stays
+// below 100 ms.
+constexpr std::int64_t kMaxWaitNs = 40'000'000;
+// Half of the readers' limit.
+constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;
+// Space of a queue that large messages leave free.
+constexpr std::size_t kSpare = std::size_t{1} << 20;
+// Poses take precedence; recorded data wait in memory.
+constexpr int kNice = 5;
+
+/// Fill limit of a queue while nothing is written. A producer that does not wait finds room for an
+/// image; one that waits (`hurried`) finds room for anything that fits.
+std::size_t room_left_at(const RecordRing& ring, bool hurried) noexcept {
+  return hurried ? ring.capacity() / 4 : ring.capacity() / 8 * 7;
+}
+
+McapMessageHead read_head(std::span<const std::uint8_t> records) noexcept {
+  return McapMessageHead::read(records.first<McapMessageHead::kSize>());
+}
+
 }  // namespace
 
 RecordRing::RecordRing(std::size_t bytes) {
@@ -70,34 +94,6 @@ std::span<const std::uint8_t> RecordRing::waiting() const noexcept {
 void RecordRing::release(std::size_t size) noexcept {
   head_.store(head_.load(std::memory_order_relaxed) + size, std::memory_order_release);
 }
-
-namespace {
-
-using namespace std::chrono_literals;
-
-// Interval of checking the queues.
-constexpr auto kPollInterval = 20ms;
-// Maximum time that a message waits for its chunk. With the polling interval and the write it stays
-// below 100 ms.
-constexpr std::int64_t kMaxWaitNs = 40'000'000;
-// Half of the readers' limit.
-constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;
-// Space of a queue that large messages leave free.
-constexpr std::size_t kSpare = std::size_t{1} << 20;
-// Poses take precedence; recorded data wait in memory.
-constexpr int kNice = 5;
-
-/// Fill limit of a queue while nothing is written. A producer that does not wait finds room for an
-/// image; one that waits (`hurried`) finds room for anything that fits.
-std::size_t room_left_at(const RecordRing& ring, bool hurried) noexcept {
-  return hurried ? ring.capacity() / 4 : ring.capacity() / 8 * 7;
-}
-
-McapMessageHead read_head(std::span<const std::uint8_t> records) noexcept {
-  return McapMessageHead::read(records.first<McapMessageHead::kSize>());
-}
-
-}  // namespace
 
 Recording::Recording(const std::filesystem::path& folder, const Options& options)
     : options_(options), sequences_(options.files.topics.size()), files_(folder, options.files) {

@@ -10,7 +10,6 @@
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/robust.hpp"
-#include "core/math/so3.hpp"
 
 namespace vergence::app::report {
 namespace {
@@ -48,8 +47,8 @@ void measure_distance(const Session& s, Analysis* a) {
 
 /// The first time that the drive confirmed the calibration in use.
 const Event* first_verification(const Session& s) {
-  const auto found = std::find_if(s.events.begin(), s.events.end(),
-                                  [](const Event& e) { return e.kind == "calibration_verified"; });
+  const auto found = std::ranges::find_if(
+      s.events, [](const Event& e) { return e.kind == "calibration_verified"; });
   return found == s.events.end() ? nullptr : &*found;
 }
 
@@ -67,8 +66,7 @@ void count_waiting(const Session& s, Analysis* a) {
       continue;
     constexpr std::array kWaits{Reason::uncalibrated, Reason::unverified_calibration};
     const std::string& reason = s.reasons[f.reason];
-    if (std::none_of(kWaits.begin(), kWaits.end(),
-                     [&reason](Reason r) { return reason == to_string(r); }))
+    if (std::ranges::none_of(kWaits, [&reason](Reason r) { return reason == to_string(r); }))
       continue;
     ++a->waited;
     ++a->waited_by_reason[f.reason];
@@ -215,7 +213,7 @@ void find_alignments(const Session& s, Analysis* a) {
   std::vector<Stamp> stamps;
   for (const Event& e : s.events)
     if (e.kind == "enu_alignment") stamps.push_back(e.stamp);
-  std::sort(stamps.begin(), stamps.end());
+  std::ranges::sort(stamps);
   a->realigned.assign(s.frames.size(), 0);
   std::size_t next = 0;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
@@ -275,10 +273,8 @@ void compare(const Session& s, Analysis* a) {
   for (auto* curve : {&a->horizontal_m, &a->vertical_m, &a->heading_deg, &a->estimate_x,
                       &a->estimate_y, &a->reference_x, &a->reference_y})
     curve->assign(s.frames.size(), kNone);
-  const bool placed =
-      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.placed; });
-  const bool ins =
-      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.has_ins; });
+  const bool placed = std::ranges::any_of(s.frames, [](const Frame& f) { return f.placed; });
+  const bool ins = std::ranges::any_of(s.frames, [](const Frame& f) { return f.has_ins; });
   if (placed) return add_ins(s, a);
   if (ins) {
     a->ins_unplaced = true;

@@ -7,14 +7,23 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <span>
 
 #include <fmt/format.h>
 
+#include "app/config/calibration_checks.hpp"
 #include "app/report/svg.hpp"
 
 namespace vergence::app::report {
 
 namespace {
+
+/// Advice for a pose's reason or the kind of a skipped frame's event, addressed to the user.
+struct Advice {
+  // Value in poses.csv or events.jsonl.
+  std::string_view word;
+  const char* message;
+};
 
 constexpr std::array kPose{
     Advice{"no_image",
@@ -48,10 +57,9 @@ constexpr std::array kPose{
         "Frames are missing: check cables, trigger and the disk's speed; see the events for when."},
     Advice{"map_reset",
            "After a gap the motion across it was extrapolated: do not use distances that span it."},
-    Advice{
-        "weak_geometry",
-        "The points constrained the pose poorly, or the window corrected it by much: expected in "
-        "tunnels, open fields and next to walls; elsewhere check that the cameras are in sync."},
+    Advice{"weak_geometry",
+           "The points constrained the pose poorly: expected in tunnels, open fields and next to "
+           "walls; elsewhere check that the cameras are in sync."},
     Advice{"dynamic_scene",
            "Much of the image moved independently, for example a bus: compare those sections with "
            "the map before use."},
@@ -103,21 +111,6 @@ constexpr std::array kSkipped{
            "supported."},
 };
 
-}  // namespace
-
-std::span<const Advice> pose_advice() noexcept { return kPose; }
-
-std::span<const Advice> skip_advice() noexcept { return kSkipped; }
-
-std::string_view advice_for(std::string_view word) noexcept {
-  for (const std::span<const Advice> table : {pose_advice(), skip_advice()})
-    for (const Advice& advice : table)
-      if (advice.word == word) return advice.message;
-  return {};
-}
-
-namespace {
-
 /// A drive of so many moving frames can confirm its calibration: 36 with a calibration given, 54
 /// from scratch (docs/calibration.md).
 inline constexpr std::size_t kFramesToVerify = 60;
@@ -126,7 +119,7 @@ inline constexpr std::size_t kFramesToVerify = 60;
 bool is_waiting(std::string_view reason) {
   constexpr std::array kWaiting{"unverified_calibration", "uncalibrated", "needs_motion",
                                 "needs_near_structure", "needs_texture"};
-  return std::find(kWaiting.begin(), kWaiting.end(), reason) != kWaiting.end();
+  return std::ranges::find(kWaiting, reason) != kWaiting.end();
 }
 
 struct Main {
@@ -260,14 +253,12 @@ class Assessor {
   }
 
   [[nodiscard]] std::size_t count(std::string_view kind) const {
-    return static_cast<std::size_t>(std::count_if(
-        s_.events.begin(), s_.events.end(), [kind](const Event& e) { return e.kind == kind; }));
+    return static_cast<std::size_t>(
+        std::ranges::count_if(s_.events, [kind](const Event& e) { return e.kind == kind; }));
   }
-  [[nodiscard]] bool any_accepted() const {
-    return std::any_of(s_.calibrations.begin(), s_.calibrations.end(), accepted);
-  }
+  [[nodiscard]] bool any_accepted() const { return std::ranges::any_of(s_.calibrations, accepted); }
   [[nodiscard]] bool all_posed() const {
-    return std::all_of(s_.frames.begin(), s_.frames.end(), [](const Frame& f) { return f.posed; });
+    return std::ranges::all_of(s_.frames, [](const Frame& f) { return f.posed; });
   }
   [[nodiscard]] std::string since_start(Stamp stamp) const {
     const Stamp first = s_.frames.empty() ? stamp : s_.frames.front().stamp;
@@ -286,7 +277,7 @@ class Assessor {
     }
     Main main =
         4 * most[0].frames >= a_.read || most[0].frames > most[1].frames ? most[0] : most[1];
-    for (const Advice& skip : skip_advice())
+    for (const Advice& skip : kSkipped)
       if (const std::size_t n = count(skip.word); n > main.frames) main = {skip.word, n};
     return main;
   }
@@ -322,8 +313,7 @@ class Assessor {
   }
 
   void assess_frames() {
-    const bool posed =
-        std::any_of(s_.frames.begin(), s_.frames.end(), [](const Frame& f) { return f.posed; });
+    const bool posed = std::ranges::any_of(s_.frames, [](const Frame& f) { return f.posed; });
     if (!posed && (a_.read == 0 || a_.ok > 0)) return find(Grade::bad, "no frame has a pose");
     if (a_.ok == 0) {
       unverified_ = ended_early();
@@ -369,8 +359,7 @@ class Assessor {
 
   /// One piece of advice per device.
   void assess_outages(const std::map<std::string, Outages>& outages) {
-    const bool holes =
-        !all_posed() || std::find(a_.breaks.begin(), a_.breaks.end(), 1) != a_.breaks.end();
+    const bool holes = !all_posed() || std::ranges::find(a_.breaks, 1) != a_.breaks.end();
     for (const auto& [device, o] : outages) {
       if (o.open) assess_open_outage(device, *o.open);
       if (holes && o.longest_s > kLong)
@@ -384,9 +373,11 @@ class Assessor {
     }
   }
 
-  /// A focal length that is not the one the images show: all distances are wrong by that ratio.
+  /// A focal length that is not, or probably not, the one the images show: all distances are wrong
+  /// by that ratio.
   void assess_focal_length() {
-    if (flag_at(s_.summary, "calibration.focal_length.contradicted") != true) return;
+    const bool contradicted = flag_at(s_.summary, "calibration.focal_length.contradicted") == true;
+    if (!contradicted && flag_at(s_.summary, "calibration.focal_length.doubted") != true) return;
     const auto metric = [&](const char* key) {
       return number_at(s_.summary, std::string("calibration.focal_length.") + key).value_or(0);
     };
@@ -395,14 +386,14 @@ class Assessor {
         sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", metric("measured_px"), sigma)
                   : fmt::format("{:.0f} px or even further off", metric("measured_px"));
     const std::string reason = fmt::format(
-        "the configured focal length, {:.0f} px, is contradicted by the images, which give {}; "
-        "distances are wrong by the same ratio",
-        metric("configured_px"), measured);
+        "the configured focal length, {:.0f} px, is {} by the images, which give {}; distances "
+        "are wrong by the same ratio",
+        metric("configured_px"), contradicted ? "contradicted" : "not supported", measured);
     constexpr const char* kAdvice =
         "Set the focal length in pixels of these images (cameras.N.intrinsics or --focal); "
         "resizing, cropping or rectification changes it.";
-    find(Grade::bad, reason, kAdvice);
-    give_up(reason, kAdvice);
+    find(contradicted ? Grade::bad : Grade::care, reason, kAdvice);
+    if (contradicted) give_up(reason, kAdvice);
   }
 
   /// The last measurement at the depth where a rig of that baseline is evaluated, if the depth is
@@ -452,8 +443,9 @@ class Assessor {
            last->reason.empty() ? "" : "The last calibration was rejected: " + last->reason + ".");
     }
     for (const Advice& advice : kCauses)
-      if (std::any_of(s_.calibrations.begin(), s_.calibrations.end(),
-                      [&advice](const auto& c) { return c.accepted && c.cause == advice.word; }))
+      if (std::ranges::any_of(s_.calibrations, [&advice](const auto& c) {
+            return c.accepted && c.cause == advice.word;
+          }))
         advise(advice.message);
   }
 
@@ -478,8 +470,8 @@ class Assessor {
   /// Findings from events about calibrations and lengths.
   void advise_on_events() {
     const auto first = [this](std::string_view kind) {
-      const auto event = std::find_if(s_.events.begin(), s_.events.end(),
-                                      [kind](const Event& e) { return e.kind == kind; });
+      const auto event =
+          std::ranges::find_if(s_.events, [kind](const Event& e) { return e.kind == kind; });
       return event == s_.events.end() ? nullptr : &*event;
     };
     if (const Event* event = first("calibration_save_failed"))
@@ -543,9 +535,8 @@ class Assessor {
           "{:.0f} runtime allocations, which must not happen: please report it with this session.",
           n));
     const double p99 = number_at(s_.summary, "timing_ms.p99").value_or(0) * 1e-3;
-    const auto slow = std::count_if(s_.frames.begin(), s_.frames.end(), [this](const Frame& f) {
-      return f.estimate_ms * 1e-3 > a_.interval_s;
-    });
+    const auto slow = std::ranges::count_if(
+        s_.frames, [this](const Frame& f) { return f.estimate_ms * 1e-3 > a_.interval_s; });
     if (a_.interval_s > 0 &&
         (p99 > a_.interval_s ||
          static_cast<double>(slow) > kFewOverBudget * static_cast<double>(a_.read)))
@@ -555,14 +546,14 @@ class Assessor {
   }
 
   void advise_by_reasons() {
-    for (const Advice& skip : skip_advice())
+    for (const Advice& skip : kSkipped)
       if (const std::size_t n = count(skip.word); n > 0)
         advise(fmt::format("{} ({} frame{} skipped): {}", skip.word, n, n == 1 ? "" : "s",
                            skip.message));
-    for (const Advice& advice : pose_advice()) {
+    for (const Advice& advice : kPose) {
       // Frames that were doubted for a moment, or a calibration that was asked for, are no knock.
       if (advice.word == "recalibrating" && count("rig_changed") == 0) continue;
-      const auto found = std::find(s_.reasons.begin(), s_.reasons.end(), advice.word);
+      const auto found = std::ranges::find(s_.reasons, advice.word);
       if (found == s_.reasons.end()) continue;
       const auto i = static_cast<std::size_t>(found - s_.reasons.begin());
       const std::size_t frames =
@@ -604,16 +595,17 @@ class Assessor {
 
 }  // namespace
 
+std::string_view advice_for(std::string_view word) noexcept {
+  for (const std::span<const Advice> table :
+       {std::span<const Advice>(kPose), std::span<const Advice>(kSkipped)})
+    for (const Advice& advice : table)
+      if (advice.word == word) return advice.message;
+  return {};
+}
+
 const char* spaced(Grade grade) noexcept {
-  switch (grade) {
-    case Grade::good:
-      return "Good";
-    case Grade::care:
-      return "Usable with care";
-    case Grade::bad:
-      return "Do not use";
-  }
-  return "";
+  constexpr std::array kTexts{"Good", "Usable with care", "Do not use"};
+  return kTexts.at(static_cast<std::size_t>(grade));
 }
 
 Assessment assess(const Session& session, const Analysis& analysis) {

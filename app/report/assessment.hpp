@@ -1,6 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,19 +9,7 @@
 
 namespace vergence::app::report {
 
-/// Advice for a pose's reason or the kind of a skipped frame's event, addressed to
-/// the user.
-struct Advice {
-  /// Value in poses.csv or events.jsonl.
-  std::string_view word;
-  const char* message;
-};
-
-/// Reasons of poses.csv.
-[[nodiscard]] std::span<const Advice> pose_advice() noexcept;
-/// Kinds of events.jsonl about frames of a recording that were not read.
-[[nodiscard]] std::span<const Advice> skip_advice() noexcept;
-/// Empty for an unknown value.
+/// Advice for a pose's reason or the kind of a skipped frame's event; empty for an unknown value.
 [[nodiscard]] std::string_view advice_for(std::string_view word) noexcept;
 
 enum class Grade : std::uint8_t { good, care, bad };

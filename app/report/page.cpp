@@ -14,7 +14,6 @@
 #include "app/report/style.hpp"
 #include "app/report/svg.hpp"
 #include "core/math/angle.hpp"
-#include "core/math/so3.hpp"
 
 namespace vergence::app::report {
 
@@ -111,12 +110,6 @@ std::string event_row(const Session& s, const EventRun& run) {
                      escape(run.first->kind, 60), escape(run.first->message), many);
 }
 
-}  // namespace
-
-std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
-
-namespace {
-
 /// Counts, errors, times, calibration, memory, drops; a figure that does not exist has no row.
 std::string metrics_table(const Session& session, const Analysis& analysis) {
   MetricTable f;
@@ -173,10 +166,8 @@ std::string health_table(const Session& session) {
                            health_row(session.summary, "at the end", "calibration.");
   if (rows.empty()) return "";
   return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>rating</th><th "
-         "class=\"n\">1 m</th><th class=\"n\">5 "
-         "m</th><th class=\"n\">10 "
-         "m</th>"
-         "<th class=\"n\">20 m</th><th class=\"n\">50 m</th></tr>\n" +
+         "class=\"n\">1 m</th><th class=\"n\">5 m</th><th class=\"n\">10 m</th><th class=\"n\">20 "
+         "m</th><th class=\"n\">50 m</th></tr>\n" +
          rows +
          "</table></div>\n<p class=\"soft\">Predicted depth error (1 σ) at each distance, from the "
          "uncertainty of the calibration.</p>\n";
@@ -186,10 +177,9 @@ std::string health_table(const Session& session) {
 std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMax = 60;
   std::string out =
-      "<table "
-      "class=\"stack\"><tr><th>time, "
-      "s</th><th>outcome</th><th>cause</th><th>latency</th><th>held-out "
-      "RMS</th><th>depth error</th><th>reason</th></tr>\n";
+      "<table class=\"stack\"><tr><th>time, "
+      "s</th><th>outcome</th><th>cause</th><th>latency</th><th>held-out RMS</th><th>depth "
+      "error</th><th>reason</th></tr>\n";
   // There is one row for all cameras if they are decided together.
   std::vector<const CalibrationRow*> rows;
   for (const CalibrationRow& c : session.calibrations)
@@ -201,7 +191,7 @@ std::string calibrations_table(const Session& session) {
   for (std::size_t i = n > kMax ? n - kMax : 0; i < n; ++i) {
     const CalibrationRow& c = *rows[i];
     std::string cause = c.cause;
-    std::replace(cause.begin(), cause.end(), '_', ' ');
+    std::ranges::replace(cause, '_', ' ');
     const std::string after = c.decided ? fmt::format("{:.0f} frames", c.latency_frames) : "";
     const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
     const std::string why =
@@ -212,8 +202,7 @@ std::string calibrations_table(const Session& session) {
                                        : "rejected";
     out += fmt::format(
         "<tr><td class=\"t\">{}</td> <td class=\"k\">{}</td> <td class=\"w\">{}</td> <td "
-        "class=\"w\">{}</td> <td "
-        "class=\"w\">{}</td> <td>{}</td> <td>{}</td></tr>\n",
+        "class=\"w\">{}</td> <td class=\"w\">{}</td> <td>{}</td> <td>{}</td></tr>\n",
         event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c),
         depth_text(c), escape(why));
   }
@@ -334,8 +323,8 @@ std::string assessment_section(const Session& s, const Analysis& a, const Assess
 std::string map_section(const Session& s, const Analysis& a) {
   const std::string map = map_plot(a, s.frames);
   if (map.empty()) return section("", "Map", "<p>No pose to draw.</p>");
-  const bool has_reference = std::any_of(a.reference_x.begin(), a.reference_x.end(),
-                                         [](double v) { return std::isfinite(v); });
+  const bool has_reference =
+      std::ranges::any_of(a.reference_x, [](double v) { return std::isfinite(v); });
   std::string legend =
       "<p class=\"soft legend\"><span><i class=\"key k-ours\"></i>estimate (● start, ■ end)</span>";
   if (has_reference)
@@ -343,11 +332,10 @@ std::string map_section(const Session& s, const Analysis& a) {
                           a.map_is_enu ? "INS" : "reference");
   if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>estimate, degraded</span>";
   if (a.lost > 0) legend += "<span>× lost from here</span>";
-  legend +=
-      a.map_is_enu
-          ? "<br/>View from above, north up; the bar is the scale. The estimate starts at the ENU "
-            "alignment"
-          : "<br/>View from above; the bar is the scale. Gaps between the lines are errors.";
+  legend += a.map_is_enu
+                ? "<br/>View from above, north up; the bar is the scale. The estimate starts at "
+                  "the ENU alignment"
+                : "<br/>View from above; the bar is the scale. Gaps between the lines are errors.";
   if (a.map_is_enu) legend += a.placed_s.size() > 1 ? " and again at each later one." : ".";
   return section("tall", "Map", map + legend + "</p>");
 }
@@ -393,17 +381,17 @@ std::string running_plots(const Session& s, const Analysis& a) {
          curve_figure({"Inliers, points", inliers, "curve s-ours", true},
                       "Points that constrain the pose; few of them make a pose degraded or lost.",
                       s, a) +
-         curve_figure(
-             {"Processing time per frame, ms", times, "curve s-ours", true},
-             "Time of the estimator, from the decoded images to the pose; it must stay below the "
-             "frame interval.",
-             s, a);
+         curve_figure({"Processing time per frame, ms", times, "curve s-ours", true},
+                      "Time of the estimator, from the decoded images to the pose; it must stay "
+                      "below the frame interval.",
+                      s, a);
 }
 
 /// A single one that the drive began with is no curve.
 bool changed(const Session& s, int camera) {
-  return std::any_of(s.calibrations.begin(), s.calibrations.end(),
-                     [camera](const CalibrationRow& c) { return c.camera == camera && c.decided; });
+  return std::ranges::any_of(s.calibrations, [camera](const CalibrationRow& c) {
+    return c.camera == camera && c.decided;
+  });
 }
 
 void calibration_sections(const Session& s, const Analysis& a, std::string* out) {
@@ -447,13 +435,15 @@ std::string footer(const Session& s) {
 
 }  // namespace
 
+std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
+
 std::string page_html(const Session& session, const Analysis& analysis,
                       const Assessment& assessment) {
   const std::string title = escape(title_line(session, analysis), 400);
   std::string out =
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>"
-      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"/>"
-      "<link rel=\"icon\" href=\"data:,\"/><title>" +
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" "
+      "content=\"width=device-width,initial-scale=1\"/><link rel=\"icon\" "
+      "href=\"data:,\"/><title>" +
       title + "</title><style>" + style_sheet() + "</style></head><body><main>\n";
   out += "<h1>" + title + "</h1>\n" + assessment_section(session, analysis, assessment) +
          "<div class=\"grid\">\n";

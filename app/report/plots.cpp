@@ -26,16 +26,48 @@ struct PlotBox {
   [[nodiscard]] double y(double v) const noexcept {
     return bottom - (v - y0) / (y1 - y0) * (bottom - top);
   }
-  [[nodiscard]] Line line(const Line& data) const;
-  void draw_time_axis(Svg* svg) const;
-  void draw_y_axis(Svg* svg) const;
+  [[nodiscard]] Line line(const Line& data) const {
+    Line placed;
+    placed.reserve(data.size());
+    for (const Point& p : data) placed.push_back({x(p.x), y(p.y)});
+    return placed;
+  }
+  void draw_time_axis(Svg* svg) const {
+    constexpr int kMax = 6;
+    const auto ticks = time_ticks(x0, x1, kMax);
+    const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 1;
+    for (const double t : ticks) {
+      const double at = x(t);
+      svg->line("tick", at, top, at, bottom);
+      // The outer ones keep clear of the other axis's numbers and of the edge.
+      const bool first = at<left + 14, last = at> right - 14;
+      const Anchor anchor = first ? Anchor::start : last ? Anchor::end : Anchor::middle;
+      svg->text("", anchor, first ? left - 3 : std::min(at, right + 10), bottom + 16,
+                time_label(t, step));
+    }
+    svg->line("axis", left, bottom, right, bottom);
+    svg->text("", Anchor::middle, (left + right) / 2, bottom + 32,
+              x1 - x0 > 60 ? "time, min:s" : "time, s");
+  }
+  void draw_y_axis(Svg* svg) const {
+    const auto ticks = nice_ticks(y0, y1, 5);
+    const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : y1 - y0;
+    for (const double t : ticks) {
+      svg->line(t == 0.0 && y0 < 0 ? "axis" : "tick", left, y(t), right, y(t));
+      svg->text("", Anchor::end, left - 6, y(t) + 4.5, tick_label(t, step));
+    }
+    svg->line("axis", left, top, left, bottom);
+  }
   /// Sets y0 and y1 around values with some air; equal values get a box, too. from_zero: y0 is 0.
-  void fit_y(double low, double high, bool from_zero);
+  void fit_y(double low, double high, bool from_zero) {
+    if (from_zero) low = std::min(0.0, low);
+    // Minimum range that doubles can resolve.
+    const double least = std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;
+    const double air = std::max(0.06 * (high - low), least);
+    y0 = from_zero && low == 0.0 ? 0.0 : low - air;
+    y1 = high + air;
+  }
 };
-
-}  // namespace
-
-namespace {
 
 // Number of columns of a curve, two per unit of the drawing, which is sharp on high-resolution
 // screens.
@@ -67,86 +99,6 @@ void draw_holes(const PlotBox& box, std::span<const double> time, std::span<cons
     drawn_to = to;
   }
 }
-
-}  // namespace
-
-/// From the first frame to the last along x.
-[[nodiscard]] static PlotBox time_box(const Analysis& a) {
-  PlotBox box;
-  // The range is never empty.
-  box.x1 = a.duration_s > 0 ? a.duration_s : 1;
-  return box;
-}
-
-Line PlotBox::line(const Line& data) const {
-  Line placed;
-  placed.reserve(data.size());
-  for (const Point& p : data) placed.push_back({x(p.x), y(p.y)});
-  return placed;
-}
-
-void PlotBox::fit_y(double low, double high, bool from_zero) {
-  if (from_zero) low = std::min(0.0, low);
-  // Minimum range that doubles can resolve.
-  const double least = std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;
-  const double air = std::max(0.06 * (high - low), least);
-  y0 = from_zero && low == 0.0 ? 0.0 : low - air;
-  y1 = high + air;
-}
-
-void PlotBox::draw_time_axis(Svg* svg) const {
-  constexpr int kMax = 6;
-  const auto ticks = time_ticks(x0, x1, kMax);
-  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 1;
-  for (const double t : ticks) {
-    const double at = x(t);
-    svg->line("tick", at, top, at, bottom);
-    // The outer ones keep clear of the other axis's numbers and of the edge.
-    const bool first = at<left + 14, last = at> right - 14;
-    const Anchor anchor = first ? Anchor::start : last ? Anchor::end : Anchor::middle;
-    svg->text("", anchor, first ? left - 3 : std::min(at, right + 10), bottom + 16,
-              time_label(t, step));
-  }
-  svg->line("axis", left, bottom, right, bottom);
-  svg->text("", Anchor::middle, (left + right) / 2, bottom + 32,
-            x1 - x0 > 60 ? "time, min:s" : "time, s");
-}
-
-void PlotBox::draw_y_axis(Svg* svg) const {
-  const auto ticks = nice_ticks(y0, y1, 5);
-  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : y1 - y0;
-  for (const double t : ticks) {
-    svg->line(t == 0.0 && y0 < 0 ? "axis" : "tick", left, y(t), right, y(t));
-    svg->text("", Anchor::end, left - 6, y(t) + 4.5, tick_label(t, step));
-  }
-  svg->line("axis", left, top, left, bottom);
-}
-
-std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
-                       std::span<const Frame> frames) {
-  PlotBox box = time_box(analysis);
-  double low = 0, high = 0;
-  bool any = false;
-  for (const double v : plot.y) {
-    if (!std::isfinite(v)) continue;
-    low = any ? std::min(low, v) : v;
-    high = any ? std::max(high, v) : v;
-    any = true;
-  }
-  if (!any) return {};
-  box.fit_y(low, high, plot.from_zero);
-  Svg svg(kPlotWidth, kPlotHeight, plot.description);
-  draw_holes(box, analysis.time_s, frames, &svg);
-  box.draw_time_axis(&svg);
-  box.draw_y_axis(&svg);
-  svg.lines(plot.css, on_paper(box, decimate(analysis.time_s, plot.y, analysis.breaks, box.x0,
-                                             box.x1, kColumns)));
-  return std::move(svg).finish();
-}
-
-// ---- bands
-
-namespace {
 
 struct Lane {
   std::string name;
@@ -204,7 +156,7 @@ std::vector<Lane> make_lanes(const Session& s, const Analysis& a, const PlotBox&
     auto& lane = states[static_cast<std::size_t>(f.state)];
     if (!lane) {
       std::string name(to_string(f.state));
-      std::replace(name.begin(), name.end(), '_', ' ');
+      std::ranges::replace(name, '_', ' ');
       lane = empty(name, kStateCss[static_cast<std::size_t>(f.state)]);
     }
     mark(&*lane, box, a, i);
@@ -227,33 +179,6 @@ void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
     last = at;
   }
 }
-
-}  // namespace
-
-std::string bands_plot(const Session& session, const Analysis& analysis) {
-  if (analysis.read == 0) return {};
-  PlotBox box = time_box(analysis);
-  box.left = kBandLeft;
-  box.top = 2;
-  const std::vector<Lane> lanes = make_lanes(session, analysis, box);
-  constexpr std::size_t kStatuses = 3;
-  // Distance between statuses, states and events.
-  constexpr double kApart = 8;
-  const double events_top = box.top + kLaneHeight * static_cast<double>(lanes.size()) + 2 * kApart;
-  box.bottom = events_top + kLaneHeight;
-  Svg svg(kPlotWidth, box.bottom + 36,
-          "Status of the frames, state of the estimator and events over time");
-  for (std::size_t i = 0; i < lanes.size(); ++i)
-    draw_lane(lanes[i], box,
-              box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0), &svg);
-  draw_events(session, box, events_top, &svg);
-  box.draw_time_axis(&svg);
-  return std::move(svg).finish();
-}
-
-// ---- calibration
-
-namespace {
 
 constexpr double kMillimetres = 1e3;
 
@@ -334,28 +259,6 @@ void draw_verification(double at_s, const PlotBox& box, Svg* svg) {
   svg->text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5),
             box.top + 11, "verified");
 }
-
-}  // namespace
-
-std::string calibration_plot(const Session& session, const Analysis& analysis, int camera,
-                             int component) {
-  const CalibrationCurve curve = calibration_curve(session, analysis, camera, component);
-  if (curve.empty()) return {};
-  PlotBox box = time_box(analysis);
-  // The left margin has room for four decimals.
-  box.left = 74;
-  fit_calibration(curve, &box);
-  Svg svg(kPlotWidth, kPlotHeight, "A calibration parameter over time with its 2 sigma band");
-  box.draw_time_axis(&svg);
-  box.draw_y_axis(&svg);
-  if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
-  draw_calibration(curve, box, &svg);
-  return std::move(svg).finish();
-}
-
-// ---- map
-
-namespace {
 
 // Sizes in the drawing. kFoot is the room for the scale bar.
 constexpr double kMargin = 16, kFoot = 38, kMin = 190, kMax = 420;
@@ -468,6 +371,73 @@ void draw_north(const MapScale& s, Svg* svg) {
 }
 
 }  // namespace
+
+/// From the first frame to the last along x.
+[[nodiscard]] static PlotBox time_box(const Analysis& a) {
+  PlotBox box;
+  // The range is never empty.
+  box.x1 = a.duration_s > 0 ? a.duration_s : 1;
+  return box;
+}
+
+std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
+                       std::span<const Frame> frames) {
+  PlotBox box = time_box(analysis);
+  double low = 0, high = 0;
+  bool any = false;
+  for (const double v : plot.y) {
+    if (!std::isfinite(v)) continue;
+    low = any ? std::min(low, v) : v;
+    high = any ? std::max(high, v) : v;
+    any = true;
+  }
+  if (!any) return {};
+  box.fit_y(low, high, plot.from_zero);
+  Svg svg(kPlotWidth, kPlotHeight, plot.description);
+  draw_holes(box, analysis.time_s, frames, &svg);
+  box.draw_time_axis(&svg);
+  box.draw_y_axis(&svg);
+  svg.lines(plot.css, on_paper(box, decimate(analysis.time_s, plot.y, analysis.breaks, box.x0,
+                                             box.x1, kColumns)));
+  return std::move(svg).finish();
+}
+
+std::string bands_plot(const Session& session, const Analysis& analysis) {
+  if (analysis.read == 0) return {};
+  PlotBox box = time_box(analysis);
+  box.left = kBandLeft;
+  box.top = 2;
+  const std::vector<Lane> lanes = make_lanes(session, analysis, box);
+  constexpr std::size_t kStatuses = 3;
+  // Distance between statuses, states and events.
+  constexpr double kApart = 8;
+  const double events_top = box.top + kLaneHeight * static_cast<double>(lanes.size()) + 2 * kApart;
+  box.bottom = events_top + kLaneHeight;
+  Svg svg(kPlotWidth, box.bottom + 36,
+          "Status of the frames, state of the estimator and events over time");
+  for (std::size_t i = 0; i < lanes.size(); ++i)
+    draw_lane(lanes[i], box,
+              box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0), &svg);
+  draw_events(session, box, events_top, &svg);
+  box.draw_time_axis(&svg);
+  return std::move(svg).finish();
+}
+
+std::string calibration_plot(const Session& session, const Analysis& analysis, int camera,
+                             int component) {
+  const CalibrationCurve curve = calibration_curve(session, analysis, camera, component);
+  if (curve.empty()) return {};
+  PlotBox box = time_box(analysis);
+  // The left margin has room for four decimals.
+  box.left = 74;
+  fit_calibration(curve, &box);
+  Svg svg(kPlotWidth, kPlotHeight, "A calibration parameter over time with its 2 sigma band");
+  box.draw_time_axis(&svg);
+  box.draw_y_axis(&svg);
+  if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
+  draw_calibration(curve, box, &svg);
+  return std::move(svg).finish();
+}
 
 std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
   Bounds bounds;

@@ -81,8 +81,6 @@ class FileLines {
   bool begun_ = false, truncated_ = false;
 };
 
-using Column = std::optional<std::size_t>;
-
 /// Rows of a table whose first line names the columns, commas between, nothing quoted: what the
 /// recorder writes. A row with another number of fields than the head has has empty ones.
 class CsvRows {
@@ -95,26 +93,25 @@ class CsvRows {
     names_.assign(names.begin(), names.end());
     fields_.resize(names_.size());
   }
-  /// Position of a column by its name; nothing when the table lacks it.
-  [[nodiscard]] Column column(std::string_view name) const noexcept {
-    const auto found = std::find(names_.begin(), names_.end(), name);
-    return found == names_.end() ? Column() : static_cast<std::size_t>(found - names_.begin());
-  }
-  /// False at the end.
+  /// Splits the next row.
   void set(std::string_view line) {
-    if (split(line, ',', fields_) != names_.size())
-      std::fill(fields_.begin(), fields_.end(), std::string_view());
+    if (split(line, ',', fields_) != names_.size()) std::ranges::fill(fields_, std::string_view());
+  }
+  [[nodiscard]] bool has(std::string_view column) const noexcept {
+    return std::ranges::find(names_, column) != names_.end();
   }
   /// Field of the last row; empty if the column does not exist.
-  [[nodiscard]] std::string_view text(Column column) const noexcept {
-    return column ? fields_[*column] : std::string_view{};
+  [[nodiscard]] std::string_view text(std::string_view column) const noexcept {
+    const auto found = std::ranges::find(names_, column);
+    return found == names_.end() ? std::string_view()
+                                 : fields_[static_cast<std::size_t>(found - names_.begin())];
   }
   /// Nothing: empty, or not one finite number.
-  [[nodiscard]] std::optional<double> number(Column column) const noexcept {
+  [[nodiscard]] std::optional<double> number(std::string_view column) const noexcept {
     double value = 0;
     return parse_number(text(column), &value) ? std::optional(value) : std::nullopt;
   }
-  [[nodiscard]] std::optional<std::int64_t> integer(Column column) const noexcept {
+  [[nodiscard]] std::optional<std::int64_t> integer(std::string_view column) const noexcept {
     return parse_integer(text(column));
   }
 
@@ -220,7 +217,7 @@ std::optional<Enum> word_to_enum(std::string_view word, int count) {
 }
 
 std::uint16_t reason_index(std::string_view word, Session* session) {
-  const auto found = std::find(session->reasons.begin(), session->reasons.end(), word);
+  const auto found = std::ranges::find(session->reasons, word);
   if (found != session->reasons.end())
     return static_cast<std::uint16_t>(found - session->reasons.begin());
   if (session->reasons.size() >= kMaxReasons) return 0;
@@ -229,75 +226,57 @@ std::uint16_t reason_index(std::string_view word, Session* session) {
 }
 
 bool near_enough(std::span<const double> numbers) {
-  return std::all_of(numbers.begin(), numbers.end(),
-                     [](double v) { return std::abs(v) <= kFarthest; });
+  return std::ranges::all_of(numbers, [](double v) { return std::abs(v) <= kFarthest; });
 }
 
-/// The columns of poses.csv that the page needs.
-class PoseColumns {
- public:
-  explicit PoseColumns(const CsvRows& rows) {
-    const auto find = [&rows](const char* name) { return rows.column(name); };
-    stamp_ = find("stamp_ns"), frame_ = find("frame"), state_ = find("state"),
-    status_ = find("status"), reason_ = find("reason");
-    inliers_ = find("inliers"), estimate_ms_ = find("estimate_ms"),
-    error_heading_ = find("error_heading_deg");
-    world_ = {find("x"), find("y"), find("z"), find("qx"), find("qy"), find("qz"), find("qw")};
-    enu_ = {find("east"), find("north"), find("up")};
-    ins_ = {find("ins_east"), find("ins_north"), find("ins_up")};
-    error_ = {find("error_east_m"), find("error_north_m"), find("error_up_m")};
-  }
+bool set_pose(const std::array<double, 7>& v, Transform* T) {
+  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
+  if (!near_enough(v) || !(q.norm() > 0.5) || !(q.norm() < 2.0)) return false;
+  *T = {q.normalized().toRotationMatrix(), Vec3(v[0], v[1], v[2])};
+  return true;
+}
 
-  /// Nothing: the row has no stamp.
-  [[nodiscard]] std::optional<Frame> read(const CsvRows& rows, Session* session) const {
-    const auto stamp = rows.integer(stamp_);
-    const auto state = word_to_enum<State>(rows.text(state_), 6);
-    const auto status = word_to_enum<PoseStatus>(rows.text(status_), 3);
-    if (!stamp || !state || !status) return std::nullopt;
-    Frame f;
-    f.stamp = Stamp(*stamp);
-    f.state = *state;
-    f.status = *status;
-    f.number = rows.integer(frame_).value_or(-1);
-    f.reason = reason_index(rows.text(reason_), session);
-    std::array<double, 7> world{};
-    f.posed = numbers(rows, world_, &world) && f.status != PoseStatus::lost &&
-              set_pose(world, &f.T_world_left);
-    f.placed = numbers(rows, enu_, &f.enu);
-    f.has_ins = numbers(rows, ins_, &f.ins);
-    f.compared = numbers(rows, error_, &f.error);
-    f.error_heading_deg = rows.number(error_heading_).value_or(kNone);
-    f.inliers = static_cast<int>(std::clamp(rows.number(inliers_).value_or(-1.0), -1.0, 1e6));
-    f.estimate_ms = rows.number(estimate_ms_).value_or(kNone);
-    return f;
+/// Numbers of the columns `prefix` + each of `names`. False, without a change of *out: one is
+/// missing or too large.
+template <std::size_t N>
+bool numbers(const CsvRows& rows, const std::string& prefix,
+             const std::array<const char*, N>& names, std::array<double, N>* out) {
+  std::array<double, N> values{};
+  for (std::size_t i = 0; i < N; ++i) {
+    const auto v = rows.number(prefix + names[i]);
+    if (!v) return false;
+    values[i] = *v;
   }
+  if (!near_enough(values)) return false;
+  *out = values;
+  return true;
+}
 
-  [[nodiscard]] static bool set_pose(const std::array<double, 7>& v, Transform* T) {
-    const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-    if (!near_enough(v) || !(q.norm() > 0.5) || !(q.norm() < 2.0)) return false;
-    *T = {q.normalized().toRotationMatrix(), Vec3(v[0], v[1], v[2])};
-    return true;
-  }
-
- private:
-  template <std::size_t N>
-  [[nodiscard]] static bool numbers(const CsvRows& rows, const std::array<Column, N>& columns,
-                                    std::array<double, N>* out) {
-    std::array<double, N> values{};
-    for (std::size_t i = 0; i < N; ++i) {
-      const auto v = rows.number(columns[i]);
-      if (!v) return false;
-      values[i] = *v;
-    }
-    if (!near_enough(values)) return false;
-    *out = values;
-    return true;
-  }
-
-  Column stamp_, frame_, state_, status_, reason_, inliers_, estimate_ms_, error_heading_;
-  std::array<Column, 7> world_;
-  std::array<Column, 3> enu_, ins_, error_;
-};
+/// Nothing: the row has no stamp.
+std::optional<Frame> read_frame(const CsvRows& rows, Session* session) {
+  constexpr std::array kWorld{"x", "y", "z", "qx", "qy", "qz", "qw"};
+  constexpr std::array kEnu{"east", "north", "up"}, kError{"east_m", "north_m", "up_m"};
+  const auto stamp = rows.integer("stamp_ns");
+  const auto state = word_to_enum<State>(rows.text("state"), 6);
+  const auto status = word_to_enum<PoseStatus>(rows.text("status"), 3);
+  if (!stamp || !state || !status) return std::nullopt;
+  Frame f;
+  f.stamp = Stamp(*stamp);
+  f.state = *state;
+  f.status = *status;
+  f.number = rows.integer("frame").value_or(-1);
+  f.reason = reason_index(rows.text("reason"), session);
+  std::array<double, 7> world{};
+  f.posed = numbers(rows, "", kWorld, &world) && f.status != PoseStatus::lost &&
+            set_pose(world, &f.T_world_left);
+  f.placed = numbers(rows, "", kEnu, &f.enu);
+  f.has_ins = numbers(rows, "ins_", kEnu, &f.ins);
+  f.compared = numbers(rows, "error_", kError, &f.error);
+  f.error_heading_deg = rows.number("error_heading_deg").value_or(kNone);
+  f.inliers = static_cast<int>(std::clamp(rows.number("inliers").value_or(-1.0), -1.0, 1e6));
+  f.estimate_ms = rows.number("estimate_ms").value_or(kNone);
+  return f;
+}
 
 std::optional<StampedPose> tum_pose(std::string_view line) {
   std::array<std::string_view, 8> fields;
@@ -307,7 +286,7 @@ std::optional<StampedPose> tum_pose(std::string_view line) {
   StampedPose pose;
   for (std::size_t i = 0; i < v.size(); ++i)
     if (!parse_number(fields[i + 1], &v[i])) return std::nullopt;
-  if (!stamp || !PoseColumns::set_pose(v, &pose.T_world_body)) return std::nullopt;
+  if (!stamp || !set_pose(v, &pose.T_world_body)) return std::nullopt;
   pose.stamp = Stamp(*stamp);
   return pose;
 }
@@ -316,11 +295,10 @@ void read_poses(const fs::path& folder, Session* session) {
   auto lines = open_part(folder / "poses.csv", "there are no poses", session);
   if (!lines) return;
   CsvRows rows(&*lines);
-  if (!rows.column("stamp_ns")) {
+  if (!rows.has("stamp_ns")) {
     session->missing.emplace_back("poses.csv has no line with column names: there are no poses");
     return;
   }
-  const PoseColumns columns(rows);
   // Approximate length of a line in bytes.
   constexpr std::uintmax_t kLine = 200;
   std::error_code error;
@@ -328,7 +306,7 @@ void read_poses(const fs::path& folder, Session* session) {
     session->frames.reserve(std::min(kMaxFrames, static_cast<std::size_t>(size / kLine)));
   const auto parse = [&](std::string_view line) {
     rows.set(line);
-    return columns.read(rows, session);
+    return read_frame(rows, session);
   };
   read_rows("poses.csv", kMaxFrames, &*lines, parse, &session->frames, session);
 }
@@ -339,33 +317,21 @@ void read_reference(const fs::path& folder, Session* session) {
   read_rows("reference.tum", kMaxFrames, &*lines, tum_pose, &session->reference, session);
 }
 
-bool read_six(const CsvRows& rows, const char* prefix, std::array<double, 6>* out) {
-  constexpr std::array<const char*, 6> kAxes{"rx", "ry", "rz", "tx", "ty", "tz"};
-  for (std::size_t i = 0; i < 6; ++i) {
-    const auto v = rows.number(rows.column(std::string(prefix) + kAxes[i]));
-    if (!v || std::abs(*v) > 1e6) return false;
-    (*out)[i] = *v;
-  }
-  return true;
-}
-
 std::optional<CalibrationRow> read_calibration_row(const CsvRows& rows) {
-  const auto text = [&rows](const char* name) { return rows.text(rows.column(name)); };
-  const auto number = [&rows](const char* name) {
-    return rows.number(rows.column(name)).value_or(kNone);
-  };
+  constexpr std::array kAxes{"rx", "ry", "rz", "tx", "ty", "tz"};
+  const auto number = [&rows](const char* name) { return rows.number(name).value_or(kNone); };
   CalibrationRow c;
-  const auto stamp = rows.integer(rows.column("stamp_ns"));
-  const auto camera = rows.integer(rows.column("camera"));
-  if (!stamp || !camera || *camera < 1 || *camera >= kMaxCameras || !read_six(rows, "", &c.value))
+  const auto stamp = rows.integer("stamp_ns"), camera = rows.integer("camera");
+  if (!stamp || !camera || *camera < 1 || *camera >= kMaxCameras ||
+      !numbers(rows, "", kAxes, &c.value))
     return std::nullopt;
   c.stamp = Stamp(*stamp);
   c.camera = static_cast<int>(*camera);
-  c.accepted = text("outcome") == "accepted";
-  c.kept = text("outcome") == "unchanged";
-  c.cause = text("cause").substr(0, kLongestText);
-  c.reason = text("reason").substr(0, kLongestText);
-  c.frames = rows.integer(rows.column("frames")).value_or(0);
+  c.accepted = rows.text("outcome") == "accepted";
+  c.kept = rows.text("outcome") == "unchanged";
+  c.cause = rows.text("cause").substr(0, kLongestText);
+  c.reason = rows.text("reason").substr(0, kLongestText);
+  c.frames = rows.integer("frames").value_or(0);
   c.latency_frames = number("latency_frames");
   c.decided = std::isfinite(c.latency_frames);
   c.held_out_before_px = number("held_out_before_px");
@@ -373,7 +339,8 @@ std::optional<CalibrationRow> read_calibration_row(const CsvRows& rows) {
   c.reference_depth_m = number("reference_depth_m");
   c.depth_sigma_percent = number("depth_sigma_percent");
   c.depth_error_percent = number("depth_error_percent");
-  c.has_sigma = read_six(rows, "sigma_total_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
+  c.has_sigma =
+      numbers(rows, "sigma_total_", kAxes, &c.sigma) || numbers(rows, "sigma_", kAxes, &c.sigma);
   return c;
 }
 
@@ -422,8 +389,8 @@ void read_summary(const fs::path& folder, Session* session) {
 /// say so.
 bool without_calibration(const Session& session) {
   return session.summary.is_object() &&
-         std::none_of(session.calibrations.begin(), session.calibrations.end(),
-                      [](const CalibrationRow& c) { return c.accepted; });
+         std::ranges::none_of(session.calibrations,
+                              [](const CalibrationRow& c) { return c.accepted; });
 }
 
 void read_calibration_file(const fs::path& folder, Session* session) {
@@ -480,10 +447,9 @@ Session read_session(const fs::path& folder) {
     throw InputError(folder.string() +
                      ": no such directory; pass the session directory (--out of run or replay)");
   if (!is_session(folder))
-    throw InputError(
-        folder.string() +
-        ": is not a session directory (no poses.csv, summary.json or events.jsonl); pass the "
-        "directory of --out");
+    throw InputError(folder.string() +
+                     ": is not a session directory (no poses.csv, summary.json or events.jsonl); "
+                     "pass the directory of --out");
   Session session;
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);

@@ -67,45 +67,6 @@ std::size_t points_in(const std::vector<Line>& lines) {
   return n;
 }
 
-}  // namespace
-
-std::vector<Line> decimate(std::span<const double> x, std::span<const double> y,
-                           std::span<const std::uint8_t> breaks, double x0, double x1,
-                           int columns) {
-  assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && x0 < x1 &&
-         columns > 0);
-  const double per_column = columns / (x1 - x0);
-  const auto column = [&](double at) {
-    return std::floor(std::clamp((at - x0) * per_column, -1.0, columns + 1.0));
-  };
-  std::vector<Line> lines;
-  for (const Piece& piece : pieces_of(x, y, breaks)) {
-    Line line;
-    for (std::size_t i = piece.begin; i < piece.end;) {
-      const std::size_t begin = i;
-      const double here = column(x[begin]);
-      while (i < piece.end && column(x[i]) == here) ++i;
-      keep_extremes(x, y, begin, i, &line);
-    }
-    lines.push_back(std::move(line));
-  }
-  return lines;
-}
-
-std::vector<Line> thin(std::span<const double> x, std::span<const double> y,
-                       std::span<const std::uint8_t> breaks, double step, std::size_t most) {
-  assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && step > 0);
-  // The limit is 10¹² times the first step, which is wider than any map.
-  constexpr int kDoublings = 40;
-  const std::vector<Piece> pieces = pieces_of(x, y, breaks);
-  std::vector<Line> lines = thinned(x, y, pieces, step);
-  for (int i = 0; i < kDoublings && points_in(lines) > most; ++i)
-    lines = thinned(x, y, pieces, step *= 2);
-  return lines;
-}
-
-namespace {
-
 void append_escaped(std::string* out, std::string_view character) {
   constexpr std::array<std::pair<char, const char*>, 5> kEntities{
       {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}}};
@@ -149,6 +110,41 @@ double nice_step(double span, int most) {
 }
 
 }  // namespace
+
+std::vector<Line> decimate(std::span<const double> x, std::span<const double> y,
+                           std::span<const std::uint8_t> breaks, double x0, double x1,
+                           int columns) {
+  assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && x0 < x1 &&
+         columns > 0);
+  const double per_column = columns / (x1 - x0);
+  const auto column = [&](double at) {
+    return std::floor(std::clamp((at - x0) * per_column, -1.0, columns + 1.0));
+  };
+  std::vector<Line> lines;
+  for (const Piece& piece : pieces_of(x, y, breaks)) {
+    Line line;
+    for (std::size_t i = piece.begin; i < piece.end;) {
+      const std::size_t begin = i;
+      const double here = column(x[begin]);
+      while (i < piece.end && column(x[i]) == here) ++i;
+      keep_extremes(x, y, begin, i, &line);
+    }
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
+std::vector<Line> thin(std::span<const double> x, std::span<const double> y,
+                       std::span<const std::uint8_t> breaks, double step, std::size_t most) {
+  assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && step > 0);
+  // The limit is 10¹² times the first step, which is wider than any map.
+  constexpr int kDoublings = 40;
+  const std::vector<Piece> pieces = pieces_of(x, y, breaks);
+  std::vector<Line> lines = thinned(x, y, pieces, step);
+  for (int i = 0; i < kDoublings && points_in(lines) > most; ++i)
+    lines = thinned(x, y, pieces, step *= 2);
+  return lines;
+}
 
 std::string escape(std::string_view text, std::size_t most) {
   std::string out;

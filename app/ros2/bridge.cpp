@@ -86,6 +86,89 @@ std::string ros_name(std::string name) {
 
 std::string optical_frame(const std::string& camera) { return camera + "_optical_frame"; }
 
+using Level = DiagnosticMessage::Level;
+
+std::string text(const json& value) {
+  if (value.is_null()) return "unknown";
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+DiagnosticMessage odometry_status(const json& line) {
+  DiagnosticMessage d{Level::ok, "vergence: odometry", text(line.at("status")), {}};
+  const json& status = line.at("status");
+  if (status == "degraded") d.level = Level::warn;
+  if (status == "lost") d.level = Level::error;
+  if (status == "degraded" || status == "lost") d.message += ": " + text(line.at("reason"));
+  constexpr double kSilentS = 1;
+  if (status.is_null() || line.at("silent_s").get<double>() > kSilentS) {
+    d.level = Level::stale;
+    d.message = status.is_null()
+                    ? "no frame yet"
+                    : fmt::format("no frames for {:.1f} s", line.at("silent_s").get<double>());
+  }
+  for (const char* key : {"session", "state", "status", "reason"})
+    d.values.emplace_back(key, text(line.at(key)));
+  if (line.at("frames").is_object())
+    for (const auto& [key, value] : line.at("frames").items())
+      d.values.emplace_back("frames " + key, text(value));
+  return d;
+}
+
+DiagnosticMessage calibration_status(const json& line, const std::string& rating) {
+  const bool calibrated = line.at("calibrated"), verified = line.at("verified");
+  DiagnosticMessage d{Level::ok, "vergence: calibration", "verified", {}};
+  if (!verified) {
+    d.level = Level::warn;
+    d.message = calibrated ? "not verified" : "none yet; drive to calibrate";
+  } else if (!rating.empty()) {
+    d.message = "verified; rating: " + rating;
+    if (rating != "good") d.level = rating == "poor" ? Level::error : Level::warn;
+  }
+  d.values = {{"verified", text(line.at("verified"))},
+              {"rating", rating.empty() ? "unknown" : rating}};
+  return d;
+}
+
+DiagnosticMessage cameras_status(const json& line) {
+  const json& pairing = line.at("pairing");
+  DiagnosticMessage d{Level::ok, "vergence: cameras", "pairing " + text(pairing), {}};
+  if (pairing == "contradicted") d.level = Level::warn;
+  std::size_t k = 0;
+  for (const json& present : line.at("cameras")) {
+    const std::string name = fmt::format("camera {}", k++);
+    d.values.emplace_back(name, present.get<bool>() ? "image" : "no image");
+    if (present) continue;
+    d.level = Level::error;
+    d.message = name + " gives no image";
+  }
+  return d;
+}
+
+DiagnosticMessage ins_status(const json& line) {
+  DiagnosticMessage d{Level::ok, "vergence: INS", "no INS, or no sample yet", {}};
+  const json& ins = line.at("ins");
+  if (ins.is_null()) return d;
+  constexpr double kSilentS = 2;
+  const double silent = ins.at("silent_s");
+  d.message =
+      "fix " + text(ins.at("fix")) + (ins.at("aligned") ? ", aligned" : ", not aligned yet");
+  if (ins.at("fix") == "none" || ins.at("fix") == "dead_reckoning") d.level = Level::warn;
+  if (silent > kSilentS) {
+    d.level = Level::error;
+    d.message = fmt::format("no sample for {:.1f} s", silent);
+  }
+  for (const auto& [key, value] : ins.items()) d.values.emplace_back(key, text(value));
+  return d;
+}
+
+DiagnosticMessage stream_status(std::uint64_t dropped, std::uint64_t malformed) {
+  return {malformed > 0 ? Level::warn : Level::ok,
+          "vergence: pose stream",
+          malformed > 0 ? "malformed lines" : "connected",
+          {{"dropped lines", fmt::format("{}", dropped)},
+           {"malformed lines", fmt::format("{}", malformed)}}};
+}
+
 }  // namespace
 
 Bridge::Bridge(const BridgeOptions& options, TopicWriter* writer)
@@ -249,7 +332,7 @@ void Bridge::on_calibration(const json& line) {
     names.push_back(ros_name(camera.at("name").get<std::string>()));
   }
   rig_ = rig;
-  names_ = distinct_names(std::move(names));
+  names_ = distinct_names(names);
   if (options_.camera_child) child_frame_ = optical_frame(names_[0]);
   rating_ = line.at("rating").is_string() ? line.at("rating").get<std::string>() : "";
 
@@ -318,93 +401,6 @@ void Bridge::on_alignment(const json& line) {
   a.rotation_variance = vector(line.at("rotation_sigma_rad")).cwiseAbs2();
   alignment_ = a;
 }
-
-namespace {
-
-using Level = DiagnosticMessage::Level;
-
-std::string text(const json& value) {
-  if (value.is_null()) return "unknown";
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
-
-DiagnosticMessage odometry_status(const json& line) {
-  DiagnosticMessage d{Level::ok, "vergence: odometry", text(line.at("status")), {}};
-  const json& status = line.at("status");
-  if (status == "degraded") d.level = Level::warn;
-  if (status == "lost") d.level = Level::error;
-  if (status == "degraded" || status == "lost") d.message += ": " + text(line.at("reason"));
-  constexpr double kSilentS = 1;
-  if (status.is_null() || line.at("silent_s").get<double>() > kSilentS) {
-    d.level = Level::stale;
-    d.message = status.is_null()
-                    ? "no frame yet"
-                    : fmt::format("no frames for {:.1f} s", line.at("silent_s").get<double>());
-  }
-  for (const char* key : {"session", "state", "status", "reason"})
-    d.values.emplace_back(key, text(line.at(key)));
-  if (line.at("frames").is_object())
-    for (const auto& [key, value] : line.at("frames").items())
-      d.values.emplace_back("frames " + key, text(value));
-  return d;
-}
-
-DiagnosticMessage calibration_status(const json& line, const std::string& rating) {
-  const bool calibrated = line.at("calibrated"), verified = line.at("verified");
-  DiagnosticMessage d{Level::ok, "vergence: calibration", "verified", {}};
-  if (!verified) {
-    d.level = Level::warn;
-    d.message = calibrated ? "not verified" : "none yet; drive to calibrate";
-  } else if (!rating.empty()) {
-    d.message = "verified; rating: " + rating;
-    if (rating != "good") d.level = rating == "poor" ? Level::error : Level::warn;
-  }
-  d.values = {{"verified", text(line.at("verified"))},
-              {"rating", rating.empty() ? "unknown" : rating}};
-  return d;
-}
-
-DiagnosticMessage cameras_status(const json& line) {
-  const json& pairing = line.at("pairing");
-  DiagnosticMessage d{Level::ok, "vergence: cameras", "pairing " + text(pairing), {}};
-  if (pairing == "contradicted") d.level = Level::warn;
-  std::size_t k = 0;
-  for (const json& present : line.at("cameras")) {
-    const std::string name = fmt::format("camera {}", k++);
-    d.values.emplace_back(name, present.get<bool>() ? "image" : "no image");
-    if (present) continue;
-    d.level = Level::error;
-    d.message = name + " gives no image";
-  }
-  return d;
-}
-
-DiagnosticMessage ins_status(const json& line) {
-  DiagnosticMessage d{Level::ok, "vergence: INS", "no INS, or no sample yet", {}};
-  const json& ins = line.at("ins");
-  if (ins.is_null()) return d;
-  constexpr double kSilentS = 2;
-  const double silent = ins.at("silent_s");
-  d.message =
-      "fix " + text(ins.at("fix")) + (ins.at("aligned") ? ", aligned" : ", not aligned yet");
-  if (ins.at("fix") == "none" || ins.at("fix") == "dead_reckoning") d.level = Level::warn;
-  if (silent > kSilentS) {
-    d.level = Level::error;
-    d.message = fmt::format("no sample for {:.1f} s", silent);
-  }
-  for (const auto& [key, value] : ins.items()) d.values.emplace_back(key, text(value));
-  return d;
-}
-
-DiagnosticMessage stream_status(std::uint64_t dropped, std::uint64_t malformed) {
-  return {malformed > 0 ? Level::warn : Level::ok,
-          "vergence: pose stream",
-          malformed > 0 ? "malformed lines" : "connected",
-          {{"dropped lines", fmt::format("{}", dropped)},
-           {"malformed lines", fmt::format("{}", malformed)}}};
-}
-
-}  // namespace
 
 void Bridge::on_status(const json& line) {
   const json& stamp = line.at("stamp_ns");

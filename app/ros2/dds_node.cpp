@@ -10,7 +10,6 @@
 #include <functional>
 #include <map>
 #include <mutex>
-#include <span>
 #include <vector>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -96,15 +95,15 @@ Bytes node_info(const rtps::GUID_t& participant, std::span<const rtps::GUID_t> r
   CdrWriter out(bytes);
   const auto gid = [&](const rtps::GUID_t& guid) {
     std::array<std::uint8_t, 24> id{};
-    std::copy_n(guid.guidPrefix.value, guid.guidPrefix.size, id.begin());
-    std::copy_n(guid.entityId.value, guid.entityId.size, id.begin() + guid.guidPrefix.size);
+    std::copy_n(guid.guidPrefix.value, rtps::GuidPrefix_t::size, id.begin());
+    std::copy_n(guid.entityId.value, rtps::EntityId_t::size, id.begin() + rtps::GuidPrefix_t::size);
     out.raw(std::span(id).first(gid_bytes));
   };
   gid(participant);
   out.count(1).text("/").text("vergence_ros2");
   for (const auto guids : {readers, writers}) {
     out.count(guids.size());
-    std::for_each(guids.begin(), guids.end(), gid);
+    std::ranges::for_each(guids, gid);
   }
   bytes.resize(out.size());
   return bytes;
@@ -116,24 +115,18 @@ constexpr std::string_view kTriggerHash =
 }  // namespace
 
 std::string_view type_hash(RosType type) noexcept {
-  switch (type) {
-    case RosType::image:
-      return "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47";
-    case RosType::odometry:
-      return "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0";
-    case RosType::tf:
-      return "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087";
-    case RosType::camera_info:
-      return "b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275";
-    case RosType::nav_sat_fix:
-      return "62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404";
-    case RosType::pose_with_covariance:
-      return "26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e";
-    case RosType::diagnostics:
-      return "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e";
-    default:
-      return "";
-  }
+  constexpr std::pair<RosType, std::string_view> kHashes[]{
+      {RosType::image, "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"},
+      {RosType::odometry, "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"},
+      {RosType::tf, "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"},
+      {RosType::camera_info, "b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275"},
+      {RosType::nav_sat_fix, "62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"},
+      {RosType::pose_with_covariance,
+       "26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e"},
+      {RosType::diagnostics, "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"}};
+  for (const auto& [with_hash, hash] : kHashes)
+    if (with_hash == type) return hash;
+  return {};
 }
 
 struct DdsNode::Request {

@@ -18,8 +18,7 @@ namespace vergence::app {
   std::vector<std::string> distinct;
   for (const std::string& name : names) {
     std::string own = name;
-    for (int n = 1; std::count(distinct.begin(), distinct.end(), own) > 0; ++n)
-      own = fmt::format("{}_{}", name, n);
+    for (int n = 1; std::ranges::count(distinct, own) > 0; ++n) own = fmt::format("{}_{}", name, n);
     distinct.push_back(own);
   }
   return distinct;

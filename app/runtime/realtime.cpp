@@ -1,7 +1,6 @@
 #include "app/runtime/realtime.hpp"
 
 #include <linux/capability.h>
-#include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -52,24 +51,34 @@ bool memory_limited() noexcept {
 
 std::string reason(int error) { return std::strerror(error); }
 
-}  // namespace
+/// Takes a number from the front of the text; false: there is none, or no such processor.
+bool parse_number(std::string_view* text, int* number) noexcept {
+  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), *number);
+  if (error != std::errc() || *number < 0 || *number >= CPU_SETSIZE) return false;
+  text->remove_prefix(static_cast<std::size_t>(end - text->data()));
+  return true;
+}
+
+bool skip_character(std::string_view* text, char c) noexcept {
+  if (!text->starts_with(c)) return false;
+  text->remove_prefix(1);
+  return true;
+}
 
 ThreadRole thread_role(std::string_view name) noexcept {
-  const auto* row =
-      std::find_if(kRoles.begin(), kRoles.end(), [name](const auto& r) { return r.first == name; });
+  const auto* row = std::ranges::find_if(kRoles, [name](const auto& r) { return r.first == name; });
   if (row != kRoles.end()) return row->second;
   return name.starts_with("vergence-") && name != "vergence-mockio" ? ThreadRole::background
                                                                     : ThreadRole::other;
 }
 
+/// SCHED_FIFO priority of a role if the most urgent one has `top`; 0 means SCHED_OTHER.
 int role_priority(ThreadRole role, int top) noexcept {
   if (top <= 0 || role == ThreadRole::solver || role == ThreadRole::other) return 0;
-  const int below = role == ThreadRole::capture     ? 0
-                    : role == ThreadRole::estimator ? 1
-                    : role == ThreadRole::ins       ? 2
-                                                    : 3;
-  return std::max(1, top - below);
+  return std::max(1, top - static_cast<int>(role));
 }
+
+}  // namespace
 
 int RealtimeSystem::set_fifo(pid_t thread, int priority) {
   sched_param parameter{};
@@ -113,8 +122,8 @@ std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>
   // One that has ended is forgotten: capture threads come and go for months, and a number is given
   // again.
   std::erase_if(done_, [&](const auto& done) {
-    return std::none_of(threads.begin(), threads.end(),
-                        [&](const ProcessThread& thread) { return thread.id == done.first; });
+    return std::ranges::none_of(
+        threads, [&](const ProcessThread& thread) { return thread.id == done.first; });
   });
   for (const ProcessThread& thread : threads) {
     const ThreadRole role = thread_role(thread.name);
@@ -155,24 +164,6 @@ void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool sol
                   "all; `taskset -pc $$` lists the available ones",
                   solver ? "solver_affinity" : "affinity", reason(error)));
 }
-
-namespace {
-
-/// Takes a number from the front of the text; false: there is none, or no such processor.
-bool parse_number(std::string_view* text, int* number) noexcept {
-  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), *number);
-  if (error != std::errc() || *number < 0 || *number >= CPU_SETSIZE) return false;
-  text->remove_prefix(static_cast<std::size_t>(end - text->data()));
-  return true;
-}
-
-bool skip_character(std::string_view* text, char c) noexcept {
-  if (!text->starts_with(c)) return false;
-  text->remove_prefix(1);
-  return true;
-}
-
-}  // namespace
 
 std::optional<cpu_set_t> parse_cpu_list(std::string_view text) noexcept {
   cpu_set_t set;

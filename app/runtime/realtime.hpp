@@ -28,7 +28,8 @@ struct ProcessThread {
 /// its creator's name.
 void process_threads(std::vector<ProcessThread>* threads);
 
-/// Real-time role of a thread, by its name (docs/deployment.md has the table).
+/// Real-time role of a thread, by its name (docs/deployment.md has the table), the most urgent
+/// first.
 enum class ThreadRole : std::uint8_t {
   /// Cameras, trigger and synchroniser, which are short and must not be late.
   capture,
@@ -44,14 +45,9 @@ enum class ThreadRole : std::uint8_t {
   other
 };
 
-[[nodiscard]] ThreadRole thread_role(std::string_view name) noexcept;
-
-/// SCHED_FIFO priority of a role if the most urgent one has `top`; 0 means SCHED_OTHER.
-[[nodiscard]] int role_priority(ThreadRole role, int top) noexcept;
-
 /// `realtime:` of the configuration.
 struct RealtimeRequest {
-  // Priority of ThreadRole::capture; 0 means that no thread is given a real-time priority.
+  // Priority of the most urgent threads; 0 means that no thread is given a real-time priority.
   int priority = 0;
   // CPUs of all roles except `other` and the solver.
   std::optional<cpu_set_t> affinity{};

@@ -68,15 +68,11 @@ bool SignalGuard::poll_calibration_request() const noexcept {
 }
 
 std::optional<ExitCode> SignalGuard::stop_code() const noexcept {
-  switch (caught.load(std::memory_order_relaxed)) {
-    case SIGINT:
-      return ExitCode::interrupted;
-    case SIGTERM:
-    case SIGHUP:  // the terminal was closed: the session is, too
-      return ExitCode::terminated;
-    default:
-      return std::nullopt;
-  }
+  const int signal = caught.load(std::memory_order_relaxed);
+  if (signal == SIGINT) return ExitCode::interrupted;
+  // SIGHUP: the terminal was closed; the session is, too.
+  if (signal == SIGTERM || signal == SIGHUP) return ExitCode::terminated;
+  return std::nullopt;
 }
 
 }  // namespace vergence::app

@@ -86,12 +86,8 @@ void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found)
     message += (message.empty() ? "" : "; ") + fault_;
   }
   if (message.empty()) return;
-  Outcome outcome;
-  outcome.failed = failed;
-  outcome.event.stamp = stamp;
-  outcome.event.kind = failed ? "calibration_save_failed" : "calibration_saved";
-  outcome.event.set_message(message);
-  (void)outcomes_.push(outcome);
+  (void)outcomes_.push(
+      {{stamp, failed ? "calibration_save_failed" : "calibration_saved", message}, failed});
 }
 
 void CalibrationWriter::write_session_file(const RigCalibration& rig) {
@@ -110,12 +106,7 @@ void CalibrationWriter::close(const RigCalibration* in_use, std::vector<std::str
   thread_.stop();
   if (in_use != nullptr) write_session_file(*in_use);
   if (!fault_.empty()) faults->push_back(fault_);
-  const bool good = lines_.close();
-  if (good && lines_.lost_lines() == 0) return;
-  faults->push_back(lines_.path().string() + ": is not complete (" +
-                    (good ? std::to_string(lines_.lost_lines()) + " lines are lost"
-                          : std::strerror(lines_.fault())) +
-                    "); check the disk and free space on it");
+  lines_.close(faults);
 }
 
 }  // namespace vergence::app

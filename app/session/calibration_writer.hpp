@@ -23,14 +23,11 @@ namespace vergence::app {
 /// CalibrationDecision.
 inline constexpr const char* kCalibrationsHeader =
     "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_"
-    "before_px,held_out_after_px,scale_sigma,"
-    "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,sigma_total_rx,"
-    "sigma_total_"
-    "ry,sigma_total_rz,sigma_total_tx,sigma_total_ty,sigma_total_tz,"
-    "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_"
-    "d3,"
-    "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
-    "reference_depth_m,depth_sigma_percent,depth_error_percent,verified";
+    "before_px,held_out_after_px,scale_sigma,camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,"
+    "sigma_tx,sigma_ty,sigma_tz,sigma_total_rx,sigma_total_ry,sigma_total_rz,sigma_total_tx,sigma_"
+    "total_ty,sigma_total_tz,fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,"
+    "sigma_d1,sigma_d2,sigma_d3,left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_"
+    "left_d2,sigma_left_d3,reference_depth_m,depth_sigma_percent,depth_error_percent,verified";
 
 /// Writes the calibrations of a session: a line of calibrations.csv for each, calibration.yaml with
 /// the one in use, and the state file for the next run. The state file gets an estimated

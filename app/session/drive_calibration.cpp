@@ -249,8 +249,8 @@ ExitCode calibrate_from_drive(ReplayRequest r, const std::filesystem::path& out)
   for (const std::string& message : sequence.remarks) progress.print("vergence: " + message);
   if (!sequence.assumptions.empty())
     progress.print(fmt::format("vergence: assumed: {}", fmt::join(sequence.assumptions, "; ")));
-  const DriveCalibration found = calibrate_with_progress(
-      {sequence, c, 0, sequence.pairs.size(), {}, {}}, given, signals, &progress);
+  const DriveCalibration found =
+      calibrate_with_progress({sequence, c, 0, sequence.pairs.size()}, given, signals, &progress);
   if (!found.rig) {
     progress.print(fmt::format("vergence: {}: no calibration was found, no file is written: {}",
                                r.data.string(), found.why));

@@ -24,8 +24,8 @@ void print_row(std::string_view name, std::size_t bytes) {
 /// Parts of an arena, the largest first; those below a hundredth in one line.
 void print_parts(const MemoryRow& row) {
   std::vector<ArenaRow> parts(row.parts.begin(), row.parts.end());
-  std::stable_sort(parts.begin(), parts.end(),
-                   [](const ArenaRow& a, const ArenaRow& b) { return a.bytes > b.bytes; });
+  std::ranges::stable_sort(parts,
+                           [](const ArenaRow& a, const ArenaRow& b) { return a.bytes > b.bytes; });
   std::size_t rest = row.bytes;
   for (const ArenaRow& part : parts) {
     if (part.bytes < row.bytes / 100) break;
@@ -33,6 +33,13 @@ void print_parts(const MemoryRow& row) {
     rest -= part.bytes;
   }
   if (!parts.empty()) print_row("  smaller ones", rest);
+}
+
+/// Time budget of a frame: live, the next one does not wait.
+Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
+  if (facts.frame_interval <= Duration{}) return {};
+  return realtime.frame_budget_ms > 0 ? Duration::seconds(1e-3 * realtime.frame_budget_ms)
+                                      : facts.frame_interval;
 }
 
 }  // namespace
@@ -47,17 +54,6 @@ void print_memory_table(const std::vector<MemoryRow>& memory) {
   print_row("total_bytes", sum);
   (void)std::fflush(stdout);
 }
-
-namespace {
-
-/// Time budget of a frame: live, the next one does not wait.
-Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
-  if (facts.frame_interval <= Duration{}) return {};
-  return realtime.frame_budget_ms > 0 ? Duration::seconds(1e-3 * realtime.frame_budget_ms)
-                                      : facts.frame_interval;
-}
-
-}  // namespace
 
 EstimationLoop::EstimationLoop(FrameSource& source, const Configuration& configuration,
                                const SessionOptions& options)
@@ -149,16 +145,16 @@ void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   if (!delivering_) ThreadAllocations::begin();
   delivering_ = true;
   watched_solver_.begin_frame(frame.solver_idle);
-  output_.post(frame.rig);
+  output_.post(&SessionObserver::on_frame, frame.rig);
   const PoseSample sample = estimator_->process(frame.rig);
   source_.done(sample);
   const FrameReport posed = report(frame, sample);
-  output_.post_pose(posed);
-  output_.post(estimator_->tracks());
+  output_.post(&SessionObserver::on_pose, posed);
+  output_.post(&SessionObserver::on_tracks, estimator_->tracks());
   log_.collect(*estimator_);
   log_.record_effort(sample);
   if (comparison_) return comparison_->add(posed);
-  output_.post(posed);
+  output_.post(&SessionObserver::on_report, posed);
   log_.collect(posed);
 }
 

@@ -15,16 +15,16 @@ constexpr int kWholeAgain = 100;
 /// Events printed immediately.
 bool is_for_user(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
-  return kind == Kind::rig_changed || kind == Kind::out_of_sync || kind == Kind::cameras_in_sync ||
-         kind == Kind::calibration_verified || kind == Kind::calibration_contradicted ||
-         kind == Kind::focal_length_contradicted || kind == Kind::calibration_accepted ||
-         kind == Kind::calibration_rejected || kind == Kind::calibration_pending ||
-         kind == Kind::calibration_resumed;
+  return kind == Kind::rig_changed || kind == Kind::rig_not_rigid || kind == Kind::out_of_sync ||
+         kind == Kind::cameras_in_sync || kind == Kind::calibration_verified ||
+         kind == Kind::calibration_contradicted || kind == Kind::focal_length_contradicted ||
+         kind == Kind::calibration_accepted || kind == Kind::calibration_rejected ||
+         kind == Kind::calibration_pending || kind == Kind::calibration_resumed;
 }
 
 std::string spaced(std::string_view name) {
   std::string text(name);
-  std::replace(text.begin(), text.end(), '_', ' ');
+  std::ranges::replace(text, '_', ' ');
   return text;
 }
 
@@ -50,11 +50,11 @@ void EventLog::collect(const Estimator& estimator) noexcept {
     if (event.kind == EstimatorEvent::Kind::dropped)
       dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
     const EventRecord record = EventRecord::of(event);
-    output_->post(record);
+    output_->post(&SessionObserver::on_event, record);
     if (is_for_user(event.kind)) (void)notices_.push(record);
   }
   for (const CalibrationDecision& decision : estimator.calibrations())
-    output_->post(CalibrationRecord{decision});
+    output_->post(&SessionObserver::on_calibration, CalibrationRecord{decision});
 }
 
 /// Frames in a row without all of their work are one event.
@@ -64,10 +64,8 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
     return;
   }
   if (std::exchange(whole_frames_, 0) < kWholeAgain) return;
-  EventRecord event;
-  event.stamp = sample.stamp;
-  event.kind = "work_dropped";
-  event.set_message(
+  EventRecord event(
+      sample.stamp, "work_dropped",
       "frames take longer than the frame budget: work other than the pose is omitted");
   event.fields[0] = {"points_percent", std::int64_t{sample.effort.points_percent}};
   event.fields[1] = {"window_keyframes", std::int64_t{sample.effort.window_keyframes}};
@@ -76,15 +74,11 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
 }
 
 void EventLog::log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept {
-  EventRecord event;
-  event.stamp = stamp;
-  event.kind = kind;
-  event.set_message(message);
-  log(event, to_user);
+  log({stamp, kind, message}, to_user);
 }
 
 void EventLog::log(const EventRecord& event, bool to_user) noexcept {
-  output_->post(event);
+  output_->post(&SessionObserver::on_event, event);
   if (to_user) (void)notices_.push(event);
 }
 

@@ -125,14 +125,13 @@ class FrameSource {
   /// Called once after next() has ended, while the estimator may still finish; stops the delivery.
   virtual void halt() noexcept {}
   /// Ends what start() began, after halt().
-  virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
+  virtual void finish(Progress* progress) = 0;
 
   /// Adds skipped frames, devices, times and ground truth to the summary.
   virtual void describe(const SessionTotals& totals, const Estimator& estimator,
                         SummaryInput* input) const = 0;
   /// Prints the statistics shown at the end.
-  virtual void print_metrics(const SessionTotals& totals, const SummaryInput& input,
-                             Progress* progress) const = 0;
+  virtual void print_metrics(const SummaryInput& input, Progress* progress) const = 0;
   /// Exit code for a problem of the source itself, whose message it has printed; called if there
   /// are poses.
   [[nodiscard]] virtual std::optional<ExitCode> verdict(Progress* /*progress*/) const {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <nlohmann/json.hpp>
 
@@ -91,11 +90,10 @@ void InsEvents::update(const ComparedPose& pose, std::uint64_t matches) noexcept
 }
 
 void InsEvents::update(const EnuAlignment& p, Stamp stamp) noexcept {
-  std::array<char, 160> text{};
-  (void)std::snprintf(text.data(), text.size(),
-                      "aligned with ENU after %.1f m: heading sigma %.2f deg, residual %.2f m",
-                      p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual);
-  event_log_.log(stamp, "enu_alignment", text.data(), false);
+  event_log_.log({stamp, "enu_alignment",
+                  "aligned with ENU after {:.1f} m: heading sigma {:.2f} deg, residual {:.2f} m",
+                  p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual},
+                 false);
 }
 
 /// Once a drive: a receiver never has one, an INS has it after it has aligned.
@@ -118,50 +116,39 @@ void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) no
   last_match_ = pose.ins;
   if (match_run_ != kSettled) return;
   const bool recorded = source_ == InsSource::recording;
-  switch (pose.ins) {
-    case InsMatch::ok:
-      if (matches > kSettled)
-        event_log_.log(pose.pose.stamp, "ins_recovered",
-                       "the INS has a position again; the comparison continues", false);
-      break;
-    case InsMatch::none:
-      event_log_.log(
-          pose.pose.stamp, "ins_timeout",
-          recorded
-              ? "no INS samples in the recording here: these poses are not compared"
-              : "the INS sends nothing; the run continues without it: check its cable and rate",
-          true);
-      break;
-    case InsMatch::gap:
-      event_log_.log(pose.pose.stamp, "ins_gap",
-                     "INS samples are missing: these poses are not compared", true);
-      break;
-    case InsMatch::no_fix:
-      event_log_.log(pose.pose.stamp, "ins_no_fix",
-                     recorded ? "the INS had no position: the comparison pauses"
-                              : "the INS has no position: the comparison pauses; check its antenna",
-                     true);
-      break;
-    case InsMatch::jump:  // told with the reading: it may fall between two frames
-      break;
-  }
+  const auto log = [&](const char* kind, const char* message, bool to_user) {
+    event_log_.log(pose.pose.stamp, kind, message, to_user);
+  };
+  if (pose.ins == InsMatch::ok && matches > kSettled)
+    log("ins_recovered", "the INS has a position again; the comparison continues", false);
+  if (pose.ins == InsMatch::none)
+    log("ins_timeout",
+        recorded ? "no INS samples in the recording here: these poses are not compared"
+                 : "the INS sends nothing; the run continues without it: check its cable and rate",
+        true);
+  if (pose.ins == InsMatch::gap)
+    log("ins_gap", "INS samples are missing: these poses are not compared", true);
+  if (pose.ins == InsMatch::no_fix)
+    log("ins_no_fix",
+        recorded ? "the INS had no position: the comparison pauses"
+                 : "the INS has no position: the comparison pauses; check its antenna",
+        true);
+  // A jump is reported with its sample, because it may fall between two frames.
 }
 
 void InsEvents::record_scale(const ComparedPose& pose) noexcept {
   if (pose.scale_disagrees == scale_disagrees_) return;
   scale_disagrees_ = pose.scale_disagrees;
-  std::array<char, 200> text{};
-  if (scale_disagrees_)
-    (void)std::snprintf(text.data(), text.size(),
-                        "the distance travelled is %.1f %% %s than the INS's over %.0f m: measure "
-                        "the baseline again",
-                        100 * std::abs(pose.path_ratio - 1),
-                        pose.path_ratio > 1 ? "longer" : "shorter", scale_stretch_m_);
-  else
-    (void)std::snprintf(text.data(), text.size(),
-                        "the distance travelled agrees with the INS again");
-  event_log_.log(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees",
-                 text.data(), scale_disagrees_);
+  const Stamp stamp = pose.pose.stamp;
+  if (!scale_disagrees_)
+    return event_log_.log(stamp, "scale_agrees", "the distance travelled agrees with the INS again",
+                          false);
+  event_log_.log({stamp, "scale_disagrees",
+                  "the distance travelled is {:.1f} % {} than the INS's over {:.0f} m: measure the "
+                  "baseline again",
+                  100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter",
+                  scale_stretch_m_},
+                 true);
 }
 
 InsComparison::InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
@@ -174,7 +161,7 @@ InsComparison::InsComparison(const ComparisonOptions& options, InsSource source,
 }
 
 void InsComparison::add(const InsRecord& reading) noexcept {
-  output_->post(reading);
+  output_->post(&SessionObserver::on_reading, reading);
   comparison_.add(reading.sample);
   events_.update(reading.sample, comparison_.counters().jumps,
                  comparison_.counters().ins_contradicted > 0);
@@ -190,7 +177,7 @@ void InsComparison::drain() noexcept {
   for (ComparedPose pose; comparison_.next(&pose);) {
     FrameReport& report = pending_[static_cast<std::size_t>(drained_++ % pending_.size())];
     report.set_comparison(pose);
-    output_->post(report);
+    output_->post(&SessionObserver::on_report, report);
     event_log_.collect(report);
     if (pose.ins_valid) ++matches_;
     measure_way(pose);
@@ -286,7 +273,7 @@ void InsComparison::apply_enu_alignment(Stamp stamp) noexcept {
       event_log_.log(stamp, "enu_alignment_limit",
                      "too many ENU alignments for summary.json; poses.csv has all of them", true);
   }
-  output_->post(p, comparison_.plane().origin());
+  output_->post(&SessionObserver::on_enu_alignment, p, comparison_.plane().origin());
   events_.update(p, stamp);
 }
 

@@ -24,11 +24,11 @@ namespace fs = std::filesystem;
 constexpr double kQuaternionLength = 0.02;
 constexpr std::array<std::string_view, 4> kFixes{"none", "dead_reckoning", "fix_2d", "fix_3d"};
 constexpr std::size_t kColumns = 23;
-static_assert(std::count(kInsHeader.begin(), kInsHeader.end(), ',') + 1 == kColumns);
+static_assert(std::ranges::count(kInsHeader, ',') + 1 == kColumns);
 
 template <std::size_t N>
 bool finite(const std::array<double, N>& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
 }
 
 void append_sigma(std::string* line, double sigma, double unit) {
@@ -60,8 +60,7 @@ class Columns {
   [[nodiscard]] bool numbers(const char* what, std::array<double, N>* values) {
     const auto mine = fields_.subspan(next_, N);
     next_ += N;
-    if (std::all_of(mine.begin(), mine.end(), [](std::string_view f) { return f.empty(); }))
-      return false;
+    if (std::ranges::all_of(mine, [](std::string_view f) { return f.empty(); })) return false;
     for (std::size_t i = 0; i < N; ++i)
       if (!parse_number(mine[i], &(*values)[i])) refuse(mine[i], what);
     return true;
@@ -72,7 +71,7 @@ class Columns {
     return value[0];
   }
   [[nodiscard]] FixStatus fix() {
-    const auto found = std::find(kFixes.begin(), kFixes.end(), fields_[next_++]);
+    const auto found = std::ranges::find(kFixes, fields_[next_++]);
     if (found == kFixes.end()) refuse(fields_[next_ - 1], "none, dead_reckoning, fix_2d or fix_3d");
     return static_cast<FixStatus>(found - kFixes.begin());
   }

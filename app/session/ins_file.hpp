@@ -17,9 +17,8 @@ namespace vergence::app {
 /// degrees (11 µm).
 inline constexpr std::string_view kInsHeader =
     "stamp_ns,stamp_error_ns,number,fix,latitude_deg,longitude_deg,height_m,velocity_east,velocity_"
-    "north,velocity_up,qx,qy,qz,qw,"
-    "position_sigma_m,height_sigma_m,velocity_sigma,tilt_sigma_deg,heading_sigma_deg,status,"
-    "satellites,filter_valid,utc_ns";
+    "north,velocity_up,qx,qy,qz,qw,position_sigma_m,height_sigma_m,velocity_sigma,tilt_sigma_deg,"
+    "heading_sigma_deg,status,satellites,filter_valid,utc_ns";
 
 /// Formats the line with its end into *line. Non-finite values and invalid positions are left
 /// empty.

@@ -149,40 +149,25 @@ void Recorder::pretend(Stamp stamp) {
 void Recorder::record_disk(const LineFile* failed, int fault) {
   if ((failed != nullptr) == disk_full_) return;
   disk_full_ = failed != nullptr;
-  EventRecord event;
-  event.stamp = newest_;
-  event.kind = disk_full_ ? "disk_full" : "disk_recovered";
-  std::array<char, 256> text{};
-  const auto out = text.begin();
-  if (disk_full_) {
-    // strerror() may allocate.
-    const char* words = ::strerrordesc_np(fault);
-    if (words == nullptr) words = "unknown error";
-    report_error(
-        "{}: cannot be written ({}); the session continues and writing is retried every {} s; "
-        "check the disk",
-        failed->path().native(), words, kRetry.count());
-    (void)fmt::format_to_n(out, text.size() - 1, "the session's files cannot be written ({})",
-                           words);
-  } else {
-    (void)fmt::format_to_n(out, text.size() - 1, "lines are written again; {} were lost",
-                           lost_lines());
-  }
-  event.set_message(text.data());
-  write(event);
+  if (!disk_full_)
+    return write(EventRecord(newest_, "disk_recovered", "lines are written again; {} were lost",
+                             lost_lines()));
+  // strerror() may allocate.
+  const char* words = ::strerrordesc_np(fault);
+  if (words == nullptr) words = "unknown error";
+  ErrorMessage message{};
+  (void)fmt::format_to_n(message.begin(), message.size() - 1,
+                         "{}: cannot be written ({}); the session continues and writing is retried "
+                         "every {} s; check the disk",
+                         failed->path().native(), words, kRetry.count());
+  (void)error_messages_.push(message);
+  write(EventRecord(newest_, "disk_full", "the session's files cannot be written ({})", words));
 }
 
 std::uint64_t Recorder::lost_lines() const {
   std::uint64_t lines = 0;
   for (const LineFile* file : files_->all) lines += file->lost_lines();
   return lines;
-}
-
-template <class... Arguments>
-void Recorder::report_error(const char* format, const Arguments&... arguments) noexcept {
-  ErrorMessage message{};
-  (void)fmt::format_to_n(message.begin(), message.size() - 1, fmt::runtime(format), arguments...);
-  (void)error_messages_.push(message);
 }
 
 std::vector<std::string> Recorder::pop_errors() {
@@ -216,13 +201,8 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   thread_.stop();
   SessionTotals& totals = totals_.totals();
   for (LineFile* file : files_->all) {
-    const bool good = file->close();
+    file->close(&totals.faults);
     totals.lost_lines += file->lost_lines();
-    if (good && file->lost_lines() == 0) continue;
-    const std::string why = good ? std::to_string(file->lost_lines()) + " lines are lost"
-                                 : std::strerror(file->fault());
-    totals.faults.push_back(file->path().string() + ": is not complete (" + why +
-                            "); check the disk and free space on it");
   }
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;

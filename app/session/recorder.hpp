@@ -59,8 +59,6 @@ class Recorder final : public SessionObserver {
   /// `folder` must exist, see make_session_folder().
   Recorder(const std::filesystem::path& folder, const Options& options);
   ~Recorder() override;
-  Recorder(const Recorder&) = delete;
-  Recorder& operator=(const Recorder&) = delete;
 
   void on_report(const FrameReport& report) noexcept override { post(report); }
   void on_event(const EventRecord& event) noexcept override { post(event); }
@@ -94,8 +92,6 @@ class Recorder final : public SessionObserver {
   [[nodiscard]] std::uint64_t lost_lines() const;
   // Null-terminated text, truncated at the end of the array.
   using ErrorMessage = std::array<char, 512>;
-  template <class... Arguments>
-  void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
 
   struct Files;

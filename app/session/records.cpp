@@ -3,15 +3,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <iterator>
 #include <numbers>
-
-#include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
 #include "app/runtime/errors.hpp"
@@ -72,6 +68,14 @@ bool LineFile::close() {
   return fault_ == 0;
 }
 
+void LineFile::close(std::vector<std::string>* faults) {
+  const bool good = close();
+  if (good && lost_lines_ == 0) return;
+  faults->push_back(
+      fmt::format("{}: is not complete ({}); check the disk and free space on it", path_.string(),
+                  good ? fmt::format("{} lines are lost", lost_lines_) : std::strerror(fault_)));
+}
+
 namespace {
 
 /// Representation of an event of the estimator in events.jsonl.
@@ -90,6 +94,7 @@ constexpr std::array kEventFormats{
     EventFormat{"relocalised", "", nullptr},
     EventFormat{"frame_dropped", "", "older_s"},
     EventFormat{"rig_changed", "", "frames_since_onset"},
+    EventFormat{"rig_not_rigid", "", "offset_frames"},
     EventFormat{"out_of_sync", "", "lag_frames"},
     EventFormat{"cameras_in_sync", "", nullptr},
     EventFormat{"calibration_verified", "", "depth_sigma_percent"},
@@ -113,74 +118,6 @@ void copy_text(std::string_view text, std::array<char, N>* out) noexcept {
   (*out)[n] = 0;
 }
 
-}  // namespace
-
-void FrameReport::set_comparison(const ComparedPose& with_ins) noexcept {
-  ComparedPose::operator=(with_ins);
-  if (ins_valid) T_reference_left = reference.T_enu_left;
-}
-
-std::array<double, 4> FrameReport::error() const noexcept {
-  // A compass counts clockwise, a yaw the other way.
-  return {error_enu.x(), error_enu.y(), error_enu.z(), -error_yaw * (180.0 / std::numbers::pi)};
-}
-
-void EventRecord::set_message(std::string_view text) noexcept { copy_text(text, &message); }
-
-EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
-  EventRecord r;
-  r.stamp = event.stamp;
-  const EventFormat& format = kEventFormats[static_cast<std::size_t>(event.kind)];
-  r.kind = format.kind;
-  const bool state = event.kind == EstimatorEvent::Kind::state;
-  if (state) {
-    std::array<char, 256> text{};
-    const auto from = to_string(event.from), to = to_string(event.to);
-    (void)std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
-                        from.data(), static_cast<int>(to.size()), to.data(), event.why);
-    r.set_message(text.data());
-    // The words are string literals: views of them end with 0.
-    r.fields[0] = {"from", from.data()};
-    r.fields[1] = {"to", to.data()};
-  } else {
-    const char* begin = format.opening;
-    const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
-    std::array<char, 256> text{};
-    if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
-      (void)std::snprintf(text.data(), text.size(), "%s: depth error %.1f %%", why, event.value);
-    else if (event.kind == EstimatorEvent::Kind::focal_length_contradicted)
-      (void)std::snprintf(text.data(), text.size(), "%s: measured %.0f px", why, event.value);
-    else
-      (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
-                          *begin != 0 && *why != 0 ? ": " : "", why);
-    r.set_message(text.data());
-    if (format.field != nullptr) r.fields[0] = {format.field, event.value};
-    std::size_t n = 1;
-    const ChangeEvidence& e = event.evidence;
-    if (e.log_likelihood_ratio > 0)
-      r.fields[n++] = {"log_likelihood_ratio", e.log_likelihood_ratio};
-    if (e.shift_px > 0) {
-      r.fields[n++] = {"shift_px", e.shift_px};
-      r.fields[n] = {"rotation_mrad", e.rotation_mrad};
-    }
-  }
-  return r;
-}
-
-CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stamp,
-                                           const char* cause, std::string_view origin) noexcept {
-  CalibrationRecord r;
-  r.stamp = stamp;
-  r.accepted = true;
-  r.calibration = rig;
-  r.decided = false;
-  r.began_as = cause;
-  copy_text(origin, &r.origin);
-  return r;
-}
-
-namespace {
-
 /// east … heading_deg, a comma before each; empty where there is nothing.
 void append_enu(std::string* line, bool valid, const EnuPose& e) {
   if (!valid) {
@@ -202,47 +139,10 @@ void append_transform(std::string* line, const Transform& T, char between) {
     fmt::format_to(out, "{}{:.9f}", between, v);
 }
 
-}  // namespace
-
-void format_pose_row(const FrameReport& r, std::string* line) {
-  const PoseSample& p = r.pose;
-  const bool posed = p.status != PoseStatus::lost;
-  line->clear();
-  const auto out = std::back_inserter(*line);
-  fmt::format_to(out, "{},{},{},{},{}", p.frame, p.stamp.ns(), to_string(p.state),
-                 to_string(p.status), to_string(p.reason));
-  if (posed)
-    append_transform(line, p.T_world_left, ',');
-  else
-    *line += ",,,,,,,";
-  append_enu(line, r.placed, r.estimate);
-  append_enu(line, r.ins_valid, r.reference);
-  for (const double v : r.error())
-    if (r.compared)
-      fmt::format_to(out, ",{:.4f}", v);
-    else
-      *line += ',';
-  fmt::format_to(out, ",{}", p.inliers);
-  if (posed)
-    fmt::format_to(out, ",{:.4f}", p.reprojection_px);
-  else
-    *line += ',';
-  fmt::format_to(out, ",{:.3f}\n", p.estimate_ms);
-}
-
-void format_tum(Stamp stamp, const Transform& T, std::string* line) {
-  line->clear();
-  append_seconds(line, stamp.ns());
-  append_transform(line, T, ' ');
-  *line += '\n';
-}
-
-namespace {
-
 /// A comma and a number for each; commas alone where all are zero, which stands for "not given".
 template <std::size_t N>
 void append_sigmas(std::string* line, const std::array<double, N>& values) {
-  const bool given = std::any_of(values.begin(), values.end(), [](double v) { return v > 0; });
+  const bool given = std::ranges::any_of(values, [](double v) { return v > 0; });
   for (const double v : values)
     if (given)
       fmt::format_to(std::back_inserter(*line), ",{:.9f}", v);
@@ -264,47 +164,6 @@ void append_field(std::string* line, std::string_view text) {
   *line += ',';
   for (const char c : text) *line += c == ',' || c == '\n' || c == '"' ? ';' : c;
 }
-
-}  // namespace
-
-void format_calibration(const CalibrationRecord& c, int camera, std::string* line) {
-  const auto k = static_cast<std::size_t>(camera);
-  const RigCalibration& rig = c.calibration;
-  line->clear();
-  const auto out = std::back_inserter(*line);
-  fmt::format_to(out, "{},{}", c.stamp.ns(),
-                 c.accepted        ? "accepted"
-                 : c.is_refinement ? "unchanged"
-                                   : "rejected");
-  append_field(line, c.cause_name());
-  append_field(line, c.why());
-  fmt::format_to(out, ",{}", rig.frames);
-  if (c.decided)
-    fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame,
-                   rig.reprojection_px, c.held_out_before_px, c.held_out_after_px, rig.scale_sigma);
-  else
-    fmt::format_to(out, ",,,{:.4f},,,{:.6f}", rig.reprojection_px, rig.scale_sigma);
-  const Transform& T = rig.T_camera_left[k];
-  const Vec3 phi = log_so3(T.R);
-  fmt::format_to(out, ",{}", k);
-  for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()})
-    fmt::format_to(out, ",{:.9f}", v);
-  append_sigmas(line, rig.sigma_noise[k]);
-  append_sigmas(line, rig.sigma_total[k]);
-  const Intrinsics& lens = rig.intrinsics[k];
-  fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
-  append_sigmas(line, lens.sigma);
-  append_distortion(line, lens);
-  append_distortion(line, rig.intrinsics[0]);
-  if (c.decided && c.reference_depth_m > 0)
-    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d}", c.reference_depth_m, c.depth_sigma_percent,
-                   c.depth_error_percent, c.verified);
-  else
-    *line += ",,,,";
-  *line += '\n';
-}
-
-namespace {
 
 void append_text(std::string* line, std::string_view text) {
   constexpr std::string_view kReplacement = "\xef\xbf\xbd";
@@ -343,6 +202,136 @@ void append_value(std::string* line, double value) {
 void append_value(std::string* line, const char* value) { append_text(line, value); }
 
 }  // namespace
+
+void FrameReport::set_comparison(const ComparedPose& with_ins) noexcept {
+  ComparedPose::operator=(with_ins);
+  if (ins_valid) T_reference_left = reference.T_enu_left;
+}
+
+std::array<double, 4> FrameReport::error() const noexcept {
+  // A compass counts clockwise, a yaw the other way.
+  return {error_enu.x(), error_enu.y(), error_enu.z(), -error_yaw * (180.0 / std::numbers::pi)};
+}
+
+void EventRecord::set_message(std::string_view text) noexcept { copy_text(text, &message); }
+
+EventRecord::EventRecord(Stamp when, const char* what, std::string_view text) noexcept
+    : stamp(when), kind(what) {
+  set_message(text);
+}
+
+EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
+  using Kind = EstimatorEvent::Kind;
+  const EventFormat& format = kEventFormats[static_cast<std::size_t>(event.kind)];
+  if (event.kind == Kind::state) {
+    const auto from = to_string(event.from), to = to_string(event.to);
+    EventRecord r(event.stamp, format.kind, "{} to {}: {}", from, to, event.why);
+    // The words are string literals: views of them end with 0.
+    r.fields[0] = {"from", from.data()};
+    r.fields[1] = {"to", to.data()};
+    return r;
+  }
+  const std::string_view begin = format.opening,
+                         why = event.kind == Kind::calibration_accepted ? "" : event.why;
+  EventRecord r =
+      event.kind == Kind::calibration_contradicted && event.value > 0
+          ? EventRecord(event.stamp, format.kind, "{}: depth error {:.1f} %", why, event.value)
+      : event.kind == Kind::focal_length_contradicted
+          ? EventRecord(event.stamp, format.kind, "{}: measured {:.0f} px", why, event.value)
+          : EventRecord(event.stamp, format.kind, "{}{}{}", begin,
+                        begin.empty() || why.empty() ? "" : ": ", why);
+  if (format.field != nullptr) r.fields[0] = {format.field, event.value};
+  std::size_t n = 1;
+  const ChangeEvidence& e = event.evidence;
+  if (e.log_likelihood_ratio > 0) r.fields[n++] = {"log_likelihood_ratio", e.log_likelihood_ratio};
+  if (e.shift_px > 0) {
+    r.fields[n++] = {"shift_px", e.shift_px};
+    r.fields[n] = {"rotation_mrad", e.rotation_mrad};
+  }
+  return r;
+}
+
+CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stamp,
+                                           const char* cause, std::string_view origin) noexcept {
+  CalibrationRecord r;
+  r.stamp = stamp;
+  r.accepted = true;
+  r.calibration = rig;
+  r.decided = false;
+  r.began_as = cause;
+  copy_text(origin, &r.origin);
+  return r;
+}
+
+void format_pose_row(const FrameReport& r, std::string* line) {
+  const PoseSample& p = r.pose;
+  const bool posed = p.status != PoseStatus::lost;
+  line->clear();
+  const auto out = std::back_inserter(*line);
+  fmt::format_to(out, "{},{},{},{},{}", p.frame, p.stamp.ns(), to_string(p.state),
+                 to_string(p.status), to_string(p.reason));
+  if (posed)
+    append_transform(line, p.T_world_left, ',');
+  else
+    *line += ",,,,,,,";
+  append_enu(line, r.placed, r.estimate);
+  append_enu(line, r.ins_valid, r.reference);
+  for (const double v : r.error())
+    if (r.compared)
+      fmt::format_to(out, ",{:.4f}", v);
+    else
+      *line += ',';
+  fmt::format_to(out, ",{}", p.inliers);
+  if (posed)
+    fmt::format_to(out, ",{:.4f}", p.reprojection_px);
+  else
+    *line += ',';
+  fmt::format_to(out, ",{:.3f}\n", p.estimate_ms);
+}
+
+void format_tum(Stamp stamp, const Transform& T, std::string* line) {
+  line->clear();
+  append_seconds(line, stamp.ns());
+  append_transform(line, T, ' ');
+  *line += '\n';
+}
+
+void format_calibration(const CalibrationRecord& c, int camera, std::string* line) {
+  const auto k = static_cast<std::size_t>(camera);
+  const RigCalibration& rig = c.calibration;
+  line->clear();
+  const auto out = std::back_inserter(*line);
+  fmt::format_to(out, "{},{}", c.stamp.ns(),
+                 c.accepted        ? "accepted"
+                 : c.is_refinement ? "unchanged"
+                                   : "rejected");
+  append_field(line, c.cause_name());
+  append_field(line, c.why());
+  fmt::format_to(out, ",{}", rig.frames);
+  if (c.decided)
+    fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame,
+                   rig.reprojection_px, c.held_out_before_px, c.held_out_after_px, rig.scale_sigma);
+  else
+    fmt::format_to(out, ",,,{:.4f},,,{:.6f}", rig.reprojection_px, rig.scale_sigma);
+  const Transform& T = rig.T_camera_left[k];
+  const Vec3 phi = log_so3(T.R);
+  fmt::format_to(out, ",{}", k);
+  for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()})
+    fmt::format_to(out, ",{:.9f}", v);
+  append_sigmas(line, rig.sigma_noise[k]);
+  append_sigmas(line, rig.sigma_total[k]);
+  const Intrinsics& lens = rig.intrinsics[k];
+  fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
+  append_sigmas(line, lens.sigma);
+  append_distortion(line, lens);
+  append_distortion(line, rig.intrinsics[0]);
+  if (c.decided && c.reference_depth_m > 0)
+    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d}", c.reference_depth_m, c.depth_sigma_percent,
+                   c.depth_error_percent, c.verified);
+  else
+    *line += ",,,,";
+  *line += '\n';
+}
 
 void format_event(const EventRecord& event, std::string* line) {
   line->clear();

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -7,6 +8,9 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
+
+#include <fmt/format.h>
 
 #include "core/comparison/comparison.hpp"
 #include "core/estimator/estimator.hpp"
@@ -34,8 +38,7 @@ class LineFile {
   /// Opens for appending and creates the file if needed. `pending` is the size of the buffer.
   explicit LineFile(const std::filesystem::path& file, std::size_t pending = kPending);
   ~LineFile();
-  LineFile(const LineFile&) = delete;
-  LineFile& operator=(const LineFile&) = delete;
+  LineFile& operator=(LineFile&&) = delete;
 
   /// Adds a line including its end; flushes first if the buffer is full. Returns false if it was
   /// refused and counted.
@@ -47,6 +50,8 @@ class LineFile {
   void write_back() noexcept;
   /// Flushes, synchronises and closes. May be called twice.
   bool close();
+  /// close(); adds a message to *faults if lines are lost.
+  void close(std::vector<std::string>* faults);
 
   /// Simulates a disk without room, until called with false.
   void pretend_full(bool full) noexcept { pretend_full_ = full; }
@@ -114,7 +119,19 @@ struct EventRecord {
   std::array<char, 256> message{};
   std::array<EventField, 4> fields{};
 
+  EventRecord() = default;
   /// Copies the text, cut at a whole UTF-8 character.
+  EventRecord(Stamp when, const char* what, std::string_view text) noexcept;
+  /// Formats the message in place, without heap.
+  template <class First, class... Rest>
+  EventRecord(Stamp when, const char* what, fmt::format_string<const First&, const Rest&...> text,
+              const First& first, const Rest&... rest) noexcept
+      : stamp(when), kind(what) {
+    std::array<char, 256> buffer;
+    const auto [end, size] = fmt::format_to_n(buffer.data(), buffer.size(), text, first, rest...);
+    set_message({buffer.data(), std::min(size, buffer.size())});
+  }
+
   void set_message(std::string_view text) noexcept;
   [[nodiscard]] static EventRecord of(const EstimatorEvent& event) noexcept;
 };

@@ -1,12 +1,11 @@
 #include "app/session/replay_session.hpp"
 
-#include <algorithm>
 #include <array>
-#include <memory>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "app/session/recorded_source.hpp"
 #include "app/session/session_source.hpp"
@@ -42,10 +41,9 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
 bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
                      const StereoSequence& sequence, StartingCalibration* begin) {
   Progress progress = Progress::on_stderr(request.session.quiet);
-  const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()),
-                                     sequence.pairs.size() - request.start);
   const DriveCalibration found = calibrate_with_progress(
-      {sequence, request.configuration, request.start, count, {}, {}}, *begin, signals, &progress);
+      {sequence, request.configuration, request.start, request.count_of(sequence), {}, {}}, *begin,
+      signals, &progress);
   if (!found.rig) {
     progress.print("vergence: no calibration from the sequence: " + found.why);
     return false;
@@ -83,8 +81,8 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
   if (request.calibration) {
     const Intrinsics& lens = begin.file.rig.intrinsics[0];
     const int recorded = begin.file.rig.cameras;
-    begin.file = read_given_calibration(*request.calibration, use,
-                                        ImageSize{lens.width, lens.height}, &begin.remarks);
+    begin.file = read_any_calibration(*request.calibration, ImageSize{lens.width, lens.height},
+                                      &begin.remarks, use);
     if (begin.file.rig.cameras != recorded)
       throw InputError(fmt::format(
           "{}: has {} cameras, but {} was recorded with {}; use the calibration of that rig",
@@ -110,9 +108,8 @@ ExitCode replay_recording(const ReplayRequest& request) {
         fmt::format("--start {} is beyond the end: {} has {} frames; choose a smaller index",
                     request.start, request.data.string(), session.frames().size()));
   auto other = other_beginning(request, session);
-  const auto source = with_plain_errors([&] {
-    return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
-  });
+  const auto source = with_plain_errors(
+      [&] { return session_source(request, std::move(session), std::move(other)); });
   const SignalGuard signals;
   return run_session(*source, request.configuration, request.session, signals);
 }
@@ -140,8 +137,8 @@ std::vector<std::string> recorded_settings(const std::filesystem::path& session)
   std::vector<std::string> settings = RecordedSession::open(session).description().settings;
   std::erase_if(settings, [&](const std::string& s) {
     const bool mask = s.starts_with("cameras.") && s.find(".mask=") != std::string::npos;
-    return !mask && std::none_of(kept.begin(), kept.end(),
-                                 [&](const char* group) { return s.starts_with(group); });
+    return !mask &&
+           std::ranges::none_of(kept, [&](const char* group) { return s.starts_with(group); });
   });
   return settings;
 }
@@ -165,8 +162,8 @@ ExitCode run_replay(const ReplayRequest& request) {
   if (request.calibrate_first) calibrate_unknown(request, signals, &sequence, &begin);
   if (const auto stopped = signals.stop_code()) return *stopped;
   const auto source = with_plain_errors([&] {
-    return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
-                                            std::move(truth), std::move(ins));
+    return recorded_source(request, std::move(sequence), std::move(begin), std::move(truth),
+                           std::move(ins));
   });
   return run_session(*source, request.configuration, request.session, signals);
 }

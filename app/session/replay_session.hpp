@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
@@ -35,6 +36,11 @@ struct ReplayRequest {
   /// Maximum number of frames; empty for all.
   std::optional<std::size_t> frames;
   Configuration configuration;
+
+  /// Number of frames of the sequence to replay. Precondition: start is one of them.
+  [[nodiscard]] std::size_t count_of(const StereoSequence& sequence) const {
+    return std::min(frames.value_or(sequence.pairs.size()), sequence.pairs.size() - start);
+  }
 };
 
 /// Sequence of a request, with the supplied calibration, if any. Prints on stderr what a

@@ -113,28 +113,13 @@ class SessionOutput {
   explicit SessionOutput(std::span<SessionObserver* const> observers) noexcept
       : observers_(observers) {}
 
-  void post(const RigFrame& frame) noexcept { notify(&SessionObserver::on_frame, frame); }
-  void post_pose(const FrameReport& report) noexcept { notify(&SessionObserver::on_pose, report); }
-  void post(const calibration::TrackLog& tracks) noexcept {
-    notify(&SessionObserver::on_tracks, tracks);
-  }
-  void post(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
-    notify(&SessionObserver::on_enu_alignment, alignment, origin);
-  }
-  void post(const FrameReport& report) noexcept { notify(&SessionObserver::on_report, report); }
-  void post(const EventRecord& event) noexcept { notify(&SessionObserver::on_event, event); }
-  void post(const CalibrationRecord& calibration) noexcept {
-    notify(&SessionObserver::on_calibration, calibration);
-  }
-  /// Precondition: Recorder::Options::ins.
-  void post(const InsRecord& reading) noexcept { notify(&SessionObserver::on_reading, reading); }
-
- private:
+  /// Calls a method of every observer, as in post(&SessionObserver::on_frame, frame).
   template <class Call, class... Values>
-  void notify(Call call, const Values&... values) noexcept {
+  void post(Call call, const Values&... values) noexcept {
     for (SessionObserver* o : observers_) (o->*call)(values...);
   }
 
+ private:
   std::span<SessionObserver* const> observers_{};
 };
 

@@ -43,7 +43,7 @@ std::vector<EndedSession> sessions_beside(const fs::path& session) {
     const auto ended = fs::last_write_time(folder / "summary.json", ignored);
     if (!ignored) found.push_back({folder, ended, bytes_in(folder)});
   }
-  std::sort(found.begin(), found.end(), [](const EndedSession& a, const EndedSession& b) {
+  std::ranges::sort(found, [](const EndedSession& a, const EndedSession& b) {
     return a.ended != b.ended ? a.ended < b.ended : a.folder < b.folder;
   });
   return found;

@@ -33,31 +33,274 @@ namespace {
 class SessionRunner {
  public:
   SessionRunner(FrameSource& source, const Configuration& configuration,
-                const SessionOptions& options, const SignalGuard& signals);
-  [[nodiscard]] ExitCode run();
+                const SessionOptions& options, const SignalGuard& signals)
+      : source_(source),
+        facts_(source.facts()),
+        configuration_(configuration),
+        request_(options),
+        signals_(signals),
+        loop_(source, configuration, options),
+        threads_(configuration.realtime) {}
+  [[nodiscard]] ExitCode run() {
+    std::vector<std::string> faults;
+    open();
+    if (request_.print_memory) print_memory_table(memory());
+    Progress progress = Progress::on_stderr(request_.quiet);
+    const auto allocations_before = AllocationGuard::runtime_allocations();
+    print_remarks(&progress);
+    // Returns the memory that was used during set-up to the system.
+    (void)::malloc_trim(0);
+    threads_.lock_memory(&progress);
+    start_source(&faults);
+    std::thread estimating = start_estimating();
+    service_.ready();
+    watch(&progress);
+    estimating.join();
+    progress.finish();
+    source_.finish(&progress);
+
+    if (recording_) recording_->close(&faults);
+    print_recording_errors(&progress);
+    const Estimator& estimator = loop_.estimator();
+    calibrations_->close(estimator.calibrated() ? &estimator.calibration() : nullptr, &faults);
+    loop_.log_kept_calibrations();
+    loop_.event_log().show(&progress, facts_.frames);
+    const auto totals = recorder_->close();
+    static_cast<CalibrationTotals&>(*totals) = calibrations_->totals();
+    totals->dropped_records += calibrations_->dropped();
+    const SummaryInput input =
+        summary_input(*totals, AllocationGuard::runtime_allocations() - allocations_before);
+    write_files(*totals, input, &faults, &progress);
+    if (!request_.quiet) print_metrics(*totals, input, &progress);
+    // The report reads the files: of a day's drive two are not held at once.
+    // Assigning {} would keep the memory.
+    totals->trajectory = std::vector<StampedPose>();
+    totals->reference = std::vector<StampedPose>();
+    const SessionReport report = write_session_report(request_.out);
+    ExitCode code = verdict(*totals, faults, &progress);
+    if (code == ExitCode::done && !report.outcome.assessment.usable) code = ExitCode::not_usable;
+    print_verdict(report, request_.quiet, &progress);
+    return signals_.stop_code().value_or(code);
+  }
 
  private:
-  void open();
-  void open_files();
-  [[nodiscard]] bool trajectory_is_asked_for() const;
-  [[nodiscard]] SessionStart session_start() const;
-  void print_remarks(Progress* progress);
-  void estimate() noexcept;
-  void watch(Progress* progress);
-  void start_source(std::vector<std::string>* faults);
-  [[nodiscard]] std::thread start_estimating();
-  void leave_no_folder();
-  void halt_source() noexcept;
-  void print_recording_errors(Progress* progress);
+  void open() {
+    // On a full disk there is room for the folder only when the quota has made some.
+    if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
+      removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
+    folder_made_ = make_session_folder(request_.out);
+    try {
+      open_files();
+    } catch (const std::exception&) {
+      leave_no_folder();
+      throw;
+    }
+  }
+  void open_files() {
+    Recorder::Options to_record;
+    to_record.first = facts_.first;
+    to_record.when_full = facts_.when_full;
+    to_record.keep_trajectory = trajectory_is_asked_for();
+    to_record.ins = loop_.comparison() != nullptr;
+    to_record.disk_full = facts_.disk_full;
+    recorder_ = std::make_unique<Recorder>(request_.out, to_record);
+    calibrations_ = std::make_unique<CalibrationWriter>(CalibrationWriter::Options{
+        request_.out, facts_.begin.file, facts_.begin.state, facts_.when_full});
+    observers_ = {recorder_.get(), calibrations_.get()};
+    observers_.insert(observers_.end(), request_.observers.begin(), request_.observers.end());
+    if (configuration_.record.any()) {
+      recording_ = std::make_unique<DriveRecorder>(request_.out, configuration_, facts_,
+                                                   loop_.solver_watch());
+      observers_.push_back(recording_.get());
+      if (configuration_.record.pulses != 0) source_.observe_pulses(recording_.get());
+    }
+    const SessionStart start = session_start();
+    for (SessionObserver* observer : observers_) observer->on_start(start);
+    loop_.open(SessionOutput(observers_), recording_.get(), calibrations_.get());
+    const StartingCalibration& begin = facts_.begin;
+    if (begin.trust != CalibrationTrust::none)
+      loop_.output().post(
+          &SessionObserver::on_calibration,
+          CalibrationRecord::begin(begin.file.rig, facts_.first, begin.cause, begin.source));
+  }
+  /// Returns true if the end of the session needs all poses in memory.
+  [[nodiscard]] bool trajectory_is_asked_for() const {
+    return loop_.comparison() != nullptr || !facts_.truth.empty() || facts_.knows_truth;
+  }
+  [[nodiscard]] SessionStart session_start() const {
+    SessionStart start;
+    start.name = request_.out.filename().string();
+    start.first = facts_.first;
+    start.frames = facts_.frames;
+    start.tie = facts_.tie;
+    const CalibrationFile& file = facts_.begin.file;
+    const RigCalibration& rig = file.rig;
+    start.camera_names = distinct_names({file.names.begin(), file.names.begin() + rig.cameras});
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+      start.image_bytes =
+          std::max(start.image_bytes, static_cast<std::size_t>(rig.intrinsics[k].width) *
+                                          static_cast<std::size_t>(rig.intrinsics[k].height));
+    start.can_recalibrate = facts_.on_request;
+    start.recording = recording_ != nullptr;
+    return start;
+  }
+  void print_remarks(Progress* progress) {
+    for (const std::string& message : removed_) {
+      progress->print("vergence: " + message);
+      loop_.event_log().log(facts_.first, "session_removed", message, false);
+    }
+    for (const SourceRemark& remark : facts_.remarks) {
+      if (remark.print) progress->print("vergence: " + remark.message);
+      if (remark.kind != nullptr)
+        loop_.event_log().log(facts_.first, remark.kind, remark.message, false);
+    }
+  }
+  void estimate() noexcept {
+    loop_.run();
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+    changed_.notify_one();
+  }
+  void watch(Progress* progress) {
+    constexpr std::chrono::milliseconds kPollInterval{50};
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, kPollInterval, [this] { return done_; })) {
+      if (signals_.stop_requested()) source_.stop();
+      source_.poll();
+      service_.alive(loop_.items(), loop_.waiting(), source_.rounds(),
+                     std::chrono::steady_clock::now());
+      if (facts_.on_request && signals_.poll_calibration_request()) loop_.ask_calibration();
+      lock.unlock();
+      if (loop_.drained()) halt_source();
+      threads_.poll(progress);
+      loop_.event_log().show(progress, facts_.frames);
+      print_recording_errors(progress);
+      lock.lock();
+    }
+    lock.unlock();
+    halt_source();
+    loop_.event_log().show(progress, facts_.frames);
+  }
+  void start_source(std::vector<std::string>* faults) {
+    try {
+      source_.start(faults);
+    } catch (const std::exception&) {
+      // Devices that did start may already deliver data to the recording.
+      halt_source();
+      leave_no_folder();
+      throw;
+    }
+  }
+  /// Without it the devices' data are not consumed yet.
+  [[nodiscard]] std::thread start_estimating() {
+    try {
+      return std::thread([this] { estimate(); });
+    } catch (const std::system_error& e) {
+      source_.stop();
+      halt_source();
+      leave_no_folder();
+      throw InputError(
+          fmt::format("the estimator thread cannot be started ({}); raise the limit of processes "
+                      "(ulimit -u; in a service TasksMax) or of memory",
+                      e.code().message()));
+    }
+  }
+  /// Handles a session that ends before it began: a service is started again and again until its
+  /// devices are there.
+  void leave_no_folder() {
+    std::vector<std::string> ignored;
+    if (recording_) recording_->close(&ignored);
+    if (calibrations_) calibrations_->close(nullptr, &ignored);
+    if (recorder_) (void)recorder_->close();
+    discard_session_folder(request_.out, folder_made_);
+  }
+  /// When the drive is over: cameras do not expose on while its last calibration is decided. That
+  /// and cameras that are slow to stop may take longer than the watchdog waits.
+  void halt_source() noexcept {
+    service_.stopping();
+    if (!halted_) source_.halt();
+    halted_ = true;
+  }
+  void print_recording_errors(Progress* progress) {
+    for (const std::string& message : recorder_->pop_errors())
+      progress->print("vergence: " + message);
+    if (!recording_) return;
+    for (const std::string& message : recording_->pop_errors())
+      progress->print("vergence: " + message);
+  }
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
-                                           std::uint64_t allocations) const;
+                                           std::uint64_t allocations) const {
+    SummaryInput input;
+    input.dropped_by_estimator = loop_.event_log().dropped();
+    const Trajectory& reference = loop_.comparison() != nullptr ? totals.reference : facts_.truth;
+    if (!reference.empty() && !totals.trajectory.empty())
+      input.evaluation = evaluate(totals.trajectory, reference, summary_evaluation_options());
+    if (const InsComparison* comparison = loop_.comparison()) {
+      input.comparison = comparison->counters();
+      input.earth = comparison->earth(facts_.ins->mount_source);
+    }
+    describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(), &input);
+    input.runtime_allocations = allocations;
+    input.frame_budget = loop_.options().frame_budget;
+    input.allocations = threads_.allocations();
+    for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
+    input.configuration_hash = configuration_hash(configuration_);
+    input.assumptions = facts_.assumptions;
+    source_.describe(totals, loop_.estimator(), &input);
+    for (SessionObserver* observer : observers_)
+      for (auto& counter : observer->counters()) input.devices.push_back(std::move(counter));
+    return input;
+  }
   void write_files(const SessionTotals& totals, const SummaryInput& input,
-                   std::vector<std::string>* faults, Progress* progress);
+                   std::vector<std::string>* faults, Progress* progress) {
+    write_session_summary(request_.out, totals, input, faults);
+    faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
+    for (const std::string& message : recorder_->pop_errors())
+      progress->print("vergence: " + message);
+    for (const std::string& message : *faults) progress->print("vergence: " + message);
+  }
   void print_metrics(const SessionTotals& totals, const SummaryInput& input,
-                     Progress* progress) const;
+                     Progress* progress) const {
+    progress->print(
+        fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; "
+                    "estimator {:.1f} ms per frame, p99 {:.1f} ms",
+                    request_.out.string(), totals.read, totals.ok + totals.degraded,
+                    totals.degraded, totals.lost, input.skipped, facts_.skipped_label,
+                    totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
+    if (const std::string message = verification_message(input); !message.empty())
+      progress->print(message);
+    if (const std::string message = allocations_message(input.allocations);
+        request_.print_memory && !message.empty())
+      progress->print(message);
+    source_.print_metrics(input, progress);
+  }
   [[nodiscard]] ExitCode verdict(const SessionTotals& totals,
-                                 const std::vector<std::string>& faults, Progress* progress) const;
-  [[nodiscard]] std::vector<MemoryRow> memory() const;
+                                 const std::vector<std::string>& faults, Progress* progress) const {
+    // Also without a pose the user is informed which device was disconnected.
+    const std::optional<ExitCode> of_source = source_.verdict(progress);
+    if (totals.ok + totals.degraded == 0) {
+      progress->print("vergence: no frame has a pose; events.jsonl and poses.csv in " +
+                      request_.out.string() + " have the reasons");
+      return ExitCode::not_usable;
+    }
+    if (of_source) return *of_source;
+    if (loop_.comparison() != nullptr && loop_.comparison()->matches() == 0) {
+      progress->print(
+          "vergence: the INS never had a position, so no pose is compared; the poses are written; "
+          "check its antenna");
+      return ExitCode::not_usable;
+    }
+    return faults.empty() ? ExitCode::done : ExitCode::not_written;
+  }
+  [[nodiscard]] std::vector<MemoryRow> memory() const {
+    return {{"estimator_bytes", loop_.estimator_arena().used(), loop_.estimator_arena().rows()},
+            {"comparison_bytes",
+             loop_.comparison_arena().used() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
+            {"images_bytes", facts_.image_bytes},
+            {"recording_bytes", recording_ ? recording_->memory() : 0},
+            {"recorder_bytes", recorder_->memory() + calibrations_->memory()},
+            {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
+  }
 
   FrameSource& source_;
   const SourceFacts& facts_;
@@ -86,291 +329,6 @@ class SessionRunner {
   // Used by the caller's thread only.
   DriveThreads threads_;
 };
-
-SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
-                             const SessionOptions& options, const SignalGuard& signals)
-    : source_(source),
-      facts_(source.facts()),
-      configuration_(configuration),
-      request_(options),
-      signals_(signals),
-      loop_(source, configuration, options),
-      threads_(configuration.realtime) {}
-
-void SessionRunner::estimate() noexcept {
-  loop_.run();
-  const std::lock_guard lock(mutex_);
-  done_ = true;
-  changed_.notify_one();
-}
-
-void SessionRunner::watch(Progress* progress) {
-  constexpr std::chrono::milliseconds kPollInterval{50};
-  std::unique_lock lock(mutex_);
-  while (!changed_.wait_for(lock, kPollInterval, [this] { return done_; })) {
-    if (signals_.stop_requested()) source_.stop();
-    source_.poll();
-    service_.alive(loop_.items(), loop_.waiting(), source_.rounds(),
-                   std::chrono::steady_clock::now());
-    if (facts_.on_request && signals_.poll_calibration_request()) loop_.ask_calibration();
-    lock.unlock();
-    if (loop_.drained()) halt_source();
-    threads_.poll(progress);
-    loop_.event_log().show(progress, facts_.frames);
-    print_recording_errors(progress);
-    lock.lock();
-  }
-  lock.unlock();
-  halt_source();
-  loop_.event_log().show(progress, facts_.frames);
-}
-
-/// When the drive is over: cameras do not expose on while its last calibration is decided. That and
-/// cameras that are slow to stop may take longer than the watchdog waits.
-void SessionRunner::halt_source() noexcept {
-  service_.stopping();
-  if (!halted_) source_.halt();
-  halted_ = true;
-}
-
-void SessionRunner::start_source(std::vector<std::string>* faults) {
-  try {
-    source_.start(faults);
-  } catch (const std::exception&) {
-    // Devices that did start may already deliver data to the recording.
-    halt_source();
-    leave_no_folder();
-    throw;
-  }
-}
-
-/// Without it the devices' data are not consumed yet.
-std::thread SessionRunner::start_estimating() {
-  try {
-    return std::thread([this] { estimate(); });
-  } catch (const std::system_error& e) {
-    source_.stop();
-    halt_source();
-    leave_no_folder();
-    throw InputError(
-        fmt::format("the estimator thread cannot be started ({}); raise the limit of processes "
-                    "(ulimit -u; in a service TasksMax) or of memory",
-                    e.code().message()));
-  }
-}
-
-/// Handles a session that ends before it began: a service is started again and again until its
-/// devices are there.
-void SessionRunner::leave_no_folder() {
-  std::vector<std::string> ignored;
-  if (recording_) recording_->close(&ignored);
-  if (calibrations_) calibrations_->close(nullptr, &ignored);
-  if (recorder_) (void)recorder_->close();
-  discard_session_folder(request_.out, folder_made_);
-}
-
-void SessionRunner::print_recording_errors(Progress* progress) {
-  for (const std::string& message : recorder_->pop_errors())
-    progress->print("vergence: " + message);
-  if (!recording_) return;
-  for (const std::string& message : recording_->pop_errors())
-    progress->print("vergence: " + message);
-}
-
-void SessionRunner::open() {
-  // On a full disk there is room for the folder only when the quota has made some.
-  if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
-    removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
-  folder_made_ = make_session_folder(request_.out);
-  try {
-    open_files();
-  } catch (const std::exception&) {
-    leave_no_folder();
-    throw;
-  }
-}
-
-void SessionRunner::open_files() {
-  Recorder::Options to_record;
-  to_record.first = facts_.first;
-  to_record.when_full = facts_.when_full;
-  to_record.keep_trajectory = trajectory_is_asked_for();
-  to_record.ins = loop_.comparison() != nullptr;
-  to_record.disk_full = facts_.disk_full;
-  recorder_ = std::make_unique<Recorder>(request_.out, to_record);
-  calibrations_ = std::make_unique<CalibrationWriter>(CalibrationWriter::Options{
-      request_.out, facts_.begin.file, facts_.begin.state, facts_.when_full});
-  observers_ = {recorder_.get(), calibrations_.get()};
-  observers_.insert(observers_.end(), request_.observers.begin(), request_.observers.end());
-  if (configuration_.record.any()) {
-    recording_ =
-        std::make_unique<DriveRecorder>(request_.out, configuration_, facts_, loop_.solver_watch());
-    observers_.push_back(recording_.get());
-    if (configuration_.record.pulses != 0) source_.observe_pulses(recording_.get());
-  }
-  const SessionStart start = session_start();
-  for (SessionObserver* observer : observers_) observer->on_start(start);
-  loop_.open(SessionOutput(observers_), recording_.get(), calibrations_.get());
-  const StartingCalibration& begin = facts_.begin;
-  if (begin.trust != CalibrationTrust::none)
-    loop_.output().post(
-        CalibrationRecord::begin(begin.file.rig, facts_.first, begin.cause, begin.source));
-}
-
-/// Returns true if the end of the session needs all poses in memory.
-bool SessionRunner::trajectory_is_asked_for() const {
-  return loop_.comparison() != nullptr || !facts_.truth.empty() || facts_.knows_truth;
-}
-
-SessionStart SessionRunner::session_start() const {
-  SessionStart start;
-  start.name = request_.out.filename().string();
-  start.first = facts_.first;
-  start.frames = facts_.frames;
-  start.tie = facts_.tie;
-  const CalibrationFile& file = facts_.begin.file;
-  const RigCalibration& rig = file.rig;
-  start.camera_names = distinct_names({file.names.begin(), file.names.begin() + rig.cameras});
-  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
-    start.image_bytes =
-        std::max(start.image_bytes, static_cast<std::size_t>(rig.intrinsics[k].width) *
-                                        static_cast<std::size_t>(rig.intrinsics[k].height));
-  start.can_recalibrate = facts_.on_request;
-  start.recording = recording_ != nullptr;
-  return start;
-}
-
-void SessionRunner::print_remarks(Progress* progress) {
-  for (const std::string& message : removed_) {
-    progress->print("vergence: " + message);
-    loop_.event_log().log(facts_.first, "session_removed", message, false);
-  }
-  for (const SourceRemark& remark : facts_.remarks) {
-    if (remark.print) progress->print("vergence: " + remark.message);
-    if (remark.kind != nullptr)
-      loop_.event_log().log(facts_.first, remark.kind, remark.message, false);
-  }
-}
-
-std::vector<MemoryRow> SessionRunner::memory() const {
-  return {{"estimator_bytes", loop_.estimator_arena().used(), loop_.estimator_arena().rows()},
-          {"comparison_bytes",
-           loop_.comparison_arena().used() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
-          {"images_bytes", facts_.image_bytes},
-          {"recording_bytes", recording_ ? recording_->memory() : 0},
-          {"recorder_bytes", recorder_->memory() + calibrations_->memory()},
-          {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
-}
-
-SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
-                                          std::uint64_t allocations) const {
-  SummaryInput input;
-  input.dropped_by_estimator = loop_.event_log().dropped();
-  const Trajectory& reference = loop_.comparison() != nullptr ? totals.reference : facts_.truth;
-  if (!reference.empty() && !totals.trajectory.empty())
-    input.evaluation = evaluate(totals.trajectory, reference, summary_evaluation_options());
-  if (const InsComparison* comparison = loop_.comparison()) {
-    input.comparison = comparison->counters();
-    input.earth = comparison->earth(facts_.ins->mount_source);
-  }
-  describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(), &input);
-  input.runtime_allocations = allocations;
-  input.frame_budget = loop_.options().frame_budget;
-  input.allocations = threads_.allocations();
-  for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
-  input.configuration_hash = configuration_hash(configuration_);
-  input.assumptions = facts_.assumptions;
-  source_.describe(totals, loop_.estimator(), &input);
-  for (SessionObserver* observer : observers_)
-    for (auto& counter : observer->counters()) input.devices.push_back(std::move(counter));
-  return input;
-}
-
-void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput& input,
-                                std::vector<std::string>* faults, Progress* progress) {
-  write_session_summary(request_.out, totals, input, faults);
-  faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-  for (const std::string& message : recorder_->pop_errors())
-    progress->print("vergence: " + message);
-  for (const std::string& message : *faults) progress->print("vergence: " + message);
-}
-
-void SessionRunner::print_metrics(const SessionTotals& totals, const SummaryInput& input,
-                                  Progress* progress) const {
-  progress->print(
-      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; "
-                  "estimator {:.1f} ms per frame, p99 {:.1f} ms",
-                  request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded,
-                  totals.lost, input.skipped, facts_.skipped_label, totals.path_m,
-                  totals.estimate.mean(), totals.estimate.percentile(0.99)));
-  if (const std::string message = verification_message(input); !message.empty())
-    progress->print(message);
-  if (const std::string message = allocations_message(input.allocations);
-      request_.print_memory && !message.empty())
-    progress->print(message);
-  source_.print_metrics(totals, input, progress);
-}
-
-ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<std::string>& faults,
-                                Progress* progress) const {
-  // Also without a pose the user is informed which device was disconnected.
-  const std::optional<ExitCode> of_source = source_.verdict(progress);
-  if (totals.ok + totals.degraded == 0) {
-    progress->print("vergence: no frame has a pose; events.jsonl and poses.csv in " +
-                    request_.out.string() + " have the reasons");
-    return ExitCode::not_usable;
-  }
-  if (of_source) return *of_source;
-  if (loop_.comparison() != nullptr && loop_.comparison()->matches() == 0) {
-    progress->print(
-        "vergence: the INS never had a position, so no pose is compared; the poses are written; "
-        "check its antenna");
-    return ExitCode::not_usable;
-  }
-  return faults.empty() ? ExitCode::done : ExitCode::not_written;
-}
-
-ExitCode SessionRunner::run() {
-  std::vector<std::string> faults;
-  open();
-  if (request_.print_memory) print_memory_table(memory());
-  Progress progress = Progress::on_stderr(request_.quiet);
-  const auto allocations_before = AllocationGuard::runtime_allocations();
-  print_remarks(&progress);
-  // Returns the memory that was used during set-up to the system.
-  (void)::malloc_trim(0);
-  threads_.lock_memory(&progress);
-  start_source(&faults);
-  std::thread estimating = start_estimating();
-  service_.ready();
-  watch(&progress);
-  estimating.join();
-  progress.finish();
-  source_.finish(&progress, &faults);
-
-  if (recording_) recording_->close(&faults);
-  print_recording_errors(&progress);
-  const Estimator& estimator = loop_.estimator();
-  calibrations_->close(estimator.calibrated() ? &estimator.calibration() : nullptr, &faults);
-  loop_.log_kept_calibrations();
-  loop_.event_log().show(&progress, facts_.frames);
-  const auto totals = recorder_->close();
-  static_cast<CalibrationTotals&>(*totals) = calibrations_->totals();
-  totals->dropped_records += calibrations_->dropped();
-  const SummaryInput input =
-      summary_input(*totals, AllocationGuard::runtime_allocations() - allocations_before);
-  write_files(*totals, input, &faults, &progress);
-  if (!request_.quiet) print_metrics(*totals, input, &progress);
-  // The report reads the files: of a day's drive two are not held at once.
-  // Assigning {} would keep the memory.
-  totals->trajectory = std::vector<StampedPose>();
-  totals->reference = std::vector<StampedPose>();
-  const SessionReport report = write_session_report(request_.out);
-  ExitCode code = verdict(*totals, faults, &progress);
-  if (code == ExitCode::done && !report.outcome.assessment.usable) code = ExitCode::not_usable;
-  print_verdict(report, request_.quiet, &progress);
-  return signals_.stop_code().value_or(code);
-}
 
 }  // namespace
 

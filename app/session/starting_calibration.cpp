@@ -8,7 +8,6 @@
 
 #include "app/config/calibration_state.hpp"
 #include "app/datasets/foreign_calibration.hpp"
-#include "app/datasets/text_file.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/angle.hpp"
@@ -23,46 +22,6 @@ bool is_foreign(const std::string& in) {
   std::error_code ignored;
   return !std::filesystem::is_regular_file(in, ignored) || !is_own_calibration(in);
 }
-
-}  // namespace
-
-CalibrationFile read_given_calibration(const std::string& in, const CalibrationUse& use,
-                                       const std::optional<ImageSize>& size,
-                                       std::vector<std::string>* remarks) {
-  return read_any_calibration(in, size, remarks, use);
-}
-
-GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
-                                   std::vector<std::string>* remarks) {
-  return {in, [in, use, remarks](const StereoSequence& sequence) {
-            // The images are only looked at for a file that may lack their size.
-            const std::optional<ImageSize> size =
-                is_foreign(in) ? std::optional(first_image_size(sequence, 0)) : std::nullopt;
-            return read_given_calibration(in, use, size, remarks);
-          }};
-}
-
-GivenCalibration given_calibration(const AssumedIntrinsics& known) {
-  return {"--focal", [known](const StereoSequence& sequence) {
-            const ImageSize size = first_image_size(sequence, 0);
-            CalibrationFile file;
-            file.source = "given";
-            RigCalibration& rig = file.rig;
-            rig.cameras = 2;
-            rig.baseline = known.baseline;
-            Intrinsics lens;
-            lens.kind = known.model;
-            lens.width = size.width, lens.height = size.height;
-            lens.fx = lens.fy = known.focal;
-            lens.cx = (size.width - 1) / 2.0, lens.cy = (size.height - 1) / 2.0;
-            if (known.wide) lens.distortion = {-0.28, 0.07, 0, 0, 0};
-            rig.intrinsics = {lens, lens};
-            make_parallel(&rig);
-            return file;
-          }};
-}
-
-namespace {
 
 /// The device's own serial says which camera it is: what the configuration finds it by may be an
 /// address, behind which it can be exchanged. A mock's camera is the one asked for.
@@ -86,8 +45,7 @@ void name_cameras(const Configuration& c, const std::vector<std::string>& serial
 bool placed_by_configuration(const Configuration& c, int cameras) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
     const auto& T = c.cameras[k].T_camera_left;
-    if (c.cameras[k].driver != "mock" &&
-        std::all_of(T.begin(), T.end(), [](double v) { return v == 0; }))
+    if (c.cameras[k].driver != "mock" && std::ranges::all_of(T, [](double v) { return v == 0; }))
       return false;
   }
   return true;
@@ -129,6 +87,36 @@ double angle_between(const Vec3& a, const Vec3& b) {
 
 }  // namespace
 
+GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
+                                   std::vector<std::string>* remarks) {
+  return {in, [in, use, remarks](const StereoSequence& sequence) {
+            // The images are only looked at for a file that may lack their size.
+            const std::optional<ImageSize> size =
+                is_foreign(in) ? std::optional(first_image_size(sequence, 0)) : std::nullopt;
+            return read_any_calibration(in, size, remarks, use);
+          }};
+}
+
+GivenCalibration given_calibration(const AssumedIntrinsics& known) {
+  return {"--focal", [known](const StereoSequence& sequence) {
+            const ImageSize size = first_image_size(sequence, 0);
+            CalibrationFile file;
+            file.source = "given";
+            RigCalibration& rig = file.rig;
+            rig.cameras = 2;
+            rig.baseline = known.baseline;
+            Intrinsics lens;
+            lens.kind = known.model;
+            lens.width = size.width, lens.height = size.height;
+            lens.fx = lens.fy = known.focal;
+            lens.cx = (size.width - 1) / 2.0, lens.cy = (size.height - 1) / 2.0;
+            if (known.wide) lens.distortion = {-0.28, 0.07, 0, 0, 0};
+            rig.intrinsics = {lens, lens};
+            make_parallel(&rig);
+            return file;
+          }};
+}
+
 RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibration& mounted,
                                 const calibration::CalibrationOptions& options) {
   RigCalibration nominal = given;
@@ -162,8 +150,8 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
       source.from_scratch || (!source.file && !placed_by_configuration(c, configured.rig.cameras));
   if (source.file) {
     const ImageSize size{configured.rig.intrinsics[0].width, configured.rig.intrinsics[0].height};
-    start.file = read_given_calibration(source.file->string(), {.length_only = source.from_scratch},
-                                        size, &start.remarks);
+    start.file = read_any_calibration(source.file->string(), size, &start.remarks,
+                                      {.length_only = source.from_scratch});
     check_same_rig(source.file->string(), start.file, configured, &start.remarks);
     name_cameras(c, serials, &start.file);
     start.source = source.file->filename().string();

@@ -26,15 +26,6 @@ struct AssumedIntrinsics {
   bool wide = false;
 };
 
-/// Reads a calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or their
-/// directory) or OpenCV stereo YAML, detected by content, and applies `use`. `size` is the image
-/// size if a file has none. *remarks receives messages about data that a format lacks. Throws
-/// InputError.
-[[nodiscard]] CalibrationFile read_given_calibration(const std::string& in,
-                                                     const CalibrationUse& use,
-                                                     const std::optional<ImageSize>& size,
-                                                     std::vector<std::string>* remarks);
-
 /// Calibration for open_sequence().
 [[nodiscard]] GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
                                                  std::vector<std::string>* remarks);

@@ -62,9 +62,7 @@ Json metrics_json(const std::optional<TrajectoryEvaluation>& evaluation) {
 }
 
 bool given(const std::array<double, 6>& sigmas) {
-  for (const double s : sigmas)
-    if (s > 0) return true;
-  return false;
+  return std::ranges::any_of(sigmas, [](double s) { return s > 0; });
 }
 
 /// Returns true if every additional camera has sigmas; otherwise nothing can be predicted.
@@ -146,6 +144,7 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
                              ? Json{{"configured_px", totals.focal.configured_px},
                                     {"measured_px", totals.focal.measured_px},
                                     {"sigma_px", totals.focal.sigma_px},
+                                    {"doubted", totals.focal.doubted},
                                     {"contradicted", totals.focal.contradicted}}
                              : Json();
   json["initial"] = input.before ? health_json(*input.before, input.options) : Json();

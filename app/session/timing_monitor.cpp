@@ -1,8 +1,10 @@
 #include "app/session/timing_monitor.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -16,29 +18,33 @@ constexpr double kMicroseconds = 1e6;
 
 double us(Duration d) { return d.to_seconds() * kMicroseconds; }
 
-template <class... Arguments>
-TimingMonitor::Message message(const char* kind, bool to_user, const char* format,
-                               Arguments... arguments) noexcept {
-  TimingMonitor::Message s;
-  s.kind = kind;
-  s.to_user = to_user;
-  (void)std::snprintf(s.text.data(), s.text.size(), format, arguments...);
-  return s;
+const char* fix_name(FixStatus fix) noexcept {
+  constexpr std::array kNames{"no position", "dead reckoning", "a fix without height", "a fix"};
+  return kNames[static_cast<std::size_t>(fix)];
 }
 
-const char* fix_name(FixStatus fix) noexcept {
-  switch (fix) {
-    case FixStatus::none:
-      return "no position";
-    case FixStatus::fix_2d:
-      return "a fix without height";
-    case FixStatus::fix_3d:
-      return "a fix";
-    case FixStatus::dead_reckoning:
-      return "dead reckoning";
-  }
-  return "";
-}
+/// Representation of a device event in events.jsonl.
+struct DeviceReport {
+  const char* kind;
+  bool to_user;
+  // Format of the message: {0} is the camera, {1} the seconds.
+  const char* text;
+};
+/// In the order of DeviceEvent::Kind.
+constexpr std::array kDeviceReports{
+    DeviceReport{"camera_disconnected", true,
+                 "camera {0} is disconnected; the run continues without it"},
+    DeviceReport{"camera_reconnected", true, "camera {0} is reconnected"},
+    DeviceReport{"trigger_board_disconnected", true,
+                 "the trigger board is disconnected: check its cable; reconnecting every second"},
+    DeviceReport{"trigger_board_reconnected", true, "the trigger board is reconnected"},
+    DeviceReport{"trigger_board_restarted", true,
+                 "the trigger board restarted: its pulses count from 0; the pairing is being "
+                 "verified again"},
+    DeviceReport{"pairing_pending", false,
+                 "images of camera {0} are not used until their pulses are identified"},
+    DeviceReport{"pairing_verified", false,
+                 "the pairing of camera {0} is verified after {1:.2f} s"}};
 
 using Json = nlohmann::ordered_json;
 
@@ -63,45 +69,24 @@ Json latency_json(const TimeHistogram& latency, bool is_virtual) {
 
 }  // namespace
 
-TimingMonitor::Message TimingMonitor::of_device(const DeviceEvent& event) const noexcept {
-  using Kind = DeviceEvent::Kind;
-  switch (event.kind) {
-    case Kind::camera_disconnected:
-      return message("camera_disconnected", true,
-                     "camera %d is disconnected; the run continues without it", event.camera);
-    case Kind::camera_reconnected:
-      return message("camera_reconnected", true, "camera %d is reconnected", event.camera);
-    case Kind::trigger_board_disconnected:
-      return message(
-          "trigger_board_disconnected", true,
-          "the trigger board is disconnected: check its cable; reconnecting every second");
-    case Kind::trigger_board_reconnected:
-      return message("trigger_board_reconnected", true, "the trigger board is reconnected");
-    case Kind::trigger_board_restarted:
-      return message("trigger_board_restarted", true,
-                     "the trigger board restarted: its pulses count from 0; the pairing is being "
-                     "verified again");
-    case Kind::pairing_pending:
-      return message("pairing_pending", false,
-                     "images of camera %d are not used until their pulses are identified",
-                     event.camera);
-    case Kind::pairing_verified:
-      return message("pairing_verified", false, "the pairing of camera %d is verified after %.2f s",
-                     event.camera, event.seconds);
-  }
-  return {};
+SourceEvent TimingMonitor::of_device(const DeviceEvent& event) noexcept {
+  const DeviceReport& report = kDeviceReports[static_cast<std::size_t>(event.kind)];
+  return {
+      EventRecord(event.stamp, report.kind, fmt::runtime(report.text), event.camera, event.seconds),
+      report.to_user};
 }
 
-TimingMonitor::Message TimingMonitor::of_set(const SyncedSet& set) noexcept {
-  const bool was = ambiguous_;
-  ambiguous_ = set.proof == SyncProof::ambiguous;
-  if (was || !ambiguous_) return {};
-  return message("pairing_ambiguous", true,
-                 "ambiguous pair: pulses, counters and stamps contradict each other%s",
-                 verifies_pairing(mode_) ? "; one image is used alone" : "");
+std::optional<SourceEvent> TimingMonitor::of_set(const AcquiredFrame& frame) noexcept {
+  const bool was = std::exchange(ambiguous_, frame.set.proof == SyncProof::ambiguous);
+  if (was || !ambiguous_) return std::nullopt;
+  return SourceEvent{EventRecord(frame.rig.stamp, "pairing_ambiguous",
+                                 "ambiguous pair: pulses, counters and stamps contradict each "
+                                 "other{}",
+                                 verifies_pairing(mode_) ? "; one image is used alone" : ""),
+                     true};
 }
 
-TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexcept {
+std::optional<SourceEvent> TimingMonitor::of_reading(const InsRecord& reading) noexcept {
   // Minimum change of the satellite count that is reported.
   constexpr int kMany = 3;
   const InsQuality& q = reading.quality;
@@ -118,25 +103,26 @@ TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexc
     (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
   // A device that reports no filter state has no status either.
   const bool given = q.status != 0 || q.filter_valid;
-  return message("ins_status", false, "the INS has %s%s%s", fix_name(fix_), satellites.data(),
-                 !given           ? ""
-                 : q.filter_valid ? ", filter valid"
-                                  : ", filter not valid");
+  return SourceEvent{EventRecord(reading.sample.stamp, "ins_status", "the INS has {}{}{}",
+                                 fix_name(fix_), satellites.data(),
+                                 !given           ? ""
+                                 : q.filter_valid ? ", filter valid"
+                                                  : ", filter not valid")};
 }
 
-TimingMonitor::Message TimingMonitor::of_utc(const InsRecord& reading) noexcept {
+std::optional<SourceEvent> TimingMonitor::of_utc(const InsRecord& reading) noexcept {
   // Minimum clock step in s that is reported.
   constexpr double kStep = 0.1;
-  if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
+  if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return std::nullopt;
   const double ahead =
       static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
-  if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
+  if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return std::nullopt;
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
-  return message(
-      "utc_offset", false,
-      "the session's stamps are %.4f s %s the INS's UTC; they follow the host clock at the start",
-      std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
+  return SourceEvent{EventRecord(
+      reading.sample.stamp, "utc_offset",
+      "the session's stamps are {:.4f} s {} the INS's UTC; they follow the host clock at the start",
+      std::abs(ahead), ahead < 0 ? "behind" : "ahead of")};
 }
 
 void TimingMonitor::record_pose(const AcquiredFrame& frame, float estimate_ms,

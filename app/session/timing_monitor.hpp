@@ -1,9 +1,10 @@
 #pragma once
-#include <array>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
 #include "app/devices/drive_devices.hpp"
+#include "app/session/frame_source.hpp"
 #include "app/session/session_totals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 
@@ -16,22 +17,15 @@ namespace vergence::app {
 ///          messages are in place.
 class TimingMonitor {
  public:
-  struct Message {
-    // Null if there is nothing to report.
-    const char* kind = nullptr;
-    std::array<char, 200> text{};
-    bool to_user = false;
-  };
-
   explicit TimingMonitor(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
 
-  /// Message of a device event.
-  [[nodiscard]] Message of_device(const DeviceEvent& event) const noexcept;
-  /// A set that was handed out: tells when a run of ambiguous ones begins.
-  [[nodiscard]] Message of_set(const SyncedSet& set) noexcept;
-  /// A reading: tells when what the receiver and the filter say has changed, and of the
-  /// session's stamps against UTC.
-  [[nodiscard]] Message of_reading(const InsRecord& reading) noexcept;
+  /// Event of a device.
+  [[nodiscard]] static SourceEvent of_device(const DeviceEvent& event) noexcept;
+  /// Event of a set that was handed out, if a run of ambiguous ones begins.
+  [[nodiscard]] std::optional<SourceEvent> of_set(const AcquiredFrame& frame) noexcept;
+  /// Event of an INS sample, if the state of the receiver or the filter has changed, or the offset
+  /// of the session's stamps from UTC.
+  [[nodiscard]] std::optional<SourceEvent> of_reading(const InsRecord& reading) noexcept;
 
   /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,
   /// meaningless in virtual time.
@@ -42,7 +36,7 @@ class TimingMonitor {
                                             const DriveDevices& devices) const;
 
  private:
-  [[nodiscard]] Message of_utc(const InsRecord& reading) noexcept;
+  [[nodiscard]] std::optional<SourceEvent> of_utc(const InsRecord& reading) noexcept;
 
   SyncMode mode_;
   bool virtual_;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <fstream>
 #include <iostream>
-#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

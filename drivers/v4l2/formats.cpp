@@ -58,8 +58,6 @@ void unpack_every_other(const std::uint8_t* from, std::size_t width, std::uint8_
 
 }  // namespace
 
-std::span<const PixelFormat> known_formats() noexcept { return kFormats; }
-
 std::string name_of(std::uint32_t fourcc) {
   std::string name;
   for (unsigned i = 0; i < 4; ++i) {

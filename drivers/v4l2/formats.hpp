@@ -30,13 +30,11 @@ struct PixelFormat {
   int shift = 0;
 };
 
-/// All formats that the driver converts to grey, cheapest first.
-[[nodiscard]] std::span<const PixelFormat> known_formats() noexcept;
 /// The four characters without trailing blanks; unprintable ones become '?'.
 [[nodiscard]] std::string name_of(std::uint32_t fourcc);
 
-/// Returns the format called `requested`, or the first of known_formats() if that is empty. Null if
-/// none is offered.
+/// Returns the format called `requested`, or the cheapest to convert to grey if that is empty. Null
+/// if none is offered.
 [[nodiscard]] const PixelFormat* choose_format(std::span<const std::uint32_t> offered,
                                                std::string_view requested) noexcept;
 

@@ -34,12 +34,6 @@ constexpr std::array<std::uint16_t, 11> kRatesExcluded{10, 15, 18,  25,  45, 50,
 
 }  // namespace
 
-std::optional<Generation> generation_of_device_id(std::uint32_t id) noexcept {
-  if ((id & 0xFFF00000U) == 0x00500000U) return Generation::legacy;
-  if ((id & 0xFFF00000U) == 0x07700000U) return Generation::mark4;
-  return std::nullopt;
-}
-
 std::optional<std::uint8_t> baud_code(std::uint32_t baud, Generation generation) noexcept {
   if (baud == 921600 && generation == Generation::legacy) return kOldCode921600;
   if (baud == 2000000 && generation == Generation::legacy) return std::nullopt;

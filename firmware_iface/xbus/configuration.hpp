@@ -15,10 +15,6 @@ namespace vergence::xbus {
 /// have different meanings.
 enum class Generation : std::uint8_t { legacy, mark4 };
 
-/// Generation by the range of a device id; nullopt if unknown. The device's answer to
-/// `output_configuration` then decides.
-[[nodiscard]] std::optional<Generation> generation_of_device_id(std::uint32_t id) noexcept;
-
 // Baud rate.
 
 /// Code of message 18; empty if the device does not support the rate. 921600 uses the MTi-G's old

@@ -68,7 +68,7 @@ std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
   if (files.size() > kMaxFiles)
     refuse(bag, 0, "holds {} {} files; at most {} are supported", files.size(), ending, kMaxFiles);
   // Recorders count without leading zeros: drive_2.mcap precedes drive_10.mcap.
-  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
     return in_name_order(a.filename().string(), b.filename().string());
   });
   return files;
@@ -88,17 +88,17 @@ class Indexer {
     bag_.files = std::move(files);
     for (; file_ < bag_.files.size(); ++file_) scan();
     for (auto& [topic, of_topic] : bag_.images) put_in_order(&of_topic);
-    const auto order = [](auto& topics) {
+    const auto order = [](auto& topics, const auto& stamp) {
       for (auto& [name, topic] : topics) {
         std::vector<Stamp> stamps;
-        for (const auto& reading : topic.readings) stamps.push_back(reading.stamp);
+        for (const auto& reading : topic.readings) stamps.push_back(stamp(reading));
         const std::vector<std::size_t> kept = ascending(stamps);
         topic.backwards = stamps.size() - kept.size();
         keep(kept, &topic.readings);
       }
     };
-    order(bag_.fixes);
-    order(bag_.attitudes);
+    order(bag_.fixes, [](const InsRecord& fix) { return fix.sample.stamp; });
+    order(bag_.attitudes, [](const RosAttitude& attitude) { return attitude.stamp; });
   }
   BagIndex release_index() { return std::move(bag_); }
 
@@ -126,8 +126,7 @@ class Indexer {
   void read_other(const BagMessage& message) {
     constexpr std::size_t kMax = 8;
     std::string name = message.channel->topic + " of " + message.channel->type;
-    if (bag_.others.size() < kMax &&
-        std::find(bag_.others.begin(), bag_.others.end(), name) == bag_.others.end())
+    if (bag_.others.size() < kMax && std::ranges::find(bag_.others, name) == bag_.others.end())
       bag_.others.push_back(std::move(name));
   }
 

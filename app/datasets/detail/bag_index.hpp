@@ -63,7 +63,7 @@ struct BagIndex {
   /// By topic, as the next ones.
   std::map<std::string, ImageTopic> images{};
   std::map<std::string, RosCameraInfo> infos{};
-  std::map<std::string, ReadingTopic<RosFix>> fixes{};
+  std::map<std::string, ReadingTopic<InsRecord>> fixes{};
   /// Messages without orientation count as unreadable.
   std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};
   /// Some topics that are not read, each with its type.

@@ -43,19 +43,6 @@ void set_attitude(const Eigen::Quaterniond& q, InsSample* s) {
   s->attitude_valid = true;
 }
 
-InsRecord to_reading(const RosFix& fix, std::size_t number) {
-  InsRecord r;
-  r.sample.number = number;
-  r.sample.stamp = fix.stamp;
-  r.sample.fix = fix.fix;
-  r.sample.position = fix.position;
-  r.sample.position_sigma = fix.position_sigma;
-  r.sample.height_sigma = fix.height_sigma;
-  r.quality.status = fix.status;
-  r.quality.filter_valid = fix.fix != FixStatus::none;
-  return r;
-}
-
 /// Interpolates the orientation at the fix's time. *next is the index of the first orientation that
 /// is not before the previous fix, and is advanced to this one. Returns false if none is near.
 bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, InsRecord* r) {
@@ -79,23 +66,23 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, I
 }
 
 void remark_without_fix(const std::string& name, RecordedIns* ins) {
-  const auto without =
-      std::count_if(ins->readings.begin(), ins->readings.end(), [](const InsRecord& r) {
-        return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
-      });
+  const auto without = std::ranges::count_if(ins->readings, [](const InsRecord& r) {
+    return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
+  });
   if (without > 0)
     ins->remarks.push_back(
         fmt::format("{}: {} of {} samples have no fix: poses are not compared there", name, without,
                     ins->readings.size()));
 }
 
-RecordedIns combine(const std::string& name, const std::vector<RosFix>& fixes,
+RecordedIns combine(const std::string& name, const std::vector<InsRecord>& fixes,
                     const std::string& imu, const std::vector<RosAttitude>& attitudes) {
   RecordedIns ins;
   ins.readings.reserve(fixes.size());
   std::size_t next = 0, without = 0;
-  for (const RosFix& fix : fixes) {
-    InsRecord& r = ins.readings.emplace_back(to_reading(fix, ins.readings.size()));
+  for (const InsRecord& fix : fixes) {
+    InsRecord& r = ins.readings.emplace_back(fix);
+    r.sample.number = ins.readings.size() - 1;
     if (!attitude_at(attitudes, &next, &r)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
@@ -109,7 +96,7 @@ RecordedIns combine(const std::string& name, const std::vector<RosFix>& fixes,
 
 void require(const std::filesystem::path& path, const BagIndex& bag, const std::string& option,
              const std::string& requested, const std::vector<std::string>& there) {
-  if (requested.empty() || std::find(there.begin(), there.end(), requested) != there.end()) return;
+  if (requested.empty() || std::ranges::find(there, requested) != there.end()) return;
   refuse(
       path, 0,
       "has no usable sample on {} for {}; NavSatFix topics: {}; Imu topics with an orientation: {}",

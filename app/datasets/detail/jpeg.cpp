@@ -1,6 +1,7 @@
 #include "app/datasets/detail/image_kinds.hpp"
 
 #include <algorithm>
+#include <array>
 #include <csetjmp>
 #include <cstdio>
 
@@ -38,18 +39,10 @@ Decoder* decoder_of(j_common_ptr jpeg) noexcept { return static_cast<Decoder*>(j
 
 /// After these warnings the decoder continues with grey or misplaced blocks.
 bool is_damage(int code) noexcept {
-  switch (code) {
-    case JWRN_HIT_MARKER:
-    case JWRN_HUFF_BAD_CODE:
-    case JWRN_ARITH_BAD_CODE:
-    case JWRN_JPEG_EOF:
-    case JWRN_MUST_RESYNC:
-    case JWRN_NOT_SEQUENTIAL:
-    case JWRN_BOGUS_PROGRESSION:
-      return true;
-    default:
-      return false;
-  }
+  constexpr std::array kDamage{JWRN_HIT_MARKER,       JWRN_HUFF_BAD_CODE, JWRN_ARITH_BAD_CODE,
+                               JWRN_JPEG_EOF,         JWRN_MUST_RESYNC,   JWRN_NOT_SEQUENTIAL,
+                               JWRN_BOGUS_PROGRESSION};
+  return std::ranges::find(kDamage, code) != kDamage.end();
 }
 
 void listen(j_common_ptr jpeg, int level) {

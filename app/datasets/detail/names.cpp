@@ -18,8 +18,7 @@ constexpr const char* kSides =
     "cam_0 cam_1 cam00 cam01 camera0 camera1 camera_0 camera_1 image_0 image_1 image_00 image_01 "
     "image0 image1 image_2 image_3 image_02 image_03 img0 img1 cam1 cam2 cam_1 cam_2 camera1 "
     "camera2 camera_1 camera_2 image_1 image_2 image1 image2 i1 i2 caml camr imgl imgr lcam rcam l "
-    "r c0 c1 "
-    "0 1";
+    "r c0 c1 0 1";
 
 std::vector<Sides> all_sides() {
   std::vector<Sides> all;
@@ -87,7 +86,7 @@ bool in_name_order(std::string_view a, std::string_view b) noexcept {
 
 std::string lower(std::string_view text) {
   std::string small(text);
-  std::transform(small.begin(), small.end(), small.begin(), [](char c) {
+  std::ranges::transform(small, small.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
   return small;
@@ -103,8 +102,8 @@ std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::stri
     for (const auto& [small, name] : there) {
       const auto other = replaced(small, sides.left, sides.right);
       const auto found = other ? there.find(*other) : there.end();
-      const bool paired = std::any_of(pairs.begin(), pairs.end(),
-                                      [&name = name](const auto& pair) { return pair[0] == name; });
+      const bool paired =
+          std::ranges::any_of(pairs, [&name = name](const auto& pair) { return pair[0] == name; });
       if (found != there.end() && !paired) pairs.push_back({name, found->second});
     }
   }

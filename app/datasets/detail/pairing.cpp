@@ -25,8 +25,8 @@ class Sorted {
  public:
   explicit Sorted(std::span<const Stamp> stamps) : stamps_(stamps), order_(stamps.size()) {
     std::iota(order_.begin(), order_.end(), std::size_t{0});
-    std::stable_sort(order_.begin(), order_.end(),
-                     [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
+    std::ranges::stable_sort(order_,
+                             [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
   }
   /// Index of the nearest stamp; the earlier one of two. Precondition: there is one.
   [[nodiscard]] std::size_t nearest(Stamp to) const {

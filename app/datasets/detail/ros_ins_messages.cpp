@@ -27,10 +27,11 @@ bool make_unit(std::array<double, 4>* q) noexcept {
 
 }  // namespace
 
-std::optional<RosFix> read_ros_fix(std::span<const std::uint8_t> message,
-                                   MessageEncoding encoding) {
+std::optional<InsRecord> read_ros_fix(std::span<const std::uint8_t> message,
+                                      MessageEncoding encoding) {
   RosReader in(message, encoding);
-  RosFix fix;
+  InsRecord record;
+  InsSample& fix = record.sample;
   fix.stamp = in.header();
   // −1 is no fix, 0 a fix, 1 and 2 a fix with corrections.
   const auto status = in.get<std::int8_t>();
@@ -44,15 +45,16 @@ std::optional<RosFix> read_ros_fix(std::span<const std::uint8_t> message,
   const auto covariance = in.doubles<9>();
   const auto covariance_type = in.get<std::uint8_t>();
   if (!in.ok()) return std::nullopt;
-  fix.status = static_cast<std::uint8_t>(status);
+  record.quality.status = static_cast<std::uint8_t>(status);
   if (covariance_type != 0) {
     fix.position_sigma = sigma(covariance[0], covariance[4]);
     fix.height_sigma = sigma(covariance[8], covariance[8]);
   }
   if (status < 0) {
     if (!fix.position.plausible()) fix.position = {};
-    return fix;
+    return record;
   }
+  record.quality.filter_valid = true;
   fix.fix = FixStatus::fix_3d;
   if (std::isnan(fix.position.height_m)) {
     fix.fix = FixStatus::fix_2d;
@@ -60,7 +62,7 @@ std::optional<RosFix> read_ros_fix(std::span<const std::uint8_t> message,
     fix.height_sigma = kUnknownHeight;
   }
   if (!fix.position.plausible()) return std::nullopt;
-  return fix;
+  return record;
 }
 
 std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> message,

@@ -5,25 +5,16 @@
 #include <span>
 
 #include "app/datasets/detail/bag_scan.hpp"
-#include "core/types/ins_sample.hpp"
+#include "drivers/ins.hpp"
 
 /// ROS messages of an INS, of ROS 2 (CDR) and ROS 1. By REP 103 the world is east, north, up and a
 /// body forward, left, up. Readers return nothing for invalid messages or numbers.
 namespace vergence::app::detail {
 
-/// Content of sensor_msgs/NavSatFix.
-struct RosFix {
-  Stamp stamp{};
-  /// With fix_2d there is no height.
-  FixStatus fix = FixStatus::none;
-  /// Value in the message, as an unsigned byte.
-  std::uint8_t status = 0;
-  Geodetic position{};
-  /// In m; 0 if unknown.
-  double position_sigma = 0, height_sigma = 0;
-};
-[[nodiscard]] std::optional<RosFix> read_ros_fix(std::span<const std::uint8_t> message,
-                                                 MessageEncoding encoding);
+/// Content of sensor_msgs/NavSatFix, without an attitude. With fix_2d there is no height; sigmas
+/// are 0 if unknown. The status is that of the message, as an unsigned byte.
+[[nodiscard]] std::optional<InsRecord> read_ros_fix(std::span<const std::uint8_t> message,
+                                                    MessageEncoding encoding);
 
 struct RosAttitude {
   Stamp stamp{};

@@ -15,8 +15,6 @@
 #include <cstring>
 #include <fstream>
 
-#include "drivers/gige/link_budget.hpp"
-
 namespace vergence::gige {
 namespace {
 
@@ -125,18 +123,6 @@ std::int64_t set_receive_buffer(int socket, std::int64_t bytes) {
   if (::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &got, &length) != 0) return 0;
   // The kernel doubles the requested size for its own bookkeeping.
   return got / 2;
-}
-
-LinkBudget link_budget(const LinkDemand& d) noexcept {
-  // Typical limits of cameras, in bytes.
-  constexpr int kMinPacket = 576, kMaxPacket = 65'000, kStep = 4;
-  const LinkLoad load{d.image_bytes, d.rate_hz, d.cameras, false};
-  LinkBudget budget;
-  budget.packet_size = choose_packet_size(d.packet_size, d.mtu, kMinPacket, kMaxPacket, kStep);
-  budget.used =
-      plan_link(load, budget.packet_size, d.speed, Duration::nanoseconds(-1)).share / kMaxOfPeriod;
-  budget.highest_hz = highest_rate(load, budget.packet_size, d.speed);
-  return budget;
 }
 
 }  // namespace vergence::gige
