@@ -11,18 +11,13 @@
 //
 // All take --set KEY=VALUE.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <deque>
-#include <functional>
 #include <span>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 
-#include "app/config/configuration.hpp"
 #include "app/runtime/background_thread.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "core/calibration/agreement.hpp"
@@ -50,8 +45,8 @@ void print(const std::string& drive_name, const std::string& what, const DriveOu
              r.since_verified > 0 ? 100.0 * r.ok_since_verified / r.since_verified : 0.0);
   if (r.contradicted_at >= 0)
     fmt::print("  contradicted at {} by {:.1f} %", r.contradicted_at, r.contradicted_percent);
-  if (r.reported_at >= 0 || r.mended_at >= 0)
-    fmt::print("  detected at {}, recalibrated at {}", r.reported_at, r.mended_at);
+  if (r.reported_at >= 0 || r.recalibrated_at >= 0)
+    fmt::print("  detected at {}, recalibrated at {}", r.reported_at, r.recalibrated_at);
   fmt::print("\n");
   std::fflush(stdout);
 }
@@ -83,7 +78,7 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
   print(d.name, "own calibration, held", drive_recorded(d, d.sequence, held, given));
   print(d.name, "own calibration, one pass", drive_recorded(d, d.sequence, c, given));
   const app::DriveCalibration found =
-      app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
+      app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size()}, given);
   if (!found.rig) {
     fmt::print("{:12s} calibrate first: {}\n", d.name, found.why);
     return;
@@ -106,10 +101,10 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
         fmt::format("turned ({:g}, {:g}, {:g}) deg", turn.x(), turn.y(), turn.z());
     const StartingCalibration wrong = app::replayed_calibration(c, s, false);
     print(d.name, words + ", one pass", drive_recorded(d, s, c, wrong));
-    const app::DriveCalibration mended =
-        app::calibrate_drive({s, c, 0, s.pairs.size(), {}, {}}, wrong);
+    const app::DriveCalibration recalibrated =
+        app::calibrate_drive({s, c, 0, s.pairs.size()}, wrong);
     StartingCalibration then = wrong;
-    if (mended.rig) then.file.rig = *mended.rig;
+    if (recalibrated.rig) then.file.rig = *recalibrated.rig;
     print(d.name, words + ", first", drive_recorded(d, s, c, then));
   }
   const std::size_t at = d.sequence.pairs.size() / 2;
@@ -120,12 +115,11 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
     const DriveOutcome r = drive_recorded(d, s, c, first, at);
     fmt::print(
         "{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: detected after {}, recalibrated after {}, "
-        "{} ok "
-        "before that, {} false before it; seg {:.3f} % ATE {:.4f} m\n",
+        "{} ok before that, {} false before it; seg {:.3f} % ATE {:.4f} m\n",
         d.name, at, turn.x(), turn.y(), turn.z(),
         r.reported_at < 0 ? -1 : r.reported_at - static_cast<int>(at),
-        r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks,
-        r.segments_percent, r.ate_m);
+        r.recalibrated_at < 0 ? -1 : r.recalibrated_at - static_cast<int>(at),
+        r.ok_before_recalibrated, r.knocks, r.segments_percent, r.ate_m);
     std::fflush(stdout);
   }
 }
@@ -212,7 +206,7 @@ std::array<std::vector<RigSolution>, kStretches.size()> solve_stretches(
     stretches.emplace_back(SegmentSolver::Kind::alone, given.file.rig, given.file.rig, n,
                            c.calibration, c.monitor, features, arena);
   std::array<std::vector<RigSolution>, kStretches.size()> solved;
-  const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size(), {}, {}};
+  const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size()};
   (void)app::drive_once(pass, given, [&](const Estimator& e, const PoseSample& /*sample*/) {
     for (std::size_t i = 0; i < kStretches.size(); ++i) {
       const auto s = stretches[i].add(e.tracks());
@@ -224,7 +218,7 @@ std::array<std::vector<RigSolution>, kStretches.size()> solve_stretches(
 
 void print_solves(const RecordedSequence& d, const app::Configuration& c) {
   const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
-  const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size(), {}, {}};
+  const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size()};
   const app::DriveCalibration whole = app::calibrate_drive(pass, given);
   if (!whole.rig) return;
   const auto solved = solve_stretches(d, c, given);
@@ -273,7 +267,7 @@ int run_stretches(const std::vector<std::string>& set, const std::string& only) 
       for_drives(set, only, [](const RecordedSequence& d, const app::Configuration& c) {
         const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
         const app::DriveCalibration found =
-            app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
+            app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size()}, given);
         print_stretches(d.name, found.stretches);
       });
   if (only.empty() || only == "mock") {

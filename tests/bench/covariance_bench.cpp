@@ -9,23 +9,16 @@
 // position after the path is turned about its start onto the truth's, which does not depend on the
 // truth's orientation there. The recorded drives' truth has errors of its own, which are added to
 // the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger, Lenz, Urtasun, CVPR 2012), of EuRoC's
-// Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where nothing is stated, an assumed 0.05°. The
-// last line of a drive is the largest share of a motion that the window corrected by more than the
-// motion's sigma.
+// Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where nothing is stated, an assumed 0.05°.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
-#include <span>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "app/session/drive_calibration.hpp"
-#include "core/estimator/detail/window_correction.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/odometry/drift_covariance.hpp"
 #include "tests/support/integrity.hpp"
@@ -147,7 +140,7 @@ std::vector<Posed> drive(const test::RecordedSequence& d) {
   const app::Configuration c = app::load_configuration(std::nullopt, {});
   const app::StartingCalibration begin = app::replayed_calibration(c, d.sequence, false);
   std::vector<Posed> poses;
-  (void)app::drive_once({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, begin,
+  (void)app::drive_once({d.sequence, c, 0, d.sequence.pairs.size()}, begin,
                         [&](const Estimator&, const PoseSample& sample) {
                           const Transform* truth = test::true_pose(d.truth, sample.stamp);
                           if (sample.status == PoseStatus::lost || truth == nullptr) return;
@@ -178,22 +171,6 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
   return poses;
 }
 
-/// Largest share of a motion that the window corrected by more than the motion's sigma.
-double largest_correction(std::span<const Posed> poses) {
-  double largest = 0;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    const Transform motion =
-        poses[i - 1].sample.T_world_left.inverse() * poses[i].sample.T_world_left;
-    const Mat6 C = full(poses[i].sample.motion_covariance);
-    const auto moved_m = static_cast<double>(poses[i].sample.corrected_m);
-    const double sigma_m =
-        std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace() - moved_m * moved_m));
-    if (WindowCorrection{moved_m, motion.t.norm(), sigma_m}.significant())
-      largest = std::max(largest, moved_m / motion.t.norm());
-  }
-  return largest;
-}
-
 void print(const std::string& name, const TruthSigma& sigma, std::span<const Posed> poses) {
   if (poses.empty()) return;
   for (const std::size_t frames : {1U, 5U, 10U, 20U, 50U, 100U}) {
@@ -208,9 +185,6 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   for (std::size_t i = 10; i < poses.size(); ++i)
     add_motion(poses.first(i + 1), sigma, full(poses[i].sample.covariance), &all);
   all.print(name, "all");
-  fmt::print(
-      "{:12s} the window's largest correction beyond a motion's sigma: {:.1f} % of the motion\n",
-      name, 100 * largest_correction(poses));
 }
 
 }  // namespace

@@ -7,9 +7,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -57,8 +55,7 @@ int main(int argc, char** argv) {
   }
   fmt::print(
       "\n{} of {} with a wrong `ok`, an `ok` at a time without truth, an exit that is not 0 or "
-      "without a "
-      "whole session, or not said, {} not usable any more within a minute\n",
+      "without a whole session, or not said, {} not usable any more within a minute\n",
       bad, cases.size(), unusable);
   return bad + unusable > 0 ? 1 : 0;
 }

@@ -7,12 +7,8 @@
 // poses whose 20 frames, or as many as there were since the last pose that was not `ok`, are; "over
 // 20" says how many there are when poses before that count, too, although they were told as
 // `degraded`.
-#include <array>
 #include <cstdlib>
-#include <numbers>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -44,8 +40,7 @@ void print_events(const Estimator& e, const PoseSample& sample) {
   for (const CalibrationDecision& d : e.calibrations())
     fmt::print(
         "    frame {:3d} calibration of {} frames {} {}: held out {:.3f} → {:.3f} px, depth {:.2f} "
-        "% "
-        "known to {:.2f} % at {:.1f} m{}\n",
+        "% known to {:.2f} % at {:.1f} m{}\n",
         sample.frame, d.calibration.frames, d.accepted ? "accepted" : "rejected", d.reason,
         d.held_out_before_px, d.held_out_after_px, d.depth_error_percent, d.depth_sigma_percent,
         d.reference_depth_m, d.verified ? ", verified" : "");
@@ -54,7 +49,7 @@ void print_events(const Estimator& e, const PoseSample& sample) {
 Driven drive(const app::StereoSequence& s, const app::Configuration& c,
              const StartingCalibration& begin, bool events = false) {
   Driven d;
-  (void)app::drive_once({s, c, 0, s.pairs.size(), {}, {}}, begin,
+  (void)app::drive_once({s, c, 0, s.pairs.size()}, begin,
                         [&](const Estimator& e, const PoseSample& sample) {
                           d.samples.push_back(sample);
                           if (events) print_events(e, sample);
@@ -142,7 +137,7 @@ void run(RecordedSequence d, const std::string& filter, bool events, Tally* tall
   take_own_poses_for_truth(c, given, &d);
   StartingCalibration own = given;
   const app::DriveCalibration found =
-      app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
+      app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size()}, given);
   if (found.rig) own.file.rig = *found.rig;
   const std::vector<test::EvaluatedPose> untouched = evaluated_poses(drive(d.sequence, c, own));
   const test::MotionError usual = test::normal_errors(untouched, d.truth)[test::kIntegrityFrames];

@@ -9,21 +9,15 @@
 // kFaultFrames of the fault is the nearest to a miss. A decision ends what is measured, so a
 // sequential test hardly exceeds 1 there: its margin is the number of frames, which is printed,
 // too.
-#include <array>
 #include <cstdio>
 #include <cstdlib>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include <fmt/format.h>
 
-#include "app/config/configuration.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "core/estimator/estimator.hpp"
 #include "tests/bench/integrity_variants.hpp"
 #include "tests/support/quantile.hpp"
-#include "tests/support/recorded_sequence.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::bench {
@@ -31,7 +25,6 @@ namespace {
 
 using app::StartingCalibration;
 using test::quantile;
-using test::RecordedSequence;
 
 // Frames after a fault within which it must be decided on.
 constexpr std::size_t kFaultFrames = 30;
@@ -85,7 +78,7 @@ Run run(const app::StereoSequence& s, const app::Configuration& c,
         const StartingCalibration& begin) {
   Run r;
   std::size_t frame = 0;
-  (void)app::drive_once({s, c, 0, s.pairs.size(), {}, {}}, begin,
+  (void)app::drive_once({s, c, 0, s.pairs.size()}, begin,
                         [&](const Estimator& e, const PoseSample& /*sample*/) {
                           const DecisionMargins& m = e.margins();
                           r[change].push_back({frame, m.change});
@@ -149,12 +142,12 @@ void add(const Run& r, const Case& of, std::size_t frames, const std::string& na
   add_fault(r, of, frames, name, all);
 }
 
-void run_drive(const RecordedSequence& drive, const app::Configuration& c,
+void run_drive(const test::RecordedSequence& drive, const app::Configuration& c,
                std::array<Summary, kDecisions>* all) {
   const StartingCalibration given = app::replayed_calibration(c, drive.sequence, false);
   StartingCalibration found = given;
   const auto calibrated =
-      app::calibrate_drive({drive.sequence, c, 0, drive.sequence.pairs.size(), {}, {}}, given);
+      app::calibrate_drive({drive.sequence, c, 0, drive.sequence.pairs.size()}, given);
   if (calibrated.rig) found.file.rig = *calibrated.rig;
   for (const Case& of : kCases) {
     const test::TemporaryFolder folder;

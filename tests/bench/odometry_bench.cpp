@@ -7,14 +7,10 @@
 // Images are decoded beforehand; the clock runs from the decoded pair to the pose. Yardstick:
 // OpenCV's pyramidal Lucas–Kanade on 1000 corners of one pair of successive EuRoC left images
 // (pyramids included, one thread). A time counts as its ratio to it.
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <numbers>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -203,10 +199,7 @@ Measured measure(const Excerpt& excerpt, const DecodedDrive& drive, const Argume
         mean(replay(drive, configuration, arguments.threads, true).milliseconds)));
   }
   EvaluationOptions options{.segments = {{excerpt.lengths, 1, false}, {excerpt.lengths, 1, true}}};
-  Measured m;
-  m.name = excerpt.name;
-  m.frames = drive.pairs.size();
-  m.posed = last.poses.size();
+  Measured m{.name = excerpt.name, .frames = drive.pairs.size(), .posed = last.poses.size()};
   m.evaluation = evaluate(last.poses, drive.truth, options);
   m.without_mount =
       segments_without_mount(last.poses, drive.truth, options, m.evaluation.sim3.scale);
@@ -232,12 +225,10 @@ std::string processor() {
 void print(const std::vector<Measured>& all, const Arguments& arguments, double yardstick) {
   fmt::print(
       "# Benchmarks\n\nWritten by `scripts/bench` (`build/bench/odometry_bench`), version {}, {}, "
-      "{} "
-      "threads.\nMedian of {} replays' means; images decoded beforehand, the clock runs from the "
-      "decoded pair to the pose.\n"
+      "{} threads.\nMedian of {} replays' means; images decoded beforehand, the clock runs from "
+      "the decoded pair to the pose.\n"
       "Accuracy and times are of odometry alone (`calibration.online: off`); the last column is "
-      "the "
-      "mean with monitoring and online calibration, the default.\n"
+      "the mean with monitoring and online calibration, the default.\n"
       "Reference: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the same "
       "run; only the ratio compares between machines.\n\n"
       "| data | frames posed | ATE SE(3) mm | ATE Sim(3) mm | scale | segments % | after one scale "

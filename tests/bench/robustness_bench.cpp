@@ -18,11 +18,6 @@
 //
 // Tables are markdown, for docs/benchmarks.md. Settings apply to every run.
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <fstream>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -31,7 +26,6 @@
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
 #include "tests/bench/integrity_variants.hpp"
-#include "tests/support/recorded_sequence.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -151,7 +145,7 @@ void windows(const Bench& b, const RecordedSequence& d) {
   const StartingCalibration initial = given(b.online, d.sequence);
   StartingCalibration own = initial;
   const app::DriveCalibration found =
-      app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size(), {}, {}}, initial);
+      app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size()}, initial);
   if (found.rig) own.file.rig = *found.rig;
   for (std::size_t first = 0; first + kMin <= d.sequence.pairs.size(); first += kStep) {
     const StereoSequence s = part(d.sequence, first, kFrames);
@@ -296,9 +290,8 @@ int main(int argc, char** argv) {
     for (const RecordedSequence& d : drives) run(d);
   };
   const char* drives_heading =
-      "drive | calibration | posed | ok | first ok | ok of those with `off` from frame 36 on, % "
-      "| moving scene | ATE mm | segments % | knocks | adopted | points kept "
-      "at adoptions, least, %";
+      "drive | calibration | posed | ok | first ok | ok of those with `off` from frame 36 on, % | "
+      "moving scene | ATE mm | segments % | knocks | adopted | points kept at adoptions, least, %";
   section("drives", drives_heading, 12, [&](const RecordedSequence& d) { whole(b, d); });
   section("cold", "drive | starts with a pose within three frames | not, at frame (reason)", 3,
           [&](const RecordedSequence& d) { started = cold_starts(b, d) && started; });

@@ -1,9 +1,7 @@
 /// Any bytes as a bag, of ROS 1 or in SQLite if they begin like one, else MCAP. Entry point of
 /// libFuzzer; the unit tests call it with seeded mutations.
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
-#include <vector>
 
 #include "app/datasets/detail/bag_images.hpp"
 #include "tests/fuzz/input_errors.hpp"

@@ -4,8 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/datasets/recorded_ins.hpp"

@@ -70,8 +70,7 @@ void probe_ubx(std::span<const std::uint8_t> bytes) {
 }  // namespace vergence::test
 
 /// Any bytes as NMEA and as UBX. Entry point of libFuzzer.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
-                                      std::size_t size) {  // NOLINT(readability-identifier-naming)
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   vergence::test::probe_nmea({data, size});
   vergence::test::probe_ubx({data, size});
   return 0;

@@ -200,19 +200,14 @@ class Bench {
   BoardPulse pulse_{};
 };
 
-/// Takes bytes as a stream from the line, then as a script of what may happen to a trigger board:
-/// bytes, time, edges, pulses made, refused and taken back. Aborts with a message when the
-/// protocol's decoder or the board breaks a promise.
-void probe_trigger(const std::uint8_t* data, std::size_t size) {
-  probe_decoder(data, size);
-  Bench(Script(data, size)).run();
-}
-
 }  // namespace
 }  // namespace vergence
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
-                                      std::size_t size) {  // NOLINT(readability-identifier-naming)
-  vergence::probe_trigger(data, size);
+/// Takes bytes as a stream from the line, then as a script of what may happen to a trigger board:
+/// bytes, time, edges, pulses made, refused and taken back. Aborts with a message when the
+/// protocol's decoder or the board breaks a promise. Entry point of libFuzzer.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  vergence::probe_decoder(data, size);
+  vergence::Bench(vergence::Script(data, size)).run();
   return 0;
 }

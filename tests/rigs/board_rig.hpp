@@ -1,12 +1,7 @@
 #pragma once
-#include <fcntl.h>
 
-#include <memory>
 #include <mutex>
-#include <utility>
-#include <vector>
 
-#include "drivers/clock.hpp"
 #include "tests/rigs/emulator.hpp"
 #include "tests/support/device_terminal.hpp"
 #include "tests/support/simulators/board_simulator.hpp"
@@ -22,9 +17,10 @@ class BoardBehindConverter {
   static constexpr const char* kWire = "/run/vergence-board";
 
   /// `told`: of every pulse as it is made; returns what the cameras' exposure outputs do.
-  explicit BoardBehindConverter(PulseSource reported = {}, BoardSimulatorOptions options = {})
+  explicit BoardBehindConverter(PulseSource reported = {})
       : converter_("sim_ftdi", {"--wire", kWire, "--serial", "VGBOARD1"}),
         reported_(std::move(reported)) {
+    BoardSimulatorOptions options;
     options.power_on = monotonic_now();
     auto board = std::make_unique<BoardSimulator>(
         [this](const SimulatedPulse& pulse) { return take(pulse); }, options);
@@ -32,7 +28,6 @@ class BoardBehindConverter {
                                                   std::move(board));
   }
 
-  [[nodiscard]] Emulator& converter() noexcept { return converter_; }
   /// Every pulse that was made, with its true time.
   [[nodiscard]] std::vector<SimulatedPulse> pulses() const {
     const std::lock_guard lock(mutex_);

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "drivers/camera.hpp"
 #include "tests/rigs/emulator.hpp"

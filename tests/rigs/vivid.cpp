@@ -7,7 +7,6 @@
 #include <sys/mman.h>
 #include <time.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <stdexcept>
 

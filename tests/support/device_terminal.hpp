@@ -7,14 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cstdint>
 #include <memory>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "drivers/clock.hpp"
 #include "tests/support/simulators/device_model.hpp"

@@ -61,8 +61,8 @@ struct FeatureDriveOptions {
   double movers = 0.03;
   // Smooth error field in the right image: rms of a coordinate and time constant.
   double bias_px = 0.02, bias_s = 10;
-  std::vector<RigChange> changes;
-  std::vector<LagChange> lags;
+  std::vector<RigChange> changes{};
+  std::vector<LagChange> lags{};
   std::uint64_t seed = 1;
 };
 

@@ -1,10 +1,7 @@
 #pragma once
 #include <condition_variable>
-#include <cstdint>
 #include <deque>
 #include <functional>
-#include <mutex>
-#include <string>
 
 #include "tests/support/gvsp_sender.hpp"
 

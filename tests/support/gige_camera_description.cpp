@@ -51,10 +51,9 @@ class Description {
   [[nodiscard]] std::string done() const {
     return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
            "<RegisterDescription ModelName=\"Simulator\" VendorName=\"Vergence\" "
-           "StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" "
-           "SchemaMinorVersion=\"1\" SchemaSubMinorVersion=\"0\" MajorVersion=\"1\" "
-           "MinorVersion=\"0\" SubMinorVersion=\"0\" "
-           "ProductGuid=\"5d0f8a0c-0000-4000-8000-000000000001\" "
+           "StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" "
+           "SchemaSubMinorVersion=\"0\" MajorVersion=\"1\" MinorVersion=\"0\" "
+           "SubMinorVersion=\"0\" ProductGuid=\"5d0f8a0c-0000-4000-8000-000000000001\" "
            "VersionGuid=\"5d0f8a0c-0000-4000-8000-000000000002\" "
            "xmlns=\"http://www.genicam.org/GenApi/Version_1_1\">\n"
            "<Category Name=\"Root\" NameSpace=\"Standard\">\n" +

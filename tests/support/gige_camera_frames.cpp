@@ -26,9 +26,7 @@ void GigeCamera::pulse(std::uint64_t number, HostStamp when) {
 }
 
 GvspFrame GigeCamera::make_frame(std::uint64_t number, HostStamp when) {
-  GvspFrame f;
-  f.number = number;
-  f.block = block_++;
+  GvspFrame f{.number = number, .block = block_++};
   if (!options_.extended_ids && block_ > 0xFFFFU) block_ = 1;
   f.ticks = ticks(when);
   f.pixel_format = word(pixel_format);

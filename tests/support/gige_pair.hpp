@@ -1,11 +1,8 @@
 #pragma once
 #include <array>
 #include <chrono>
-#include <cstdint>
-#include <functional>
 #include <limits>
 #include <memory>
-#include <string>
 #include <thread>
 
 #include <fmt/format.h>

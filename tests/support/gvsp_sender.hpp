@@ -58,7 +58,7 @@ struct GvspFrame {
   std::uint32_t pixel_format = 0;
   int width = 0, height = 0, offset_x = 0, offset_y = 0;
   /// Pixels, and the chunk data behind them.
-  std::vector<std::uint8_t> pixels;
+  std::vector<std::uint8_t> pixels{};
 };
 
 /// The stream channel of the simulated camera: packets, their loss, what is sent again, and the

@@ -1,6 +1,7 @@
 #include "tests/support/integrity.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -70,22 +71,25 @@ NormalErrors normal_errors(std::span<const EvaluatedPose> poses, const app::Traj
 
 NormalError normal_error_there(std::vector<EvaluatedPose> poses, app::Trajectory truth) {
   const NormalErrors mean = normal_errors(poses, truth);
-  return [mean, poses = std::move(poses), truth = std::move(truth)](Stamp from, Stamp to) {
-    constexpr Duration kAround = Duration::seconds(1.0);
-    const auto between = [from, to](const EvaluatedPose& p) {
-      return p.stamp > from && p.stamp <= to;
-    };
-    const auto frames = std::clamp<std::size_t>(
-        static_cast<std::size_t>(std::count_if(poses.begin(), poses.end(), between)), 1,
-        kLongestNormal);
-    Mean around;
-    for (std::size_t i = frames; i < poses.size(); ++i)
-      if (poses[i].stamp >= to - kAround && poses[i].stamp <= to + kAround)
-        around.add(motion_error(poses[i - frames], poses[i], truth));
-    const MotionError here = around.value();
-    return MotionError{std::max(mean[frames].ins_path_m, here.ins_path_m),
-                       std::max(mean[frames].turn_rad, here.turn_rad)};
-  };
+  // The errors of a later time are the mean ones, so the poses there cannot be counted.
+  const double interval_s = poses.size() < 2
+                                ? 1
+                                : (poses.back().stamp - poses.front().stamp).to_seconds() /
+                                      static_cast<double>(poses.size() - 1);
+  return
+      [mean, interval_s, poses = std::move(poses), truth = std::move(truth)](Stamp from, Stamp to) {
+        constexpr Duration kAround = Duration::seconds(1.0);
+        const auto frames = std::clamp<std::size_t>(
+            static_cast<std::size_t>(std::llround((to - from).to_seconds() / interval_s)), 1,
+            kLongestNormal);
+        Mean around;
+        for (std::size_t i = frames; i < poses.size(); ++i)
+          if (poses[i].stamp >= to - kAround && poses[i].stamp <= to + kAround)
+            around.add(motion_error(poses[i - frames], poses[i], truth));
+        const MotionError here = around.value();
+        return MotionError{std::max(mean[frames].ins_path_m, here.ins_path_m),
+                           std::max(mean[frames].turn_rad, here.turn_rad)};
+      };
 }
 
 Integrity evaluate_integrity(std::span<const EvaluatedPose> poses, const NormalError& normal,

@@ -7,13 +7,8 @@ namespace vergence::test {
 
 /// A lens without distortion and with its principal point in the middle of the image.
 [[nodiscard]] inline Intrinsics pinhole(int width, int height, double focal) {
-  return {CameraModelKind::pinhole_radtan,
-          width,
-          height,
-          focal,
-          focal,
-          0.5 * (width - 1),
-          0.5 * (height - 1)};
+  const double cx = 0.5 * (width - 1), cy = 0.5 * (height - 1);
+  return {.width = width, .height = height, .fx = focal, .fy = focal, .cx = cx, .cy = cy};
 }
 
 /// Equal cameras whose axes are parallel; camera 1 is `baseline` m to the right of camera 0.

@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <numbers>
-#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
@@ -94,7 +93,7 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
                             std::size_t knock_at) {
   DriveOutcome row;
   std::vector<StampedPose> poses;
-  const app::DrivePass pass{sequence, c, 0, sequence.pairs.size(), {}, {}};
+  const app::DrivePass pass{sequence, c, 0, sequence.pairs.size()};
   row.rig = app::drive_once(pass, begin, [&](const Estimator& e, const PoseSample& s) {
     const auto at = static_cast<int>(s.frame);
     const bool knocked = s.frame >= knock_at;
@@ -107,6 +106,7 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
         if (knocked && row.reported_at < 0) row.reported_at = at;
         if (!knocked) ++row.knocks;
       }
+      if (event.kind == Kind::rig_not_rigid && !knocked) ++row.knocks;
       if (event.kind == Kind::calibration_applied)
         row.points_kept_percent = std::min(row.points_kept_percent, event.value);
       if (event.kind == Kind::calibration_verified && row.verified_at < 0) row.verified_at = at;
@@ -117,13 +117,14 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
     }
     for (const CalibrationDecision& decision : e.calibrations()) {
       if (decision.accepted && row.adopted++ == 0) row.adopted_at = at;
-      if (knocked && row.reported_at >= 0 && decision.accepted && row.mended_at < 0)
-        row.mended_at = at;
+      if (knocked && row.reported_at >= 0 && decision.accepted && row.recalibrated_at < 0)
+        row.recalibrated_at = at;
       if (decision.focal.measured_px > 0) row.focal = decision.focal;
       if (decision.held_out_after_px > 0) row.held_out_px = decision.held_out_after_px;
     }
     if (row.verified_at < 0 && s.status == PoseStatus::ok) ++row.ok_before_verified;
-    if (knocked && row.mended_at < 0 && s.status == PoseStatus::ok) ++row.ok_before_mended;
+    if (knocked && row.recalibrated_at < 0 && s.status == PoseStatus::ok)
+      ++row.ok_before_recalibrated;
     if (row.verified_at >= 0) ++row.since_verified;
     (s.status == PoseStatus::ok         ? row.ok
      : s.status == PoseStatus::degraded ? row.degraded

@@ -48,12 +48,12 @@ inline constexpr std::array kRecordedDrives = {"kitti06_51",     "kitti01_51",  
 /// Result of one pass. Frames count from 0; −1: never.
 struct DriveOutcome {
   int frames = 0, ok = 0, degraded = 0, lost = 0;
-  // Number of knocks reported before `knock_at`.
+  // Number of reports of a knock or of a rig that is not rigid before `knock_at`.
   int knocks = 0;
   int verified_at = -1, since_verified = 0, ok_since_verified = 0;
   int contradicted_at = -1, ok_before_verified = 0;
   // Frames of the report and of the recalibration after a knock.
-  int reported_at = -1, mended_at = -1, ok_before_mended = 0;
+  int reported_at = -1, recalibrated_at = -1, ok_before_recalibrated = 0;
   double contradicted_percent = 0;
   // ate_scaled_m is the error after one scale.
   double ate_m = 0, ate_scaled_m = 0, scale = 1;

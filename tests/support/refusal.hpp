@@ -1,5 +1,4 @@
 #pragma once
-#include <string>
 
 #include "app/runtime/errors.hpp"
 #include "tests/support/mentions.hpp"

@@ -1,9 +1,5 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "tests/support/bag_writer.hpp"
 

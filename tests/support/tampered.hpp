@@ -1,11 +1,7 @@
 #pragma once
-#include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "tests/support/simulators/device_model.hpp"
 

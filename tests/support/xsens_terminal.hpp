@@ -1,7 +1,5 @@
 #pragma once
-#include <memory>
 
-#include "drivers/clock.hpp"
 #include "tests/support/device_terminal.hpp"
 #include "tests/support/simulators/xsens_simulator.hpp"
 

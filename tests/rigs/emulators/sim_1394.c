@@ -151,8 +151,8 @@ static size_t advance(struct node* n, uint64_t ns, uint64_t edge, uint8_t* batch
     n->c.sent = 0;
     n->c.tearing = false;
     n->next_cycle = bus_time(begin + shutter) / 125000 + 1;
-    if (n->c.drop || n->c.muted) {
-      n->c.drop -= n->c.drop > 0;
+    if (n->c.drop) {
+      n->c.drop--;
       n->c.dropped++;
       n->c.sent = n->c.bytes;
     } else if (n->c.tear) {

@@ -45,8 +45,6 @@ static bool obey(const char* line, struct sim_camera* const* cameras, unsigned c
     cameras[a]->drop = b;
   else if (sscanf(line, "tear %u %u", &a, &b) == 2 && a < count)
     cameras[a]->tear = b;
-  else if (sscanf(line, "mute %u %u", &a, &b) == 2 && a < count)
-    cameras[a]->muted = b;
   else
     return false;
   return true;

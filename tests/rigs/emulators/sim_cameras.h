@@ -11,7 +11,7 @@ struct sim_camera {
   uint8_t* image; /* the frame on its way */
   size_t bytes, sent;
   unsigned drop, tear;
-  bool muted, tearing;
+  bool tearing;
   uint64_t exposed, transmitted, overtaken, dropped, incomplete;
 };
 
@@ -31,7 +31,6 @@ void sim_tell_ready(const struct sim_options* options);
  *   trigger [NS]  one external trigger pulse to all cameras, now or at that time of CLOCK_MONOTONIC
  *   drop C N      the next N frames of camera C are exposed but lost on the wire
  *   tear C N      the next N frames of camera C lose a part each
- *   mute C 0|1    camera C stops sending, goes on
  *   quit
  * Other lines go to `own`, which says whether it knows them. False: quit. */
 bool sim_obey(struct sim_camera* const* cameras, unsigned count, uint64_t* edge,

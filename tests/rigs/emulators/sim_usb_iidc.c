@@ -77,8 +77,8 @@ static void expose(struct unit* u, uint64_t ns, uint64_t edge) {
               cycle_time(begin + shutter)); /* cameras stamp its end */
     u->c.sent = 0;
     u->c.tearing = false;
-    if (u->c.drop || u->c.muted) {
-      u->c.drop -= u->c.drop > 0;
+    if (u->c.drop) {
+      u->c.drop--;
       u->c.dropped++;
       u->c.bytes = 0;
     } else if (u->c.tear) {

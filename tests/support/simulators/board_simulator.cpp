@@ -12,7 +12,6 @@ namespace {
 
 constexpr Duration kSecond = Duration::seconds(1);
 constexpr Duration kPpsWidth = Duration::milliseconds(100);
-constexpr Duration kSyncWidth = Duration::milliseconds(1);
 constexpr std::uint32_t kMaxMillihertz = 1'000'000;
 
 }  // namespace
@@ -21,8 +20,6 @@ BoardSimulator::BoardSimulator(PulseSource pulses, const BoardSimulatorOptions& 
     : pulses_(std::move(pulses)), options_(options), end_(options.power_on + options.duration) {
   start(options_.power_on);
   if (options_.pps) plan_pps(options_.power_on);
-  if (options_.ins_interval > Duration{})
-    plan_edge({options_.power_on + options_.ins_interval, board_input_ins, true});
   plan();
 }
 
@@ -148,15 +145,11 @@ void BoardSimulator::make_pulse(HostStamp at) {
 void BoardSimulator::take_edge(const Edge& edge) {
   const std::uint64_t count = count_at(edge.at);
   if (edge.at >= awake_) board_edge(&board_, count, edge.input, edge.rising, count);
-  if (edge.input == board_input_pps) {
-    if (edge.rising)
-      plan_edge({edge.at + kPpsWidth, board_input_pps, false});
-    else
-      plan_pps(edge.at);
-  } else if (edge.input == board_input_ins) {
-    plan_edge({edge.at + (edge.rising ? kSyncWidth : options_.ins_interval - kSyncWidth),
-               board_input_ins, !edge.rising});
-  }
+  if (edge.input != board_input_pps) return;
+  if (edge.rising)
+    plan_edge({edge.at + kPpsWidth, board_input_pps, false});
+  else
+    plan_pps(edge.at);
 }
 
 void BoardSimulator::plan_edge(const Edge& edge) {

@@ -1,10 +1,7 @@
 #pragma once
 #include <array>
-#include <cstdint>
 #include <deque>
 #include <functional>
-#include <optional>
-#include <vector>
 
 #include "firmware_iface/trigger/board/board.h"
 #include "tests/support/simulators/device_model.hpp"
@@ -54,8 +51,6 @@ struct BoardSimulatorOptions {
   std::vector<HostStamp> reboots{};
   /// A GNSS receiver is wired: an edge every whole second of the host's clock.
   bool pps = false;
-  /// Interval of the INS' SyncOut; 0: not wired.
-  Duration ins_interval{};
   std::uint64_t seed = 1;
 };
 

@@ -1,13 +1,9 @@
 #pragma once
 #include <cstddef>
-#include <cstdint>
 #include <deque>
 #include <memory>
-#include <optional>
 #include <string>
-#include <vector>
 
-#include "core/types/time.hpp"
 #include "drivers/serial/serial_link.hpp"
 #include "tests/support/simulators/device_model.hpp"
 

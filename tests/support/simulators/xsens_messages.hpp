@@ -1,12 +1,9 @@
 #pragma once
-#include <cstdint>
 #include <deque>
-#include <vector>
 
 #include "core/math/random.hpp"
 #include "core/types/ins_sample.hpp"
 #include "tests/support/simulators/xsens_settings.hpp"
-#include "tests/support/simulators/xsens_simulator_options.hpp"
 
 namespace vergence::test {
 

@@ -1,9 +1,6 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <vector>
 
-#include "firmware_iface/xbus/xbus.hpp"
 #include "tests/support/simulators/xsens_simulator_options.hpp"
 
 namespace vergence::test {

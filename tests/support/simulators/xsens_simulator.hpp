@@ -1,17 +1,8 @@
 #pragma once
-#include <cstdint>
-#include <deque>
 #include <functional>
-#include <optional>
-#include <vector>
 
-#include "core/math/random.hpp"
-#include "core/types/ins_sample.hpp"
-#include "firmware_iface/xbus/xbus.hpp"
 #include "tests/support/simulators/device_model.hpp"
 #include "tests/support/simulators/xsens_messages.hpp"
-#include "tests/support/simulators/xsens_settings.hpp"
-#include "tests/support/simulators/xsens_simulator_options.hpp"
 
 namespace vergence::test {
 

@@ -1,13 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <iterator>
-#include <string>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -15,7 +9,6 @@
 
 #include "app/config/calibration_file.hpp"
 #include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/checkerboard/board_picture.hpp"
 #include "tests/unit/app/checkerboard/board_scene.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"

@@ -2,14 +2,9 @@
 // simulated cameras.
 #include <gtest/gtest.h>
 
-#include <thread>
-
-#include <fmt/format.h>
-
 #include "app/config/calibration_file.hpp"
 #include "tests/support/gige_pair.hpp"
 #include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/gige/socket_buffer.hpp"
 #include "tests/unit/app/checkerboard/board_picture.hpp"
 #include "tests/unit/app/checkerboard/board_scene.hpp"

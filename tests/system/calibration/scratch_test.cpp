@@ -150,8 +150,7 @@ TEST(StandingStill, standingRigNeedsMotionAndAdoptsNothing) {
 }
 
 TEST(ThreeCameras, bothTransformsOfThreeCamerasAreFound) {
-  RigCalibration rig;
-  rig.cameras = 3;
+  RigCalibration rig{.cameras = 3};
   for (int k = 0; k < 3; ++k) {
     Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
     c.width = 640, c.height = 480, c.fx = c.fy = 550, c.cx = 319 + 2 * k, c.cy = 240 - k;

@@ -1,17 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "app/config/calibration_file.hpp"
 #include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -155,8 +149,7 @@ TEST_F(CalibrationCli, sigusr1RequestsRecalibration) {
   const std::string command = arguments("s", "--duration 5");
   const std::string script = fmt::format(
       "true; '{}' {} & pid=$!; for i in $(seq 300); do [ \"$(wc -l <'{}' 2>/dev/null || echo 0)\" "
-      "-gt 3 ] && break; sleep 0.1; done; "
-      "kill -USR1 $pid; wait $pid",
+      "-gt 3 ] && break; sleep 0.1; done; kill -USR1 $pid; wait $pid",
       VERGENCE_PROGRAM, command, (session("s") / "poses.csv").string());
   const fs::path file = folder_ / "drive.sh";
   folder_.write("drive.sh", script);

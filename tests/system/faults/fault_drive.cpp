@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
 
 #include <fmt/format.h>
 
 #include "app/report/session.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {
@@ -36,9 +34,7 @@ FaultDrive drive_with_faults(const FaultCase& c) {
   const Outcome outcome = run_vergence(
       arguments,
       c.system.empty() ? "" : fmt::format("{} LD_PRELOAD='{}'", c.system, VERGENCE_FAULTY_SYSTEM));
-  FaultDrive d;
-  d.code = outcome.code;
-  d.err = outcome.err;
+  FaultDrive d{.code = outcome.code, .err = outcome.err};
   if (!std::filesystem::exists(folder / "s" / "poses.csv")) return d;
   const app::report::Session session = app::report::read_session(folder / "s");
   // In real time, the run starts at its first pose.
@@ -90,8 +86,7 @@ Untouched untouched_drive() {
   FaultCase none;
   none.name = "none";
   none.duration_s = kMinute;
-  Untouched u;
-  u.drive = drive_with_faults(none);
+  Untouched u{.drive = drive_with_faults(none)};
   const auto& poses = u.drive.poses;
   const auto count = [&poses](PoseStatus status) {
     return std::count_if(poses.begin(), poses.end(),
@@ -109,6 +104,8 @@ Untouched untouched_drive() {
 
 std::string unsaid(const FaultCase& c, const FaultDrive& drive, const FaultDrive& untouched) {
   if (c.said.empty()) {
+    // The untouched drive has no later poses.
+    if (c.from_s >= kMinute) return "";
     for (std::size_t i = 0; i < std::min(drive.poses.size(), untouched.poses.size()); ++i)
       if (drive.at_s[i] >= c.from_s &&
           drive.poses[i].T_world_left.t != untouched.poses[i].T_world_left.t)
@@ -137,8 +134,7 @@ bool is_bad(const FaultDrive& drive, const FaultResult& result) {
 EvaluatedDrive drive_until_recovered(FaultCase c, const NormalError& normal) {
   // The loop runs twice at most.
   for (;;) {
-    EvaluatedDrive d;
-    d.drive = drive_with_faults(c);
+    EvaluatedDrive d{.drive = drive_with_faults(c)};
     d.result = evaluate(c, d.drive, normal);
     if (is_bad(d.drive, d.result) || d.result.recovery_s || c.duration_s >= kMinute) return d;
     c.duration_s = kMinute;

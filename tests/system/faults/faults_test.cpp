@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <string>
 
 #include "tests/system/faults/fault_drive.hpp"
 
@@ -22,13 +21,12 @@ std::string described(const FaultCase& c, const FaultDrive& drive, const FaultRe
 
 struct Driven {
   FaultDrive drive;
-  FaultResult result;
+  FaultResult result{};
 };
 
 Driven expect_honest(const FaultCase& c) {
   EXPECT_EQ(untouched().unfit, "");
-  Driven d;
-  d.drive = drive_with_faults(c);
+  Driven d{.drive = drive_with_faults(c)};
   d.result = evaluate(c, d.drive, untouched().normal);
   SCOPED_TRACE(described(c, d.drive, d.result));
   EXPECT_EQ(d.drive.code, 0);

@@ -1,6 +1,5 @@
-// Injects faults below the program by LD_PRELOAD:
-//   VERGENCE_STALL='AT SECONDS'      writes to files, begun in that time since the start, last to
-//   its end VERGENCE_CLOCK_SET='AT SECONDS'  CLOCK_REALTIME is so much later from then on
+// Injects a fault below the program by LD_PRELOAD: VERGENCE_STALL='AT SECONDS' makes every write to
+// a file that begins in that time since the start last to its end.
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
@@ -64,17 +63,4 @@ int fdatasync(int fd) {
 int fsync(int fd) {
   stall(fd);
   return (int)syscall(SYS_fsync, fd);
-}
-
-int clock_gettime(clockid_t clock, struct timespec* t) {
-  const int status = (int)syscall(SYS_clock_gettime, clock, t);
-  double at = 0;
-  double seconds = 0;
-  if (status == 0 && clock == CLOCK_REALTIME && asked("VERGENCE_CLOCK_SET", &at, &seconds) &&
-      now() - started >= at) {
-    static const char line[] = "faulty_system: the clock is set\n";
-    say(line, sizeof line - 1);
-    t->tv_sec += (time_t)seconds;
-  }
-  return status;
 }

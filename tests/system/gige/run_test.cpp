@@ -1,15 +1,8 @@
-#include <gtest/gtest.h>
 
-#include <algorithm>
-#include <memory>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/support/gige_pair.hpp"
 #include "tests/support/simulators/board_simulator.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/support/thread_allocations.hpp"
 #include "tests/support/xsens_terminal.hpp"
 #include "tests/system/gige/socket_buffer.hpp"
@@ -22,7 +15,6 @@ namespace {
 
 using test::Outcome;
 using test::run_vergence;
-using test::TemporaryFolder;
 
 constexpr int kWidth = 640, kHeight = 480, kPairs = 40;
 constexpr double kRate = 10;
@@ -64,7 +56,7 @@ TEST(GigeRun, everyPairOverGigeVisionIsPosed) {
   const test::StereoDrive drive = rendered();
   const test::GigePair cameras = cameras_on(drive);
   std::jthread pulses = cameras.pulses(kRate, kPairs);
-  const TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   const auto session = folder / "s";
   const Outcome o =
       run_vergence("run '" + kExample + "' --duration " + std::to_string(kPairs / kRate + 3) +
@@ -102,8 +94,7 @@ TEST(GigeRun, everyPairOverGigeVisionIsPosed) {
 
 /// A trigger board on a terminal whose pulses the cameras expose at.
 std::unique_ptr<test::BoardSimulator> board_of(const test::GigePair& cameras) {
-  test::BoardSimulatorOptions o;
-  o.power_on = monotonic_now();
+  test::BoardSimulatorOptions o{.power_on = monotonic_now()};
   return std::make_unique<test::BoardSimulator>(
       [&cameras, n = std::uint64_t{0}](const test::SimulatedPulse& pulse) mutable {
         cameras.pulse(n++, pulse.edge);
@@ -130,7 +121,7 @@ Outcome record_drive(const test::StereoDrive& drive, const std::filesystem::path
 TEST(GigeRun, recordedGigeRunReplaysBitForBit) {
   if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
   const test::StereoDrive drive = rendered();
-  const TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   const Outcome o = record_drive(drive, folder / "s");
   ASSERT_LE(o.code, 1) << o.err;
   const Outcome again = run_vergence("replay '" + (folder / "s").string() + "' --out '" +

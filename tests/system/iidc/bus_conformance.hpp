@@ -1,7 +1,5 @@
 #pragma once
 #include <chrono>
-#include <memory>
-#include <string>
 
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/camera_options.hpp"

@@ -3,10 +3,8 @@
 
 #include <chrono>
 #include <memory>
-#include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/camera_options.hpp"

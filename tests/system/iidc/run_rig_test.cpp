@@ -1,15 +1,10 @@
 // `vergence run` on emulated IIDC cameras that look at a rendered drive: what the example
 // configurations do on real stacks.
-#include <gtest/gtest.h>
 
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
-#include <filesystem>
 #include <thread>
-#include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "app/report/session.hpp"
 #include "drivers/iidc/iidc.hpp"

@@ -1,5 +1,4 @@
 #include "drivers/iidc/iidc.hpp"
-#include "tests/rigs/iidc_rig.hpp"
 
 namespace vergence::test {
 

@@ -11,10 +11,10 @@ namespace vergence::test {
 namespace {
 
 /// The image of a camera in the dark: black level and a grey level of noise.
-OwnedImage dark_image(std::uint64_t seed) {
+features::test::Image dark_image(std::uint64_t seed) {
   // Both are in grey levels.
   constexpr double kBlackLevel = 6.0, kNoise = 1.0;
-  OwnedImage p(640, 480);
+  features::test::Image p(640, 480);
   Random random(seed);
   for (std::uint8_t& b : p.bytes)
     b = static_cast<std::uint8_t>(
@@ -24,7 +24,7 @@ OwnedImage dark_image(std::uint64_t seed) {
 
 TEST(OdometryInBadConditions, cameraCoveredForGoodIsNeverOkAgain) {
   constexpr std::size_t kCovered = 20;
-  const std::array<OwnedImage, 4> dark{dark_image(1), dark_image(2), dark_image(3), dark_image(4)};
+  const std::array dark{dark_image(1), dark_image(2), dark_image(3), dark_image(4)};
   for (const std::size_t camera : {0U, 1U}) {
     EstimatorRun run(with_supplied(brief_drive().rig));
     run.process(brief_drive(), 0, brief_drive().size(), [&](std::size_t i, RigFrame* f) {

@@ -176,7 +176,9 @@ MotionError motion_error(const FrameResult& from, const FrameResult& to) {
   return {(estimated.t - real.t).norm(), log_so3(estimated.R * real.R.transpose()).norm()};
 }
 
-std::string false_ok(const std::vector<FrameResult>& results, const OkBound& bound) {
+std::string false_ok(const std::vector<FrameResult>& results) {
+  // Limits: 5 cm and 1.5 % of the path since then; rad.
+  constexpr double kTranslation = 0.05, kPerMetre = 0.015, kRotation = 0.01;
   std::string worst;
   double worst_ratio = 1.0;
   const FrameResult* first = nullptr;
@@ -193,8 +195,8 @@ std::string false_ok(const std::vector<FrameResult>& results, const OkBound& bou
     path += (r.T_reference_left.t - previous->T_reference_left.t).norm();
     previous = &r;
     const MotionError e = motion_error(*first, r);
-    const double ratio = std::max(e.translation / (bound.translation + bound.per_metre * path),
-                                  e.rotation / bound.rotation);
+    const double ratio =
+        std::max(e.translation / (kTranslation + kPerMetre * path), e.rotation / kRotation);
     if (ratio <= worst_ratio) continue;
     worst_ratio = ratio;
     worst = fmt::format("frame {} is ok, but since frame {} ({:.2f} m) off by {:.3f} m, {:.4f} rad",
@@ -211,9 +213,7 @@ TrajectoryEvaluation evaluate_results(const std::vector<FrameResult>& results,
     estimate.push_back({r.sample.stamp, r.sample.T_world_left});
     truth.push_back({r.sample.stamp, r.T_reference_left});
   }
-  EvaluationOptions options;
-  options.segments = {{lengths, 1, false}};
-  return evaluate(estimate, truth, options);
+  return evaluate(estimate, truth, {.segments = {{lengths, 1, false}}});
 }
 
 RigError rig_error(const RigCalibration& found, int k, const Transform& truth) {

@@ -4,7 +4,6 @@
 #include <limits>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
@@ -109,19 +108,9 @@ struct MotionError {
 };
 [[nodiscard]] MotionError motion_error(const FrameResult& from, const FrameResult& to);
 
-/// Maximum error of a usable pose relative to the first one since the drive's start or the last
-/// reported map reset.
-struct OkBound {
-  /// Constant part in m.
-  double translation = 0.05;
-  /// Part in m per metre of the path since then.
-  double per_metre = 0.015;
-  /// Limit in rad.
-  double rotation = 0.01;
-};
-/// Describes the worst usable pose beyond the bound; empty if there is none.
-[[nodiscard]] std::string false_ok(const std::vector<FrameResult>& results,
-                                   const OkBound& bound = {});
+/// Describes the usable pose whose error relative to the first one since the drive's start or the
+/// last reported map reset exceeds the limits most; empty if there is none.
+[[nodiscard]] std::string false_ok(const std::vector<FrameResult>& results);
 
 /// The poses of all frames that are not lost against the truth; segments of these lengths in m.
 [[nodiscard]] TrajectoryEvaluation evaluate_results(const std::vector<FrameResult>& results,

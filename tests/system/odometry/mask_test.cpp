@@ -10,6 +10,8 @@
 namespace vergence::test {
 namespace {
 
+using features::test::Image;
+
 constexpr std::size_t kFrames = 120;
 /// Height in rows.
 constexpr int kBonnet = 110;
@@ -24,15 +26,14 @@ bool is_painted(std::size_t k, int x, int y, int height) {
 }
 
 /// Static things with more texture than the street has: rivets, grains, reflections.
-OwnedImage paint(int width, int height) {
-  OwnedImage p(width, height);
+Image paint(int width, int height) {
+  Image p(width, height);
   Random random(7);
   for (int y = 0; y < height; y += 4)
     for (int x = 0; x < width; x += 4) {
       const auto grey = static_cast<std::uint8_t>(random.below(256));
       for (int v = y; v < std::min(y + 4, height); ++v)
-        for (int u = x; u < std::min(x + 4, width); ++u)
-          p.bytes[static_cast<std::size_t>(v * p.stride + u)] = grey;
+        for (int u = x; u < std::min(x + 4, width); ++u) p.at(u, v) = grey;
     }
   return p;
 }
@@ -43,13 +44,11 @@ class DirtyDrive {
   DirtyDrive() : drive_(brief_drive()) {
     const Intrinsics& c = drive_.rig.intrinsics[0];
     // Identical paint in both images matches at infinity.
-    const OwnedImage dirt = paint(c.width, c.height);
+    const Image dirt = paint(c.width, c.height);
     for (std::size_t k = 0; k < 2; ++k) {
-      masks_[k] = OwnedImage(c.width, c.height);
       for (int y = 0; y < c.height; ++y)
         for (int x = 0; x < c.width; ++x)
-          masks_[k].bytes[static_cast<std::size_t>(y * masks_[k].stride + x)] =
-              is_painted(k, x, y, c.height) ? 0 : 255;
+          masks_[k].at(x, y) = is_painted(k, x, y, c.height) ? 0 : 255;
     }
     for (std::size_t i = 0; i < kFrames; ++i) {
       pairs_.push_back(drive_.pairs[i]);
@@ -72,8 +71,8 @@ class DirtyDrive {
 
  private:
   const StereoDrive& drive_;
-  std::array<OwnedImage, 2> masks_;
-  std::vector<std::array<OwnedImage, 2>> pairs_;
+  std::array<Image, 2> masks_{Image(640, 480), Image(640, 480)};
+  std::vector<std::array<Image, 2>> pairs_;
 };
 
 const DirtyDrive& dirty_drive() {

@@ -1,23 +1,11 @@
 #include "tests/system/odometry/stereo_drive.hpp"
 
-#include <cstring>
-
 #include "core/math/so3.hpp"
-#include "core/memory/frame_pool.hpp"
 
 namespace vergence::test {
 
-OwnedImage::OwnedImage(int w, int h)
-    : width(w),
-      height(h),
-      stride(static_cast<std::ptrdiff_t>(FramePool::stride(w))),
-      bytes(FramePool::stride(w) * static_cast<std::size_t>(h)) {}
-
 RigFrame StereoDrive::frame(std::size_t i) const {
-  RigFrame frame;
-  frame.number = i;
-  frame.stamp = stamps[i];
-  frame.cameras = 2;
+  RigFrame frame{.number = i, .stamp = stamps[i], .cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) frame.images[k] = pairs[i][k].view();
   return frame;
 }
@@ -28,24 +16,16 @@ StereoDrive render(const RenderedDriveOptions& options, std::size_t frames) {
   RenderedDrive drive(options);
   for (std::size_t i = 0; i < frames; ++i) {
     const RigFrame& frame = drive.frame(i);
-    std::array<OwnedImage, 2> pair;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const ImageView& view = frame.images[k];
-      pair[k] = OwnedImage(view.width, view.height);
-      for (int y = 0; y < view.height; ++y)
-        std::memcpy(pair[k].bytes.data() + y * pair[k].stride, view.row(y),
-                    static_cast<std::size_t>(view.width));
-    }
     out.stamps.push_back(frame.stamp);
-    out.pairs.push_back(std::move(pair));
+    out.pairs.push_back(
+        {features::test::copy_of(frame.images[0]), features::test::copy_of(frame.images[1])});
     out.truth.push_back(drive.T_enu_left(i));
   }
   return out;
 }
 
 RigCalibration distorted_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = rig.intrinsics[k];
     c.width = 640;

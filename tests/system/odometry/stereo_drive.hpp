@@ -1,33 +1,17 @@
 #pragma once
-#include <array>
 #include <cstddef>
-#include <cstdint>
-#include <vector>
 
-#include "core/types/calibration.hpp"
-
-#include "core/types/image.hpp"
 #include "core/types/time.hpp"
 #include "tests/support/rendered_drive.hpp"
+#include "tests/unit/core/features/texture.hpp"
 
 namespace vergence::test {
-
-/// 8-bit grey pixels, rows padded to whole cache lines.
-struct OwnedImage {
-  int width = 0, height = 0;
-  std::ptrdiff_t stride = 0;
-  std::vector<std::uint8_t> bytes;
-
-  OwnedImage() = default;
-  OwnedImage(int w, int h);
-  [[nodiscard]] ImageView view() const noexcept { return {bytes.data(), width, height, stride}; }
-};
 
 /// A stereo drive in memory with its ground truth: T_reference_left of every frame, in any world.
 struct StereoDrive {
   RigCalibration rig;
   std::vector<Stamp> stamps;
-  std::vector<std::array<OwnedImage, 2>> pairs;
+  std::vector<std::array<features::test::Image, 2>> pairs;
   /// T_reference_left of every frame.
   std::vector<Transform> truth;
 

@@ -1,26 +1,17 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstdint>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
-#include <vector>
 
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/support/recording_reader.hpp"
 #include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
 namespace {
 
-using test::kSmall;
 using test::Outcome;
 using test::read_file;
 using test::run_vergence;
@@ -31,8 +22,8 @@ const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.y
 const std::string kRecord = " --set record.poses=on --set record.ins=on --set record.images=on";
 
 Outcome drive(const std::filesystem::path& session, const std::string& more) {
-  return run_vergence("run '" + kMock + "' --out '" + session.string() + "'" + kSmall + kRecord +
-                      " " + more);
+  return run_vergence("run '" + kMock + "' --out '" + session.string() + "'" + test::kSmall +
+                      kRecord + " " + more);
 }
 
 Outcome replay(const std::filesystem::path& data, const std::filesystem::path& session,
@@ -241,7 +232,7 @@ TEST(RecordedTruth, truthEndingMicrosecondsEarlyIsExtrapolated) {
 TEST(Recorded, recordedPulsesLeaveThePosesUnchanged) {
   const TemporaryFolder folder;
   const std::string chain = "run '" + std::string(VERGENCE_SOURCE_DIR) +
-                            "/app/config/mock_board.yaml' --fast --duration 4" + kSmall;
+                            "/app/config/mock_board.yaml' --fast --duration 4" + test::kSmall;
   const Outcome plain = run_vergence(chain + " --out '" + (folder / "plain").string() + "'");
   ASSERT_LE(plain.code, 1) << plain.err;
   const Outcome o =

@@ -1,6 +1,4 @@
-#include <gtest/gtest.h>
 
-#include <fstream>
 
 #include "tests/support/refusal.hpp"
 #include "tests/support/ros_messages.hpp"

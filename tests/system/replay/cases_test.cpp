@@ -3,9 +3,6 @@
 
 #include <cmath>
 #include <functional>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -15,7 +12,6 @@
 #include "core/math/se3.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/ros_messages.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {
@@ -132,7 +128,8 @@ std::vector<Case> trajectories() {
        "3 rows that repeat a stamp are dropped|60 poses matched"},
       {"out of order", "{s} {p}\n1403636584.1 {p}|{s} {p}", kTum, "rows are sorted by time"},
       {"KITTI without times", "{m}", "{m}", "row by row|60 poses matched"},
-      {"KITTI of other lengths", "{m}", "{m}\n{m}|{m}", "has 60 poses|has 63", 2},
+      {"KITTI of fewer poses", "{m}", "{m}\n{m}|{m}", "has 60 poses|has 63", 2},
+      {"KITTI of more poses", "{m}\n{m}|{m}", "{m}", "has 63 poses|has 60", 2},
       {"numbers before matrices", "{i} {m}", "{m}", "row by row|60 poses matched"},
       {"w first", "{s} {w}", kTum, "rotations differ|--quaternion wxyz"},
       {"w first, said", "{s} {w}", kTum, "60 poses matched", 0, "--quaternion wxyz"},
@@ -162,17 +159,16 @@ std::string matrix(const std::string& key, int rows, int columns, const std::str
 }
 const std::string kK = "80, 0, 48, 0, 80, 36, 0, 0, 1", kD = "-0.1, 0.01, 0, 0",
                   kEye = "1, 0, 0, 0, 1, 0, 0, 0, 1";
-std::string opencv(const std::vector<std::string>& keys, const std::string& t = "-0.11, 0, 0") {
+std::string opencv(const std::vector<std::string>& keys, const std::string& t = "-0.11, 0, 0",
+                   const std::string& r = kEye) {
   return "%YAML:1.0\n---\n" + matrix(keys[0], 3, 3, kK) + matrix(keys[1], 1, 4, kD) +
-         matrix(keys[2], 3, 3, kK) + matrix(keys[3], 1, 4, kD) + matrix(keys[4], 3, 3, kEye) +
+         matrix(keys[2], 3, 3, kK) + matrix(keys[3], 1, 4, kD) + matrix(keys[4], 3, 3, r) +
          matrix(keys[5], 3, 1, t);
 }
-/// `body`: where a camera sits, `X: [matrix]`, in a body turned by 90° against it.
-std::string at(const std::string& key, double x, bool inverse) {
-  return inverse ? fmt::format("  {}: [[0, 1, 0, 0], [-1, 0, 0, {}], [0, 0, 1, 0], [0, 0, 0, 1]]\n",
-                               key, x)
-                 : fmt::format("  {}: [[0, -1, 0, {}], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n",
-                               key, x);
+const std::vector<std::string> kKeys{"M1", "D1", "M2", "D2", "R", "T"};
+/// A pose by its first two rows; its third is that of the identity.
+std::string pose(const std::string& key, const std::string& first, const std::string& second) {
+  return fmt::format("  {}: [[{}], [{}], [0, 0, 1, 0], [0, 0, 0, 1]]\n", key, first, second);
 }
 std::string kalibr(const std::string& left = "", const std::string& right = "",
                    const std::string& model = "radtan") {
@@ -181,8 +177,7 @@ std::string kalibr(const std::string& left = "", const std::string& right = "",
                            "\n  intrinsics: [80, 80, 48, 36]\n  resolution: [96, 72]\n";
   return "cam0:\n" + left + lens + "cam1:\n" + right + lens;
 }
-const std::string kStepBetween =
-    "  T_cn_cnm1: [[1, 0, 0, -0.11], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+const std::string kStepBetween = pose("T_cn_cnm1", "1, 0, 0, -0.11", "0, 1, 0, 0");
 std::string camera_info(double p3, const std::string& size = kSize, double scale = 1) {
   const auto n = [&](double v) { return fmt::format("{}", scale * v); };
   return size + "camera_matrix: {rows: 3, cols: 3, data: [" + n(80) + ", 0, " + n(48) + ", 0, " +
@@ -218,17 +213,16 @@ std::string vins_camera(const std::string& model = "PINHOLE") {
          "projection_parameters: {fx: 80, fy: 80, cx: 48, cy: 36}\n";
 }
 const std::string kVins =
-    "%YAML:1.0\nnum_of_cam: 2\ncam0_calib: \"c0.yaml\"\ncam1_calib: "
-    "\"c1.yaml\"\n" +
+    "%YAML:1.0\nnum_of_cam: 2\ncam0_calib: \"c0.yaml\"\ncam1_calib: \"c1.yaml\"\n" +
     matrix("body_T_cam0", 4, 4, "0,-1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1") +
     matrix("body_T_cam1", 4, 4, "0,-1,0,0, 1,0,0,0.11, 0,0,1,0, 0,0,0,1");
 std::string sensor(double y, const std::string& model = "radial-tangential") {
-  return "%YAML:1.0\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0,-1,0,0, 1,0,0," +
-         fmt::format("{}", y) +
-         ", 0,0,1,0, 0,0,0,1]\nresolution: [96, 72]\ncamera_model: pinhole\nintrinsics: [80, 80, "
-         "48, "
-         "36]\ndistortion_model: " +
-         model + "\ndistortion_coefficients: [" + kD + "]\n";
+  return fmt::format(
+      "%YAML:1.0\nT_BS:\n  cols: 4\n  rows: 4\n"
+      "  data: [0,-1,0,0, 1,0,0,{}, 0,0,1,0, 0,0,0,1]\nresolution: [96, 72]\n"
+      "camera_model: pinhole\nintrinsics: [80, 80, 48, 36]\ndistortion_model: {}\n"
+      "distortion_coefficients: [{}]\n",
+      y, model, kD);
 }
 
 using Files = std::vector<std::pair<std::string, std::string>>;
@@ -249,13 +243,12 @@ Case calibration(const char* name, const Files& files, std::string mentions = "0
 }
 
 std::vector<Case> calibrations() {
-  const std::string raw = at("T_imu_cam", 0, false), raw1 =
-                                                         "  T_imu_cam: [[0, -1, 0, 0], [1, 0, 0, "
-                                                         "0.11], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
-  const std::string cam0 = at("T_cam_imu", 0, true),
-                    cam1 =
-                        "  T_cam_imu: [[0, 1, 0, -0.11], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, "
-                        "1]]\n";
+  // In a body turned by 90° against the camera.
+  const auto inertial = [](const std::string& x) {
+    return pose("T_imu_cam", "0, -1, 0, 0", "1, 0, 0, " + x);
+  };
+  const std::string cam0 = pose("T_cam_imu", "0, 1, 0, 0", "-1, 0, 0, 0"),
+                    cam1 = pose("T_cam_imu", "0, 1, 0, -0.11", "-1, 0, 0, 0");
   const std::string xml = [] {
     const auto element = [](const char* key, int rows, int columns, std::string data) {
       std::replace(data.begin(), data.end(), ',', ' ');
@@ -277,32 +270,26 @@ std::vector<Case> calibrations() {
     std::string t = "%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"PinHole\"\n";
     for (const int i : {1, 2})
       t += fmt::format(
-          "Camera{0}.fx: 80.0\nCamera{0}.fy: 80.0\nCamera{0}.cx: 48.0\nCamera{0}.cy: "
-          "36.0\nCamera{0}.k1: -0.1\nCamera{0}.k2: 0.01\nCamera{0}.p1: 0.0\n"
-          "Camera{0}.p2: 0.0\n",
+          "Camera{0}.fx: 80.0\nCamera{0}.fy: 80.0\nCamera{0}.cx: 48.0\nCamera{0}.cy: 36.0\n"
+          "Camera{0}.k1: -0.1\nCamera{0}.k2: 0.01\nCamera{0}.p1: 0.0\nCamera{0}.p2: 0.0\n",
           i);
     return t + "Camera.width: 96\nCamera.height: 72\n" +
            matrix("Stereo.T_c1_c2", 4, 4, "1,0,0,0.11, 0,1,0,0, 0,0,1,0, 0,0,0,1");
   }();
-  const std::string ost =
-      "# oST version 5.0 "
-      "parameters\n\n[image]\n\nwidth\n96\n\nheight\n72\n\n[narrow/left]\n\ncamera "
-      "matrix\n80 0 48\n0 80 36\n0 0 1\n\ndistortion\n0 0 0 0 0\n\nrectification\n1 0 0\n0 1 0\n0 "
-      "0 "
-      "1\n\nprojection\n80 0 48 0\n0 80 36 0\n0 0 1 0\n\n# oST version 5.0 "
-      "parameters\n\n[image]\n\n"
-      "width\n96\n\nheight\n72\n\n[narrow/right]\n\ncamera matrix\n80 0 48\n0 80 36\n0 0 1\n\n"
-      "distortion\n0 0 0 0 0\n\nrectification\n1 0 0\n0 1 0\n0 0 1\n\nprojection\n80 0 48 -8.8\n0 "
-      "80 "
-      "36 0\n0 0 1 0\n";
+  const auto ost = [](const std::string& side, const std::string& fx_times_b) {
+    return "# oST version 5.0 parameters\n\n[image]\n\nwidth\n96\n\nheight\n72\n\n[narrow/" + side +
+           "]\n\ncamera matrix\n80 0 48\n0 80 36\n0 0 1\n\ndistortion\n0 0 0 0 0\n\n"
+           "rectification\n1 0 0\n0 1 0\n0 0 1\n\nprojection\n80 0 48 " +
+           fx_times_b + "\n0 80 36 0\n0 0 1 0\n";
+  };
   const auto pair = [](const std::string& l, const std::string& r) {
     return Files{{"left.yaml", l}, {"right.yaml", r}};
   };
   const std::string binned =
-      "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, y_offset: 0, height: 0, "
-      "width: 0}\n";
+      "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, y_offset: 0, height: 0, width: 0}\n";
   return {
-      calibration("T_imu_cam of both", {{"c.yaml", "%YAML:1.0\n" + kalibr(raw, raw1)}}),
+      calibration("T_imu_cam of both",
+                  {{"c.yaml", "%YAML:1.0\n" + kalibr(inertial("0"), inertial("0.11"))}}),
       calibration("T_cam_imu of both", {{"c.yaml", kalibr(cam0, cam1)}}),
       calibration("T_cam_imu of one", {{"c.yaml", kalibr(cam0)}}, "T_cn_cnm1", 2),
       calibration("radial-tangential", {{"c.yaml", kalibr("", kStepBetween, "radial-tangential")}}),
@@ -313,7 +300,7 @@ std::vector<Case> calibrations() {
       calibration("ros2 topic echo", pair(echo(0, true) + "---\n", echo(-8.8, true) + "---\n")),
       calibration("two documents", {{"b.yaml", echo(0, true) + "---\n" + echo(-8.8, true)}}),
       calibration("binned by REP 104", pair(echo(0, true, 2, binned), echo(-8.8, true, 2, binned))),
-      calibration("ost.txt", {{"ost.txt", ost}}),
+      calibration("ost.txt", {{"ost.txt", ost("left", "0") + "\n" + ost("right", "-8.8")}}),
       calibration("P in centimetres", pair(camera_info(0), camera_info(-880)),
                   "11 m|unusually long"),
       calibration("sign of P", pair(camera_info(0), camera_info(8.8)), "right.yaml|swapped", 2),
@@ -322,23 +309,18 @@ std::vector<Case> calibrations() {
                   pair(camera_info(0, "image_width: 192\nimage_height: 144\n"),
                        camera_info(-8.8, "image_width: 192\nimage_height: 144\n")),
                   "192x144|96x72", 2),
-      calibration("M1", {{"c.yml", opencv({"M1", "D1", "M2", "D2", "R", "T"}) + kSize}}),
+      calibration("M1", {{"c.yml", opencv(kKeys) + kSize}}),
       calibration(
           "left_K",
           {{"c.yml", opencv({"left_K", "left_D", "right_K", "right_D", "R", "T"}) + kSize}}),
       calibration("KL", {{"c.yml", opencv({"KL", "DL", "KR", "DR", "Rot", "Trans"}) + kSize}}),
       calibration("XML", {{"c.xml", xml}}),
       calibration("nested lists", {{"c.json", lists}}),
-      calibration("without a size", {{"c.yml", opencv({"M1", "D1", "M2", "D2", "R", "T"})}},
-                  "--size", 2),
-      calibration("T in squares",
-                  {{"c.yml", opencv({"M1", "D1", "M2", "D2", "R", "T"}, "-4.4, 0, 0") + kSize}},
+      calibration("without a size", {{"c.yml", opencv(kKeys)}}, "--size", 2),
+      calibration("T in squares", {{"c.yml", opencv(kKeys, "-4.4, 0, 0") + kSize}},
                   "4.4 m|unusually long|squares"),
       calibration("upside down on the right",
-                  {{"c.yml", "%YAML:1.0\n---\n" + matrix("M1", 3, 3, kK) + matrix("D1", 1, 4, kD) +
-                                 matrix("M2", 3, 3, kK) + matrix("D2", 1, 4, kD) +
-                                 matrix("R", 3, 3, "-1, 0, 0, 0, -1, 0, 0, 0, 1") +
-                                 matrix("T", 3, 1, "0.11, 0, 0") + kSize}}),
+                  {{"c.yml", opencv(kKeys, "0.11, 0, 0", "-1, 0, 0, 0, -1, 0, 0, 0, 1") + kSize}}),
       calibration("ORB-SLAM3", {{"c.yaml", orb3}}),
       calibration("ORB-SLAM3, rectified",
                   {{"c.yaml",
@@ -358,9 +340,8 @@ std::vector<Case> calibrations() {
       calibration("EuRoC, Kimera", {{"l.yaml", sensor(0)}, {"r.yaml", sensor(0.11, "radtan")}}),
       calibration("stella_vslam",
                   {{"c.yaml",
-                    "Camera: {setup: stereo, model: perspective, fx: 80, fy: 80, cx: 48, cy: "
-                    "36, k1: 0, k2: 0, p1: 0, p2: 0, cols: 96, rows: 72, "
-                    "focal_x_baseline: 8.8}\n"}}),
+                    "Camera: {setup: stereo, model: perspective, fx: 80, fy: 80, cx: 48, cy: 36, "
+                    "k1: 0, k2: 0, p1: 0, p2: 0, cols: 96, rows: 72, focal_x_baseline: 8.8}\n"}}),
       calibration(
           "KITTI calib.txt",
           {{"calib.txt", "P0: 80 0 48 0 0 80 36 0 0 0 1 0\nP1: 80 0 48 -8.8 0 80 36 0 0 0 1 0\n"}},
@@ -384,14 +365,12 @@ std::vector<std::uint8_t> grey(int frame, int camera) {
     }
   return pixels;
 }
-const std::string kOwn = fmt::format(
-    "version: 1\nrig: {{name: tiny, baseline: 0.11}}\ncameras:\n  - {{name: left, size: [96, 72], "
-    "model: "
-    "pinhole-radtan, intrinsics: [80, 80, 48, 36], distortion: [0, 0, 0, 0]}}\n  - {{name: right, "
-    "size: [96, "
-    "72], model: pinhole-radtan, intrinsics: [80, 80, 48, 36], distortion: [0, 0, 0, 0], "
-    "T_camera_left: [1, "
-    "0, 0, -0.11, 0, 1, 0, 0, 0, 0, 1, 0]}}\n");
+const std::string kLens =
+    "size: [96, 72], model: pinhole-radtan, intrinsics: [80, 80, 48, 36], distortion: [0, 0, 0, 0]";
+const std::string kOwn =
+    "version: 1\nrig: {name: tiny, baseline: 0.11}\ncameras:\n  - {name: left, " + kLens +
+    "}\n  - {name: right, " + kLens +
+    ", T_camera_left: [1, 0, 0, -0.11, 0, 1, 0, 0, 0, 0, 1, 0]}\n";
 
 /// The name of an image by a pattern: what lines() has, and {side} {c} {L}: left or right, 0 or 1,
 /// L or R; {ns} … are `later` ns of the right camera.
@@ -560,9 +539,9 @@ std::vector<Case> folders() {
   for (int k = 0; k < 2; ++k) {
     raw.emplace_back(drive + fmt::format("image_0{}/timestamps.txt", k), dates);
     cameras += fmt::format(
-        "S_0{0}: 96 72\nK_0{0}: 80 0 48 0 80 36 0 0 1\nD_0{0}: 0 0 0 0 0\nR_0{0}: 1 0 0 0 1 0 0 0 "
-        "1\n"
-        "T_0{0}: {1} 0 0\nS_rect_0{0}: 64 40\nR_rect_0{0}: 1 0 0 0 1 0 0 0 1\n",
+        "S_0{0}: 96 72\nK_0{0}: 80 0 48 0 80 36 0 0 1\nD_0{0}: 0 0 0 0 0\n"
+        "R_0{0}: 1 0 0 0 1 0 0 0 1\nT_0{0}: {1} 0 0\nS_rect_0{0}: 64 40\n"
+        "R_rect_0{0}: 1 0 0 0 1 0 0 0 1\n",
         k, -kBaseline * k);
   }
   raw.emplace_back("2014_06_24/calib_cam_to_cam.txt", cameras);
@@ -636,17 +615,11 @@ Case bag(const char* name, const Bag& b, std::string mentions = "", int code = k
               if (!b.infos) continue;
               w.channel(static_cast<std::uint16_t>(3 + k), camera + "/camera_info",
                         "sensor_msgs/CameraInfo");
+              CameraInfoMessage info{kWidth, kHeight};
+              info.fx = info.fy = kFocal, info.cx = 48, info.cy = 36;
+              info.fx_times_b = k == 0 ? 0 : b.fx_times_b;
               w.message(static_cast<std::uint16_t>(3 + k), kStart,
-                        camera_info_message(Wire::cdr, kStart,
-                                            {kWidth,
-                                             kHeight,
-                                             "plumb_bob",
-                                             {0, 0, 0, 0, 0},
-                                             kFocal,
-                                             kFocal,
-                                             48,
-                                             36,
-                                             k == 0 ? 0 : b.fx_times_b}));
+                        camera_info_message(Wire::cdr, kStart, info));
             }
             if (b.more) b.more(&w);
             for (int i = 0; i < kFrames; ++i)

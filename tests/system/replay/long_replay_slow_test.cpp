@@ -4,14 +4,10 @@
 #include <sys/resource.h>
 
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <string>
 
 #include <fmt/format.h>
 
 #include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 

@@ -1,12 +1,8 @@
 #pragma once
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <string>
-
 #include <nlohmann/json.hpp>
 
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {

@@ -1,5 +1,4 @@
 // A first drive of which nothing is known but focal length and baseline, on recorded images.
-#include <gtest/gtest.h>
 
 #include <cstdio>
 

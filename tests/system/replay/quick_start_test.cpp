@@ -1,8 +1,4 @@
 // Mistakes of the first day with the program, on recorded images.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <string>
 
 #include <fmt/format.h>
 
@@ -44,11 +40,9 @@ TEST_F(QuickStart, missingDistortionExitsOneAndIsNamed) {
 std::string euroc_calibration(const std::string& T) {
   return "version: 1\ncameras:\n"
          "  - {size: [752, 480], model: pinhole-radtan, intrinsics: [458.654, 457.296, 367.215, "
-         "248.375], distortion: [-0.2834, 0.0740, "
-         "0.0002, 0.0]}\n"
+         "248.375], distortion: [-0.2834, 0.0740, 0.0002, 0.0]}\n"
          "  - {size: [752, 480], model: pinhole-radtan, intrinsics: [457.587, 456.134, 379.999, "
-         "255.238], distortion: [-0.2837, 0.0745, "
-         "-0.0001, 0.0],\n     T_camera_left: [" +
+         "255.238], distortion: [-0.2837, 0.0745, -0.0001, 0.0],\n     T_camera_left: [" +
          T + "]}\n";
 }
 

@@ -1,15 +1,6 @@
-#include <gtest/gtest.h>
 
-#include <unistd.h>
 
 #include <array>
-#include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <string>
-
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "tests/support/child_program.hpp"
 #include "tests/support/refusal.hpp"

@@ -1,16 +1,11 @@
 #pragma once
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-#include <string>
-
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "app/config/calibration_file.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/odometry/stereo_drive.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -40,7 +35,7 @@ class ReplayedFolder : public ::testing::Test {
     for (std::size_t i = 0; i < drive.size(); ++i) {
       times += fmt::format("{}\n", drive.stamps[i].ns());
       for (int k = 0; k < 2; ++k) {
-        const OwnedImage& p = drive.pairs[i][static_cast<std::size_t>(k)];
+        const features::test::Image& p = drive.pairs[i][static_cast<std::size_t>(k)];
         const fs::path file = *master_ / image_name(k, i);
         fs::create_directories(file.parent_path());
         const cv::Mat image(p.height, p.width, CV_8U, const_cast<std::uint8_t*>(p.bytes.data()),
@@ -49,8 +44,7 @@ class ReplayedFolder : public ::testing::Test {
       }
     }
     master_->write("times.txt", times);
-    app::CalibrationFile calibration;
-    calibration.rig = drive.rig;
+    app::CalibrationFile calibration{.rig = drive.rig};
     app::write_calibration(*master_ / "calibration.yaml", calibration);
   }
   static void TearDownTestSuite() { delete master_; }

@@ -1,9 +1,6 @@
 // Checks that examples of the README work unchanged.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <string>
-
 #include "app/config/calibration_file.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,12 +1,9 @@
 // vergence-ros2 over restarts, with readers that do not read, and what it costs.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sched.h>
 
 #include <algorithm>
 #include <fstream>
-#include <string>
-#include <vector>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -30,8 +27,7 @@ using Ros2Restarts = Ros2Rig;
 TEST_F(Ros2Restarts, nextSessionIsFoundGapIsStale) {
   const std::string log = (folder_.path() / "log").string();
   const app::FileDescriptor out(::open(log.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
-  ChildProgram::Start start;
-  start.errors = out.get();
+  ChildProgram::Start start{.errors = out.get()};
   const auto bridge = start_bridge(socket_, domain_, {}, start);
   // Nothing listens yet.
   std::this_thread::sleep_for(1500ms);
@@ -44,7 +40,7 @@ TEST_F(Ros2Restarts, nextSessionIsFoundGapIsStale) {
     }
     EXPECT_TRUE(feed_until(&session, [&] { return odometry.read() != nullptr; })) << i;
   }
-  const RosDiagnostics* d = nullptr;
+  const RosDiagnostics::Message* d = nullptr;
   do {
     d = diagnostics.next();
     ASSERT_NE(d, nullptr);

@@ -3,14 +3,10 @@
 #include <gtest/gtest.h>
 #include <messages.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <functional>
 #include <map>
 #include <memory>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -23,19 +19,6 @@ namespace vergence::test {
 
 using namespace std::chrono_literals;
 
-/// Messages that Cyclone DDS decodes.
-using RosOdometry = nav_msgs_msg_dds__Odometry_;
-using RosTf = tf2_msgs_msg_dds__TFMessage_;
-using RosCameraInfo = sensor_msgs_msg_dds__CameraInfo_;
-using RosFix = sensor_msgs_msg_dds__NavSatFix_;
-using RosPose = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
-using RosDiagnostics = diagnostic_msgs_msg_dds__DiagnosticArray_;
-using RosImage = sensor_msgs_msg_dds__Image_;
-using RosNodes = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
-using HumbleNodes = humble_msg_dds__ParticipantEntitiesInfo_;
-using TriggerRequest = std_srvs_srv_dds__Trigger_Request_;
-using TriggerResponse = std_srvs_srv_dds__Trigger_Response_;
-
 /// Humble's layout under the same name.
 inline const dds_topic_descriptor_t kHumbleNodes = [] {
   dds_topic_descriptor_t d = humble_msg_dds__ParticipantEntitiesInfo__desc;
@@ -43,40 +26,29 @@ inline const dds_topic_descriptor_t kHumbleNodes = [] {
   return d;
 }();
 
-/// Descriptor of a message type.
-template <class Message>
-inline const dds_topic_descriptor_t* const kDescriptor = nullptr;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosOdometry> =
-    &nav_msgs_msg_dds__Odometry__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosTf> = &tf2_msgs_msg_dds__TFMessage__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosCameraInfo> =
-    &sensor_msgs_msg_dds__CameraInfo__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosFix> =
-    &sensor_msgs_msg_dds__NavSatFix__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosPose> =
-    &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosDiagnostics> =
-    &diagnostic_msgs_msg_dds__DiagnosticArray__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosImage> =
-    &sensor_msgs_msg_dds__Image__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<RosNodes> =
-    &rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<TriggerRequest> =
-    &std_srvs_srv_dds__Trigger_Request__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<TriggerResponse> =
-    &std_srvs_srv_dds__Trigger_Response__desc;
-template <>
-inline const dds_topic_descriptor_t* const kDescriptor<HumbleNodes> = &kHumbleNodes;
+/// A message that Cyclone DDS decodes, and its descriptor.
+template <class Decoded, const dds_topic_descriptor_t* kOfType>
+struct RosKind {
+  using Message = Decoded;
+  static constexpr const dds_topic_descriptor_t* kDescriptor = kOfType;
+};
+using RosOdometry = RosKind<nav_msgs_msg_dds__Odometry_, &nav_msgs_msg_dds__Odometry__desc>;
+using RosTf = RosKind<tf2_msgs_msg_dds__TFMessage_, &tf2_msgs_msg_dds__TFMessage__desc>;
+using RosCameraInfo =
+    RosKind<sensor_msgs_msg_dds__CameraInfo_, &sensor_msgs_msg_dds__CameraInfo__desc>;
+using RosFix = RosKind<sensor_msgs_msg_dds__NavSatFix_, &sensor_msgs_msg_dds__NavSatFix__desc>;
+using RosPose = RosKind<geometry_msgs_msg_dds__PoseWithCovarianceStamped_,
+                        &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc>;
+using RosDiagnostics = RosKind<diagnostic_msgs_msg_dds__DiagnosticArray_,
+                               &diagnostic_msgs_msg_dds__DiagnosticArray__desc>;
+using RosImage = RosKind<sensor_msgs_msg_dds__Image_, &sensor_msgs_msg_dds__Image__desc>;
+using RosNodes = RosKind<rmw_dds_common_msg_dds__ParticipantEntitiesInfo_,
+                         &rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc>;
+using TriggerRequest =
+    RosKind<std_srvs_srv_dds__Trigger_Request_, &std_srvs_srv_dds__Trigger_Request__desc>;
+using TriggerResponse =
+    RosKind<std_srvs_srv_dds__Trigger_Response_, &std_srvs_srv_dds__Trigger_Response__desc>;
+using HumbleNodes = RosKind<humble_msg_dds__ParticipantEntitiesInfo_, &kHumbleNodes>;
 
 /// A domain of this process's own, so that tests may run in parallel.
 inline std::uint32_t own_domain() { return 1 + static_cast<std::uint32_t>(::getpid()) % 200; }
@@ -86,9 +58,8 @@ class RosParticipant {
  public:
   explicit RosParticipant(std::uint32_t domain) {
     ::setenv("CYCLONEDDS_URI",
-             "<CycloneDDS><Domain><General><Interfaces>"
-             "<NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces></General>"
-             "</Domain></CycloneDDS>",
+             "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
+             "multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>",
              1);
     participant_ = dds_create_participant(domain, nullptr, nullptr);
   }
@@ -109,9 +80,9 @@ class RosParticipant {
     dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 10);
     return qos;
   }
-  template <class Message>
+  template <class Kind>
   [[nodiscard]] dds_entity_t topic(const std::string& name) const {
-    return dds_create_topic(participant_, kDescriptor<Message>, name.c_str(), nullptr, nullptr);
+    return dds_create_topic(participant_, Kind::kDescriptor, name.c_str(), nullptr, nullptr);
   }
 
  private:
@@ -119,11 +90,12 @@ class RosParticipant {
 };
 
 /// A subscription as ROS 2 has it by default: reliable, the last ten.
-template <class Message>
+template <class Kind>
 class RosReader {
  public:
+  using Message = typename Kind::Message;
   RosReader(const RosParticipant& participant, const std::string& topic, bool latched = false)
-      : RosReader(participant, participant.topic<Message>("rt" + topic), latched) {}
+      : RosReader(participant, participant.topic<Kind>("rt" + topic), latched) {}
   RosReader(const RosParticipant& participant, dds_entity_t topic, bool latched = false)
       : reader_(dds_create_reader(participant.get(), topic, RosParticipant::reliable(latched).get(),
                                   nullptr)) {}
@@ -225,9 +197,7 @@ class StreamSession {
   }
   /// The pose of a camera that looks and drives straight ahead at 0.1 m per frame.
   void pose() {
-    RigFrame frame;
-    frame.number = frames_;
-    frame.cameras = 2;
+    RigFrame frame{.number = frames_, .cameras = 2};
     frame.stamp = Stamp(kFirst + static_cast<std::int64_t>(frames_) * kInterval);
     for (std::size_t k = 0; k < 2; ++k) frame.images[k] = image(frames_, k);
     publisher_.on_frame(frame);

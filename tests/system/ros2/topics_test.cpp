@@ -1,19 +1,13 @@
 // Checks vergence-ros2's topics with Cyclone DDS, which the product does not use.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/eventfd.h>
 
 #include <algorithm>
-#include <map>
-#include <string>
-#include <vector>
 
 #include "tests/system/ros2/ros2_rig.hpp"
 
 namespace vergence::test {
 namespace {
-
-using app::FileDescriptor;
 
 using Ros2Topics = Ros2Rig;
 
@@ -34,7 +28,7 @@ TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
   RosReader<RosPose> pose_enu(participant, "/vergence/pose_enu");
   RosReader<RosDiagnostics> diagnostics(participant, "/diagnostics");
 
-  const RosOdometry* o = nullptr;
+  const RosOdometry::Message* o = nullptr;
   ASSERT_TRUE(feed_until(&session, [&] {
     o = odometry.read();
     return o != nullptr && o->twist.twist.linear.x > 0;
@@ -54,20 +48,20 @@ TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
       std::vector<std::string>{
           "typehash=RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0;"});
 
-  const RosTf* moved = tf.next();
+  const auto* moved = tf.next();
   ASSERT_NE(moved, nullptr);
   ASSERT_EQ(moved->transforms._length, 1U);
   EXPECT_STREQ(moved->transforms._buffer[0].child_frame_id, "base_link");
   EXPECT_NEAR(moved->transforms._buffer[0].transform.translation.x,
               0.1 * static_cast<double>(frame_of(moved->transforms._buffer[0].header)), 1e-6);
 
-  const RosFix* f = fix.next();
+  const auto* f = fix.next();
   ASSERT_NE(f, nullptr);
   EXPECT_EQ(f->status.status, 0);
   EXPECT_EQ(f->position_covariance_type, 3);
   EXPECT_NEAR(f->longitude, 153.0137, 1e-4);
   EXPECT_GT(f->latitude, -27.4975);
-  const RosPose* p = pose_enu.next();
+  const auto* p = pose_enu.next();
   ASSERT_NE(p, nullptr);
   EXPECT_STREQ(p->header.frame_id, "enu");
   EXPECT_NEAR(p->pose.pose.position.x, 1, 1e-9);
@@ -80,7 +74,7 @@ TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
   RosReader<RosTf> tf_static(participant, "/tf_static", true);
   RosReader<RosCameraInfo> left(participant, "/vergence/left/camera_info", true),
       right(participant, "/vergence/right/camera_info", true);
-  const RosTf* rig = tf_static.next();
+  const auto* rig = tf_static.next();
   ASSERT_NE(rig, nullptr);
   ASSERT_EQ(rig->transforms._length, 2U);
   const auto& T = rig->transforms._buffer[1];
@@ -89,7 +83,7 @@ TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
   EXPECT_NEAR(T.transform.translation.x, 1.5, 1e-12);
   EXPECT_NEAR(T.transform.translation.y, -0.75, 1e-12);
   EXPECT_NEAR(T.transform.rotation.x, -0.5, 1e-12);
-  const RosCameraInfo* info = right.next();
+  const auto* info = right.next();
   ASSERT_NE(info, nullptr);
   EXPECT_STREQ(info->header.frame_id, "right_optical_frame");
   EXPECT_STREQ(info->distortion_model, "plumb_bob");
@@ -105,7 +99,7 @@ TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
   ASSERT_NE(info, nullptr) << "an adopted calibration is published again";
   EXPECT_EQ(info->k[0], 460);
 
-  const RosDiagnostics* d = diagnostics.next();
+  const auto* d = diagnostics.next();
   ASSERT_NE(d, nullptr);
   ASSERT_EQ(d->status._length, 5U);
   EXPECT_STREQ(d->status._buffer[0].name, "vergence: odometry");
@@ -126,10 +120,14 @@ TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
     return writer.current_count > 0 && reader.current_count > 0;
   };
   ASSERT_TRUE(feed_until(&session, matched));
-  TriggerRequest request{0x123456789abcdef0, 42, 0};
-  ASSERT_EQ(dds_write(requests, &request), 0);
-  const TriggerResponse* response = responses.next();
-  ASSERT_NE(response, nullptr);
+  TriggerRequest::Message request{0x123456789abcdef0, 42, 0};
+  const TriggerResponse::Message* response = nullptr;
+  // A response is lost while the bridge has not yet discovered the reader, so the call is repeated.
+  ASSERT_TRUE(feed_until(&session, [&] {
+    EXPECT_EQ(dds_write(requests, &request), 0);
+    response = responses.read();
+    return response != nullptr;
+  }));
   EXPECT_EQ(response->client, 0x123456789abcdef0U);
   EXPECT_EQ(response->number, 42);
   EXPECT_TRUE(response->success);
@@ -154,7 +152,7 @@ TEST_F(Ros2Topics, imagesEqualTheSessionsAndShareStamps) {
   std::map<std::int64_t, int> received;
   int images = 0;
   const auto read_all = [&](RosReader<RosImage>* reader, std::size_t camera) {
-    for (const RosImage* m; (m = reader->read()) != nullptr; ++images) {
+    for (const RosImage::Message* m; (m = reader->read()) != nullptr; ++images) {
       const std::int64_t frame = frame_of(m->header);
       ++received[frame];
       EXPECT_EQ(m->header.stamp.nanosec % 50'000'000, 1U);
@@ -196,7 +194,7 @@ void expect_node(const std::string& socket, std::uint32_t domain, const char* di
   const RosParticipant participant(domain);
   RosReader<Nodes> nodes(participant, participant.topic<Nodes>("ros_discovery_info"), true);
   RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
-  const Nodes* n = nullptr;
+  const typename Nodes::Message* n = nullptr;
   // The service is the last of the endpoints without a calibration.
   ASSERT_TRUE(feed_until(&session, [&] {
     n = nodes.read();
@@ -239,10 +237,8 @@ class Ros2Refusals : public testing::TestWithParam<RefusalCase> {};
 TEST_P(Ros2Refusals, exitWithTwoAndNameTheOption) {
   const TemporaryFolder folder;
   const std::string log = (folder.path() / "log").string();
-  const FileDescriptor out(::open(log.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
-  ChildProgram::Start start;
-  start.errors = out.get();
-  ChildProgram bridge(GetParam().words, start);
+  const app::FileDescriptor out(::open(log.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
+  ChildProgram bridge(GetParam().words, {.errors = out.get()});
   EXPECT_EQ(bridge.wait(20s), 2);
   EXPECT_NE(read_file(log).find(GetParam().named), std::string::npos) << read_file(log);
 }
@@ -261,7 +257,7 @@ TEST_F(Ros2Topics, otherStreamVersionExitsWithTwo) {
       app::open_line_socket({app::LineAddress::Kind::unix_socket, socket_, {}}, "test");
   socket->greet("{\"version\":1,\"frame\":0}\n");
   const auto bridge = start_bridge(socket_, domain_);
-  const FileDescriptor wake(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  const app::FileDescriptor wake(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   while (socket->counters().readers == 0) socket->wait(wake.get(), Duration::milliseconds(20), {});
   EXPECT_EQ(bridge->wait(20s), 2);
 }

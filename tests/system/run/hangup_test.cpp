@@ -3,12 +3,9 @@
 
 #include <chrono>
 #include <csignal>
-#include <filesystem>
 #include <thread>
 
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/live_drive.hpp"
-#include "tests/system/run/session.hpp"
 
 namespace vergence {
 namespace {
@@ -16,14 +13,10 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-using test::Drive;
-using test::lines_of;
-using test::within;
-
 // Devices take seconds to open, a mock's world to build: who stops it then has no session.
 TEST(Stop, sigtermBeforeTheRunLeavesNoDirectory) {
   const test::TemporaryFolder folder;
-  Drive drive(folder / "s", false, 600);
+  test::Drive drive(folder / "s", false, 600);
   std::this_thread::sleep_for(100ms);
   drive.signal(SIGTERM);
   EXPECT_EQ(drive.wait(), 143);
@@ -34,8 +27,8 @@ TEST(Hangup, sighupOrClosedTerminalClosesSession) {
   const test::TemporaryFolder folder;
   for (const bool terminal : {false, true}) {
     const fs::path session = folder / (terminal ? "terminal" : "none");
-    Drive drive(session, terminal, 600);
-    ASSERT_TRUE(within(60, [&] { return lines_of(session / "poses.csv") > 5; }));
+    test::Drive drive(session, terminal, 600);
+    ASSERT_TRUE(test::within(60, [&] { return test::lines_of(session / "poses.csv") > 5; }));
     if (terminal)
       drive.close_terminal();
     else

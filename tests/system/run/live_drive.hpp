@@ -1,7 +1,4 @@
 #pragma once
-#include <filesystem>
-#include <string>
-#include <vector>
 
 #include "tests/support/child_program.hpp"
 #include "tests/support/within.hpp"

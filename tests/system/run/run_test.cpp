@@ -1,19 +1,13 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <string>
 #include <utility>
-
-#include <nlohmann/json.hpp>
 
 #include "app/datasets/trajectory_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -22,10 +16,8 @@ namespace {
 
 using test::events;
 using test::kSmall;
-using test::lines_of;
 using test::Outcome;
 using test::read_file;
-using test::read_lines;
 using test::run_vergence;
 using test::summary_of;
 using test::TemporaryFolder;
@@ -103,9 +95,9 @@ TEST(Run, realTimeFramesArePosedOrCounted) {
                 devices["camera0_underruns"].get<int>(),
             81);
   // The header is not counted.
-  EXPECT_EQ(lines_of(session / "poses.csv") - 1, read - summary["drops"]["lines"].get<int>());
+  EXPECT_EQ(test::lines_of(session / "poses.csv") - 1, read - summary["drops"]["lines"].get<int>());
   EXPECT_EQ(summary["runtime_allocations"], 0);
-  const auto lines = read_lines(session / "events.jsonl");
+  const auto lines = test::read_lines(session / "events.jsonl");
   EXPECT_FALSE(lines.empty());
   for (const std::string& line : lines)
     EXPECT_GE(nlohmann::json::parse(line)["stamp_ns"].get<std::int64_t>(),

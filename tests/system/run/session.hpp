@@ -1,10 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 

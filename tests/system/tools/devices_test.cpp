@@ -1,12 +1,10 @@
-#include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include <nlohmann/json.hpp>
 
 #include "tests/support/gige_camera.hpp"
-#include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
@@ -19,9 +17,7 @@ using test::Outcome;
 using test::run_vergence;
 
 TEST(Devices, networkCameraIsListedWithItsConfiguration) {
-  test::GigeCameraOptions o;
-  o.address = test::GigeCamera::address(60);
-  o.serial = "TOOL-60";
+  test::GigeCameraOptions o{.address = test::GigeCamera::address(60), .serial = "TOOL-60"};
   const test::GigeCamera camera(o);
   const Outcome listed = run_vergence("devices");
   EXPECT_EQ(listed.code, 0) << listed.err;

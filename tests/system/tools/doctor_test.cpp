@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include <nlohmann/json.hpp>
 
 #include "tests/support/gige_camera.hpp"
@@ -49,9 +47,7 @@ TEST(Doctor, missingCamerasAreProblemsAndExitOne) {
 }
 
 TEST(Doctor, connectedCameraAndItsLinkAreEvaluated) {
-  test::GigeCameraOptions options;
-  options.address = test::GigeCamera::address(61);
-  options.serial = "TOOL-61";
+  test::GigeCameraOptions options{.address = test::GigeCamera::address(61), .serial = "TOOL-61"};
   const test::GigeCamera camera(options);
   const Outcome o = run_vergence(
       "doctor '" + kConfigurations +

@@ -1,19 +1,11 @@
-#include <gtest/gtest.h>
 
-#include <array>
-#include <chrono>
-#include <filesystem>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/image_file.hpp"
 #include "core/math/random.hpp"
 #include "tests/support/gige_pair.hpp"
-#include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {

@@ -3,19 +3,9 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <memory>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include <nlohmann/json.hpp>
 
 #include "tests/rigs/emulator.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/support/within.hpp"
 #include "tests/support/xsens_terminal.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <limits>
 #include <utility>
-#include <vector>
 
 #include "drivers/v4l2/v4l2.hpp"
 #include "tests/rigs/vivid.hpp"

@@ -1,17 +1,5 @@
 // `vergence run` on V4L2 cameras that look at a rendered drive, inside the rig's kernel.
-#include <gtest/gtest.h>
 #include <signal.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <filesystem>
-#include <string>
-#include <thread>
-#include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/rigs/film.hpp"

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "app/checkerboard/board_detector.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 

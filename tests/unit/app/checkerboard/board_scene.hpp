@@ -13,8 +13,7 @@ namespace vergence::test {
 
 /// Side by side, 12 cm apart, a little turned: lenses of a common machine-vision rig.
 inline RigCalibration known_rig(int cameras, CameraModelKind kind) {
-  RigCalibration rig;
-  rig.cameras = cameras;
+  RigCalibration rig{.cameras = cameras};
   for (int k = 0; k < cameras; ++k) {
     Intrinsics& lens = rig.intrinsics[static_cast<std::size_t>(k)];
     lens.kind = kind;
@@ -95,22 +94,15 @@ inline app::BoardView seen_board(const RigCalibration& rig, const app::BoardPatt
   return seen;
 }
 
-struct BoardScene {
-  RigCalibration rig{};
-  std::vector<Transform> T_left_board{};
-  std::vector<app::BoardView> views{};
-};
-
 /// Corners of `count` board poses with normal noise, px a coordinate. A view is kept where every
 /// camera has the whole board.
-inline BoardScene board_scene(const RigCalibration& rig, const app::BoardPattern& board, int count,
-                              double noise_px, std::uint64_t seed) {
-  BoardScene scene;
-  scene.rig = rig;
+inline std::vector<app::BoardView> board_views(const RigCalibration& rig,
+                                               const app::BoardPattern& board, int count,
+                                               double noise_px, std::uint64_t seed) {
+  std::vector<app::BoardView> views;
   Random poses(7, 1), noise(seed, 2);
-  for (int view = 0; static_cast<int>(scene.views.size()) < count && view < 20 * count; ++view) {
-    const Transform T = held_board(board, rig.intrinsics[0], view, poses);
-    app::BoardView seen = seen_board(rig, board, T);
+  for (int view = 0; static_cast<int>(views.size()) < count && view < 20 * count; ++view) {
+    app::BoardView seen = seen_board(rig, board, held_board(board, rig.intrinsics[0], view, poses));
     seen.name = "view" + std::to_string(view);
     bool whole = true;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
@@ -118,18 +110,14 @@ inline BoardScene board_scene(const RigCalibration& rig, const app::BoardPattern
       for (app::BoardCorner& c : seen.corners[k])
         c.pixel += noise_px * Vec2(noise.normal(), noise.normal());
     }
-    if (!whole) continue;
-    scene.views.push_back(seen);
-    scene.T_left_board.push_back(T);
+    if (whole) views.push_back(seen);
   }
-  return scene;
+  return views;
 }
 
 inline app::BoardCalibrationOptions board_options(const RigCalibration& rig,
                                                   const app::BoardPattern& board) {
-  app::BoardCalibrationOptions o;
-  o.board = board;
-  o.model = rig.intrinsics[0].kind;
+  app::BoardCalibrationOptions o{.board = board, .model = rig.intrinsics[0].kind};
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
     o.sizes.push_back({rig.intrinsics[k].width, rig.intrinsics[k].height});
   return o;

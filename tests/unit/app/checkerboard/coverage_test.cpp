@@ -1,12 +1,9 @@
 #include "app/checkerboard/coverage.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <map>
 
 #include "app/checkerboard/view_collector.hpp"
-#include "tests/support/refusal.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/app/checkerboard/board_picture.hpp"
 #include "tests/unit/app/checkerboard/board_scene.hpp"
 

@@ -2,9 +2,6 @@
 // (checkerboards/opencv/README.md of the shared data).
 #include <gtest/gtest.h>
 
-#include <string>
-
-#include "app/checkerboard/board_calibration.hpp"
 #include "app/checkerboard/board_images.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/unit/app/checkerboard/board_scene.hpp"

@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -12,7 +10,6 @@
 #include "core/comparison/geodesy.hpp"
 #include "core/math/se3.hpp"
 #include "tests/support/shared_data.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::app {
@@ -203,19 +200,5 @@ TEST(EvaluateCommand, refusesInvalidArguments) {
 }
 
 // Without times row belongs to row, and that takes as many.
-TEST(Evaluate, refusesKittiPosesOfOtherLength) {
-  const test::TemporaryFolder folder;
-  const auto write = [&](const char* name, int rows) {
-    std::string text;
-    for (int i = 0; i < rows; ++i) text += fmt::format("1 0 0 {} 0 1 0 0 0 0 1 0\n", i);
-    folder.write(name, text);
-    return (folder / name).string();
-  };
-  const std::string ten = write("ten.txt", 10);
-  EXPECT_NE(evaluate_command({ten, ten}).code, 2);
-  for (const int other : {9, 11})
-    EXPECT_EQ(evaluate_command({write("other.txt", other), ten}).code, 2) << other;
-}
-
 }  // namespace
 }  // namespace vergence::app

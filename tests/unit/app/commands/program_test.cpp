@@ -1,11 +1,7 @@
 #include <algorithm>
-#include <string>
-
-#include <gtest/gtest.h>
 
 #include "app/runtime/nearest.hpp"
-#include "tests/support/refusal.hpp"
-#include "tests/support/temporary_folder.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::app {

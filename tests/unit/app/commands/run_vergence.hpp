@@ -2,7 +2,6 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <string>
 
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,7 +1,6 @@
 #include "app/config/calibration_covariance.hpp"
 
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>

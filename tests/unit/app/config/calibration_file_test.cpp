@@ -1,12 +1,9 @@
 #include "app/config/calibration_file.hpp"
 
-#include <string>
 #include <tuple>
-#include <vector>
 
 #include <gtest/gtest.h>
 
-#include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/refusal.hpp"
@@ -64,9 +61,7 @@ TEST(CalibrationFile, documentedFormIsRead) {
 /// A rig of four with every field set to numbers that need all their digits.
 CalibrationFile awkward() {
   Random random(7);
-  CalibrationFile c;
-  c.rig_name = "the \"blue\" van: № 3\n";
-  c.names = {"left", "true", "12", ""};
+  CalibrationFile c{.rig_name = "the \"blue\" van: № 3\n", .names = {"left", "true", "12", ""}};
   c.serials = {"0123", "", "a b", "0x1f"};
   c.source = "online";
   c.rig.cameras = 4;

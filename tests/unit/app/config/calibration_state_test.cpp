@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <optional>
-#include <string>
 
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -35,9 +33,7 @@ class Environment {
 };
 
 RigSettings rig(const std::string& name, const std::string& state_dir = "") {
-  RigSettings r;
-  r.name = name;
-  r.state_dir = state_dir;
+  RigSettings r{.name = name, .state_dir = state_dir};
   return r;
 }
 

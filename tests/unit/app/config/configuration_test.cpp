@@ -2,13 +2,10 @@
 
 #include <sys/stat.h>
 
-#include <string>
 #include <utility>
-#include <vector>
 
 #include <gtest/gtest.h>
 
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -43,6 +40,7 @@ TEST(Configuration, unknownKeyNamesNearestFileAndLine) {
 TEST(Configuration, suggestsOnlyKeysThatAreNear) {
   for (const auto& [setting, part] :
        {std::pair{"foo.bar=1", "\"foo.bar\"; docs/configuration.md lists all keys"},
+        std::pair{"cameras.0.driver=GIEG", "did you mean \"gige\"?"},
         std::pair{"cameras.0.rate=1", "did you mean \"trigger.rate\"?"},
         std::pair{"cameras.driver=mock", "cameras is a list"},
         std::pair{"cameras.7.name=a", "at most 4 cameras, numbered from 0"},

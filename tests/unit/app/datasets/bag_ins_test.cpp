@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <numbers>
 
 #include "app/datasets/recorded_ins.hpp"
@@ -19,7 +17,6 @@ namespace {
 
 using test::BagKind;
 using test::mentions;
-using test::Wire;
 
 /// Times in ns.
 constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kMs = 1'000'000;
@@ -58,7 +55,7 @@ class BagIns : public ::testing::TestWithParam<BagKind> {
     writer_->channel(3, "/fix", "sensor_msgs/NavSatFix");
     writer_->channel(4, "/imu/data", "sensor_msgs/Imu");
   }
-  [[nodiscard]] static Wire wire() { return GetParam().wire(); }
+  [[nodiscard]] static test::Wire wire() { return GetParam().wire(); }
   void fix(double t, std::int8_t status = 0, std::uint16_t channel = 3) {
     const Geodetic g = plane_.to_geodetic(place(t));
     write(channel, t, [&](std::int64_t ns) {

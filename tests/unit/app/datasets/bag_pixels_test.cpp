@@ -1,9 +1,6 @@
 // Decoded pixels of each encoding of sensor_msgs/Image and CompressedImage, in both containers.
 #include <gtest/gtest.h>
 
-#include <array>
-#include <memory>
-
 #include <opencv2/imgcodecs.hpp>
 
 #include "app/datasets/detail/bag_images.hpp"

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <optional>
 #include <span>
 
 #include "tests/support/bag_writer.hpp"
@@ -12,7 +11,6 @@ namespace vergence::app::detail {
 namespace {
 
 using test::BagKind;
-using test::McapWriter;
 using test::RosbagWriter;
 
 /// Two chunks of two messages each.
@@ -116,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, BagScanOf,
                                            BagKind{"rosbag", "lz4"}, BagKind{"rosbag", "bz2"}));
 
 TEST(Mcap, skipsChunkWithExcessiveSize) {
-  McapWriter writer;
+  test::McapWriter writer;
   writer.channel(1, "/left/image_raw", "sensor_msgs/Image");
   writer.close_chunk();
   const std::size_t here = writer.bytes().size();

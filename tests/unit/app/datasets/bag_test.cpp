@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
-#include <array>
 #include <memory>
 
 #include "app/datasets/detail/bag_images.hpp"
@@ -130,15 +129,6 @@ TEST_P(Bag, countsImagesOfOtherSizeOrBackwardStamp) {
   EXPECT_TRUE(mentions(s.remarks[0], "drive_0" + GetParam().ending() + ", offset "));
 }
 
-TEST_P(Bag, skipsImageWithoutPartner) {
-  for (std::int64_t i = 0; i < 4; ++i) frame(i);
-  left(kStart + 4 * kStep);
-  frame(5);
-  const StereoSequence s = open();
-  EXPECT_EQ(s.pairs.size(), 5U);
-  EXPECT_EQ(s.left_out, 1U);
-}
-
 TEST_P(Bag, listsTopicsAndUsesNamedOne) {
   writer_->channel(5, "/left/image_small", "sensor_msgs/Image");
   writer_->message(5, 0, image(wire(), kStart));
@@ -223,8 +213,7 @@ void write_db3(const std::filesystem::path& file, int pairs) {
     ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
   };
   run("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format "
-      "TEXT, "
-      "offered_qos_profiles TEXT)");
+      "TEXT, offered_qos_profiles TEXT)");
   run("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data "
       "BLOB)");
   const std::array<std::string, 4> topics{"left/image_raw", "right/image_raw", "left/camera_info",

@@ -2,13 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
 #include <tuple>
-#include <vector>
 
-#include <fmt/format.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/refusal.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"

@@ -6,7 +6,6 @@
 #include <sys/resource.h>
 
 #include "app/datasets/image_writer.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 

@@ -1,13 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <numbers>
-#include <string>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stamp_text.hpp"

@@ -1,10 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <functional>
 #include <numbers>
-#include <string>
 
 #include <fmt/format.h>
 #include <GeographicLib/LocalCartesian.hpp>

@@ -4,9 +4,7 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
-
+#include "tests/support/refusal.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
 namespace vergence::app {
@@ -123,16 +121,6 @@ TEST_F(Sequence, eurocSortsUnpairedImagesByStamp) {
   EXPECT_TRUE(s.pairs[1].file[0].empty());
   EXPECT_TRUE(s.pairs[2].file[1].empty());
   EXPECT_FALSE(s.pairs[3].file[1].empty());
-}
-
-TEST_F(Sequence, folderPairsByNameOrder) {
-  test::write_tiny_folder(folder_, 2);
-  std::filesystem::rename(folder_ / "right/001.png", folder_ / "right/zz.png");
-  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
-  ASSERT_EQ(s.pairs.size(), 2U);
-  EXPECT_EQ(s.pairs[0].stamp.ns(), test::kTinyStart);
-  EXPECT_EQ(s.pairs[1].file[0], "left/001.png");
-  EXPECT_EQ(s.pairs[1].file[1], "right/zz.png");
 }
 
 TEST_F(Sequence, folderReadsTimesWithImageNames) {

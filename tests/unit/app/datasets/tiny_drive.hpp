@@ -1,12 +1,9 @@
 #pragma once
 #include <cstdint>
-#include <filesystem>
-#include <string>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 /// Data sets of a few tiny images, in each of the layouts that are read.

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <string>
-#include <vector>
 
 #include "app/devices/drive_sync.hpp"
 #include "tests/support/gige_camera.hpp"

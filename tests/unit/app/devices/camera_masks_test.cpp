@@ -10,13 +10,10 @@
 namespace vergence::app {
 namespace {
 
-using test::TemporaryFolder;
-
 constexpr int kWidth = 80, kHeight = 60;
 
 RigCalibration small_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k) {
     rig.intrinsics[k].width = kWidth;
     rig.intrinsics[k].height = kHeight;
@@ -30,22 +27,20 @@ std::string pgm(const std::string& head, char value = 1) {
 
 /// The message with which a mask of camera 1 is refused.
 std::string refusal(const std::filesystem::path& folder, const std::string& name) {
-  Configuration c;
-  c.folder = folder;
+  Configuration c{.folder = folder};
   c.cameras[1].mask = name;
   return test::refusal_of([&] { const CameraMasks masks(c, small_rig()); });
 }
 
 TEST(CameraMasks, pngAndPgmBesideConfigurationAreRead) {
-  const TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   cv::Mat drawn(kHeight, kWidth, CV_8UC3, cv::Scalar(255, 255, 255));
   drawn.rowRange(50, 60).setTo(cv::Scalar(0, 0, 0));
   ASSERT_TRUE(cv::imwrite((folder / "bonnet.png").string(), drawn));
   std::string dots = pgm("P5\n# drawn by hand\n80 60 255\n");
   dots[dots.size() - 1] = '\0';
   (void)folder.write("dots.pgm", dots);
-  Configuration c;
-  c.folder = folder.path();
+  Configuration c{.folder = folder.path()};
   c.cameras[0].mask = "bonnet.png";
   c.cameras[1].mask = (folder / "dots.pgm").string();
   const CameraMasks masks(c, small_rig());
@@ -59,7 +54,7 @@ TEST(CameraMasks, pngAndPgmBesideConfigurationAreRead) {
 }
 
 TEST(CameraMasks, unusableMasksAreRefused) {
-  const TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   (void)folder.write("small.pgm", "P5 40 30 255\n" + std::string(40 * 30, '\1'));
   (void)folder.write("truncated.pgm", pgm("P5 80 60 255\n").substr(0, 1000));
   (void)folder.write("black.pgm", pgm("P5 80 60 255\n", '\0'));

@@ -3,14 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <string>
 
 #include "tests/unit/app/devices/fake_machine.hpp"
 
 namespace vergence::app {
 namespace {
 
-using test::contains;
 using test::FakeMachine;
 using enum FindingState;
 
@@ -161,7 +159,7 @@ TEST(Doctor, findingsFollowTheMachine) {
     if (found.empty()) continue;
     std::string text = found[0].message;
     for (const std::string& command : found[0].fix) text += "\n" + command;
-    EXPECT_TRUE(contains(text, c.part)) << text;
+    EXPECT_TRUE(test::contains(text, c.part)) << text;
   }
 }
 

@@ -4,13 +4,10 @@
 
 #include <filesystem>
 #include <set>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "app/devices/rig_settings.hpp"
 #include "app/devices/serial_devices.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 
 namespace vergence::app {

@@ -3,10 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
-#include <thread>
-#include <vector>
 
 #include "tests/support/idle_camera.hpp"
 
@@ -29,9 +26,7 @@ class SlowCamera final : public test::IdleCamera {
     return answer.load();
   }
   void expose_for(ExposureControl* control) {
-    Frame frame;
-    frame.exposure = has.exposure;
-    frame.gain_db = has.gain_db;
+    Frame frame{.exposure = has.exposure, .gain_db = has.gain_db};
     control->on_frame(0, frame);
   }
   void show(double grey) { std::fill(pixels_.begin(), pixels_.end(), std::uint8_t(grey)); }
@@ -70,8 +65,7 @@ TEST(ExposureControl, unableCameraEndsItForgetfulOneIsAskedAgain) {
   EXPECT_EQ(unable.asked, 1);
   EXPECT_TRUE(control.counters().unsupported);
 
-  exposure::ExposureOptions options;
-  options.target = 20;
+  exposure::ExposureOptions options{.target = 20};
   // Ten grey levels are within a stop of 20.
   options.dead_band = 1;
   // Another exposure than it was given, or another gain alone.

@@ -1,8 +1,6 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "app/devices/doctor_checks.hpp"
 #include "tests/support/refusal.hpp"

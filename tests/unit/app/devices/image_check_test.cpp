@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "app/devices/drive_sync.hpp"
 #include "core/math/random.hpp"

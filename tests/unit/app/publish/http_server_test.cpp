@@ -6,19 +6,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <memory>
 #include <random>
-#include <string>
 #include <vector>
 
-#include "app/publish/line_socket.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 
 namespace vergence::app {
 namespace {
-
-using std::chrono::milliseconds;
 
 constexpr const char* kPage = "<p>the page</p>";
 const std::string kToken = "0123456789abcdef";
@@ -63,7 +57,7 @@ class Http : public testing::Test {
     return socket;
   }
   void serve() {
-    for (int i = 0; i < 6; ++i) server_->step(milliseconds(1));
+    for (int i = 0; i < 6; ++i) server_->step(std::chrono::milliseconds(1));
   }
   static std::string received(const FileDescriptor& socket) {
     std::string text;
@@ -189,7 +183,7 @@ TEST_F(Http, garbageAndIdleConnectionsAreDropped) {
   (void)::send(other.get(), text.data(), text.size(), MSG_NOSIGNAL);
   std::string answer;
   for (int i = 0; i < 1000 && !answer.ends_with(kPage); ++i) {
-    server_->step(milliseconds(1));
+    server_->step(std::chrono::milliseconds(1));
     answer += received(other);
   }
   EXPECT_TRUE(answer.ends_with(kPage));

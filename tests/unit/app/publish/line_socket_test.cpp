@@ -8,8 +8,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <filesystem>
-#include <string>
 
 #include "app/runtime/errors.hpp"
 #include "drivers/clock.hpp"

@@ -4,16 +4,10 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 
-#include <atomic>
 #include <chrono>
 #include <limits>
 #include <map>
-#include <memory>
 #include <numbers>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -24,9 +18,7 @@ namespace vergence::app {
 namespace {
 
 PoseSample sample() {
-  PoseSample s;
-  s.frame = 12;
-  s.stamp = Stamp(1'577'836'800'500'000'001);
+  PoseSample s{.frame = 12, .stamp = Stamp(1'577'836'800'500'000'001)};
   s.state = State::stereo_odometry;
   s.status = PoseStatus::degraded;
   s.reason = Reason::few_inliers;
@@ -56,36 +48,23 @@ TEST(PoseLine, hasEveryKeyOfTheSchema) {
   earth.T_enu_left.t = {1, 2, 3};
   earth.position = {-27.4975, 153.0137, 60};
   earth.yaw = (90 - 358.25) * std::numbers::pi / 180;
-  const auto j = line_of(sample(), earth, 21.5);
-  EXPECT_EQ(j["version"], 2);
-  EXPECT_EQ(j["type"], "pose");
-  EXPECT_EQ(j["frame"], 12);
-  EXPECT_EQ(j["stamp_ns"], 1'577'836'800'500'000'001);
-  EXPECT_EQ(j["state"], "stereo_odometry");
-  EXPECT_EQ(j["status"], "degraded");
-  EXPECT_EQ(j["reason"], "few_inliers");
-  EXPECT_EQ(j["pose"]["position_m"], (std::vector<double>{1.25, -2.5, 3.125}));
+  auto j = line_of(sample(), earth, 21.5);
   const Eigen::Quaterniond q = quaternion(sample().T_world_left.R);
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_NEAR(j["pose"]["orientation_xyzw"][i].get<double>(),
                 q.coeffs()[static_cast<Eigen::Index>(i)], 1e-9);
-  ASSERT_EQ(j["covariance"].size(), 21U);
-  EXPECT_DOUBLE_EQ(j["covariance"][0], 0.25);
-  // Four digits are written.
-  EXPECT_DOUBLE_EQ(j["covariance"][20], 1e-6);
-  ASSERT_EQ(j["motion_covariance"].size(), 21U);
-  EXPECT_DOUBLE_EQ(j["motion_covariance"][6], 0.0004);
-  EXPECT_DOUBLE_EQ(j["length_sigma"], 0.0125);
-  EXPECT_EQ(j["enu"]["enu_m"], (std::vector<double>{1, 2, 3}));
-  EXPECT_EQ(j["enu"]["latitude_deg"], -27.4975);
-  EXPECT_EQ(j["enu"]["heading_deg"], 358.25);
-  EXPECT_EQ(j["inliers"], 44);
-  EXPECT_EQ(j["stereo_inliers"], 33);
-  EXPECT_EQ(j["reprojection_px"], 0.25);
-  EXPECT_EQ(j["estimate_ms"], 7.5);
-  EXPECT_EQ(j["age_ms"], 21.5);
-  EXPECT_EQ(j["dropped"], 7);
-  EXPECT_EQ(j.size(), 18U) << "a key that docs/live_interface.md does not have";
+  j["pose"].erase("orientation_xyzw");
+  // docs/live_interface.md has these keys. Covariances are written with four digits.
+  EXPECT_EQ(j, nlohmann::json::parse(R"({
+      "version": 2, "type": "pose", "frame": 12, "stamp_ns": 1577836800500000001,
+      "state": "stereo_odometry", "status": "degraded", "reason": "few_inliers",
+      "pose": {"position_m": [1.25, -2.5, 3.125]},
+      "covariance": [0.25, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1e-6],
+      "motion_covariance": [0, 0, 0, 0, 0, 0, 0.0004, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
+      "length_sigma": 0.0125,
+      "enu": {"enu_m": [1, 2, 3], "latitude_deg": -27.4975, "longitude_deg": 153.0137, "height_m": 60, "heading_deg": 358.25},
+      "inliers": 44, "stereo_inliers": 33, "reprojection_px": 0.25, "estimate_ms": 7.5,
+      "age_ms": 21.5, "dropped": 7})"));
 }
 
 TEST(PoseLine, omitsPositionWhenLost) {
@@ -113,16 +92,10 @@ TEST(PoseStream, calibrationLineHoldsRig) {
   CalibrationRecord record;
   record.stamp = Stamp(5);
   record.calibration.cameras = 2;
-  record.calibration.intrinsics[0] = {CameraModelKind::pinhole_equidistant,
-                                      640,
-                                      480,
-                                      450,
-                                      451,
-                                      322,
-                                      239,
-                                      {0.1, 0.2, 0.3, 0.4, 0},
-                                      {},
-                                      {}};
+  Intrinsics& lens = record.calibration.intrinsics[0];
+  lens = {.width = 640, .height = 480, .fx = 450, .fy = 451, .cx = 322, .cy = 239};
+  lens.kind = CameraModelKind::pinhole_equidistant;
+  lens.distortion = {0.1, 0.2, 0.3, 0.4, 0};
   record.calibration.T_camera_left[1] = {exp_so3({0.01, -0.02, 0.03}), {-0.75, 0.01, -0.02}};
   const std::vector<std::string> names{"left", "ri\"ght\xff"};
   const auto j = nlohmann::json::parse(calibration_line(record, names, {}));
@@ -139,8 +112,7 @@ TEST(PoseStream, calibrationLineHoldsRig) {
 }
 
 TEST(PoseStream, statusLineBeforeAndAfterFirstFrame) {
-  StreamStatus status;
-  status.session = "monday";
+  StreamStatus status{.session = "monday"};
   auto j = nlohmann::json::parse(status_line(status));
   EXPECT_EQ(j["type"], "status");
   for (const char* key : {"stamp_ns", "status", "frames", "ins"})
@@ -242,23 +214,6 @@ TEST(LinePublisher, fullRingDropsAndCountsNewestPoses) {
   }
 }
 
-TEST(LinePublisher, estimatorThreadDoesNotAllocate) {
-  const Publishing p;
-  EnuAlignment alignment;
-  alignment.T_enu_world.t = {1, 2, 3};
-  AllocationGuard::seal_thread();
-  const auto before = AllocationGuard::runtime_allocations();
-  p.publisher->on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
-  p.publisher->on_pose(report(0));
-  const auto taken = AllocationGuard::runtime_allocations() - before;
-  AllocationGuard::unseal_thread();
-  EXPECT_EQ(taken, 0U);
-  (void)p.publisher->counters();
-  ASSERT_EQ(p.socket->lines.size(), 1U);
-  EXPECT_EQ(nlohmann::json::parse(p.socket->lines[0])["enu"]["enu_m"],
-            (std::vector<double>{1, 2, 3}));
-}
-
 TEST(LinePublisher, greetsWithCalibrationAndAlignment) {
   const Publishing p;
   const Kept* socket = p.socket;
@@ -283,14 +238,14 @@ TEST(LinePublisher, imagesFollowARequestForThem) {
   const Kept* socket = p.socket;
   // Rows have 4 bytes.
   const std::string pixels = "abcdefgh";
-  RigFrame frame;
-  frame.cameras = 2;
+  RigFrame frame{.cameras = 2};
   frame.images[0] = {reinterpret_cast<const std::uint8_t*>(pixels.data()), 3, 2, 4};
   frame.images[1] = {reinterpret_cast<const std::uint8_t*>(pixels.data()), 2, 2, 4};
   for (frame.number = 0; !socket->images_sent && frame.number < 20'000; ++frame.number) {
     frame.stamp = Stamp(static_cast<std::int64_t>(frame.number) * 50'000'000);
     AllocationGuard::seal_thread();
     const auto before = AllocationGuard::runtime_allocations();
+    p.publisher->on_enu_alignment({}, {-27.4975, 153.0137, 60});
     p.publisher->on_frame(frame);
     p.publisher->on_pose(report(frame.number));
     EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
@@ -299,6 +254,7 @@ TEST(LinePublisher, imagesFollowARequestForThem) {
   }
   (void)p.publisher->counters();
   ASSERT_TRUE(socket->images_sent);
+  EXPECT_EQ(nlohmann::json::parse(socket->lines.at(0))["enu"]["latitude_deg"], -27.4975);
   std::string_view rest = socket->images;
   const auto next = [&rest] {
     const std::size_t end = rest.find('\n');

@@ -7,11 +7,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cstdint>
-#include <filesystem>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,5 @@
 #include "app/recording/messages.hpp"
 
-#include <array>
-#include <string>
-
 #include <gtest/gtest.h>
 
 #include "app/datasets/detail/ros_messages.hpp"
@@ -42,9 +39,7 @@ TEST(CdrWriter, reportsOverflowAndStopsWriting) {
 // Bytes of the same numbers as a NavSatFix that Fast CDR wrote and @foxglove/rosmsg2-serialization
 // read.
 TEST(Messages, navSatFixMatchesReferenceWriter) {
-  InsSample s;
-  s.stamp = Stamp(1'336'964'645'250'000'000);
-  s.fix = FixStatus::fix_3d;
+  InsSample s{.stamp = Stamp(1'336'964'645'250'000'000), .fix = FixStatus::fix_3d};
   s.position = {-27.476543, 153.028765, 52.25};
   s.position_sigma = 2;
   s.height_sigma = 3;
@@ -80,8 +75,7 @@ TEST(Messages, imageReadsBackWithoutPadding) {
 }
 
 RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
+  RigCalibration r{.cameras = 2};
   for (auto& lens : {&r.intrinsics[0], &r.intrinsics[1]})
     *lens = {CameraModelKind::pinhole_radtan, 640, 480, 450, 451, 322, 239,
              {-0.3, 0.1, 1e-4, -2e-4, 0.01},  {},  {}};

@@ -3,13 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <string>
-#include <thread>
 
-#include "app/recording/mcap_file.hpp"
 #include "app/recording/messages.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/memory/allocation_guard.hpp"
@@ -132,12 +128,18 @@ TEST(Recording, splitsBySizeWithRosbagNames) {
   EXPECT_EQ(all, sequence(0, 3000));
 }
 
-TEST(Recording, imagesNeverPushOutSmallMessages) {
+/// For a recording on a disk with faults.
+class FaultyRecording : public ::testing::Test {
+ protected:
+  FaultyRecording() { o.files.disk = &disk; }
+
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
+};
+
+TEST_F(FaultyRecording, imagesNeverPushOutSmallMessages) {
   o.when_full = WhenFull::drop;
-  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   // The first chunk stalls.
   disk.stall_ms = 1000;
@@ -162,11 +164,7 @@ void await_chunks(const Recording& recording, std::uint64_t chunks) {
   while (recording.counters().chunks < chunks) std::this_thread::sleep_for(1ms);
 }
 
-TEST(Recording, retriesFailedWritesInSameFile) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
-  o.files.disk = &disk;
+TEST_F(FaultyRecording, retriesFailedWritesInSameFile) {
   Recording recording(folder.path(), o);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
   await_chunks(recording, 1);
@@ -185,12 +183,8 @@ TEST(Recording, retriesFailedWritesInSameFile) {
   EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
 }
 
-TEST(Recording, fullDiskDropsAndCountsOldest) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
+TEST_F(FaultyRecording, fullDiskDropsAndCountsOldest) {
   o.queues = {64U << 10U};
-  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   disk.room = 0;
   for (int i = 0; i < 2000; ++i) ASSERT_TRUE(post(&recording, i, 100));
@@ -205,11 +199,7 @@ TEST(Recording, fullDiskDropsAndCountsOldest) {
 }
 
 // The system tells of it once, and the file's end finds nothing wrong.
-TEST(Recording, countsDataLostByDisk) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
-  o.files.disk = &disk;
+TEST_F(FaultyRecording, countsDataLostByDisk) {
   Recording recording(folder.path(), o);
   ASSERT_TRUE(post(&recording, 0));
   await_chunks(recording, 1);
@@ -240,15 +230,11 @@ TEST(Recording, refusesUnwritableDiskAtStart) {
   }
 }
 
-TEST(Recording, postingAndWritingDoNotAllocate) {
+TEST_F(FaultyRecording, postingAndWritingDoNotAllocate) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
   o.queues = {64U << 10U};
   o.files.roll_bytes = 100'000;
-  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   const auto before = AllocationGuard::runtime_allocations();
   {

@@ -18,9 +18,7 @@ constexpr double kDegree = 0.017453292519943295;
 Session bent_drive(std::size_t n) {
   Session s;
   for (std::size_t i = 0; i < n; ++i) {
-    Frame f;
-    f.stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
-    f.status = PoseStatus::ok;
+    Frame f{.stamp = Stamp(static_cast<std::int64_t>(i) * kStep), .status = PoseStatus::ok};
     f.state = State::stereo_odometry;
     f.posed = true;
     const double angle = 0.005 * static_cast<double>(i), radius = 100;

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <string>
-#include <vector>
 
 namespace vergence::app::report {
 namespace {
@@ -27,9 +25,7 @@ struct Case {
 
   Case() {
     for (int i = 0; i < 1000; ++i) {
-      Frame f;
-      f.stamp = at(0.05 * i);
-      f.posed = true;
+      Frame f{.stamp = at(0.05 * i), .posed = true};
       f.status = PoseStatus::ok;
       f.estimate_ms = 10;
       session.frames.push_back(f);
@@ -47,10 +43,7 @@ struct Case {
   }
   nlohmann::json& calibration() { return session.summary["calibration"]; }
   CalibrationRow& attempt(bool accepted, const char* cause, double before_px, double after_px) {
-    CalibrationRow row;
-    row.accepted = accepted;
-    row.decided = true;
-    row.cause = cause;
+    CalibrationRow row{.accepted = accepted, .decided = true, .cause = cause};
     row.reason = accepted ? "" : "it is worse";
     row.held_out_before_px = before_px;
     row.held_out_after_px = after_px;
@@ -171,9 +164,19 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
          c.calibration()["focal_length"] = {{"configured_px", 898.6},
                                             {"measured_px", 711.2},
                                             {"sigma_px", 12.0},
+                                            {"doubted", true},
                                             {"contradicted", true}};
        },
        bad, "711 ± 12", "--focal"},
+      {"probably another focal length",
+       [](Case& c) {
+         c.calibration()["focal_length"] = {{"configured_px", 898.6},
+                                            {"measured_px", 795.2},
+                                            {"sigma_px", 48.0},
+                                            {"doubted", true},
+                                            {"contradicted", false}};
+       },
+       care, "795 ± 48", "--focal"},
       {"scale of the INS", event(1, "scale_disagrees", "90.0 % longer"), care, "lengths disagree"},
       {"calibration not kept", event(2, "calibration_save_failed", "no room"), good, "", "no room"},
       {"truncated",
@@ -264,12 +267,9 @@ TEST(Assessment, everyReasonOfPoseHasAdvice) {
 
 /// Frames that are all degraded for one reason, the last `lost` of them without a pose.
 Session degraded_drive(std::size_t frames, const char* reason, std::size_t lost = 0) {
-  Session s;
-  s.reasons = {"", reason};
+  Session s{.reasons = {"", reason}};
   for (std::size_t i = 0; i < frames; ++i) {
-    Frame f;
-    f.stamp = at(0.1 * static_cast<double>(i));
-    f.posed = i + lost < frames;
+    Frame f{.stamp = at(0.1 * static_cast<double>(i)), .posed = i + lost < frames};
     f.status = f.posed ? PoseStatus::degraded : PoseStatus::lost;
     f.reason = 1;
     s.frames.push_back(f);
@@ -296,8 +296,7 @@ TEST(Usability, driveWithoutOkFrameIsNotUsable) {
   }
   // Why no calibration was found is the main reason.
   drives.push_back({degraded_drive(100, "uncalibrated"), false, "the right camera is on the left"});
-  CalibrationRow rejected;
-  rejected.reason = "the right camera is on the left";
+  CalibrationRow rejected{.reason = "the right camera is on the left"};
   drives.back().session.calibrations = {rejected};
   // Frames that stand still confirm nothing: fifty moved.
   drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});

@@ -1,16 +1,8 @@
 #include "app/report/page.hpp"
 
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <fstream>
-#include <string>
-#include <vector>
-
 #include "app/report/report.hpp"
-#include "tests/support/refusal.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/support/session_writer.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/report/xml_check.hpp"
 
 namespace vergence::app {

@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <string>
-
 #include "app/runtime/errors.hpp"
 #include "tests/support/session_writer.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -1,7 +1,5 @@
 #pragma once
 #include <cstdlib>
-#include <string>
-#include <vector>
 
 #include "tests/support/temporary_folder.hpp"
 

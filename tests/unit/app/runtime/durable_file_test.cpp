@@ -2,10 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <iterator>
-#include <string>
-
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <sstream>
-#include <string>
 
 #include "tests/support/refusal.hpp"
 
@@ -17,11 +16,7 @@ class ProgressTest : public testing::Test {
     return {out, mode, [this] { return now; }, [this] { return width; }};
   }
   static ProgressState at(std::uint64_t frame, std::uint64_t frames) {
-    ProgressState s;
-    s.state = "stereo";
-    s.frame = frame;
-    s.frames = frames;
-    s.path_m = 618;
+    ProgressState s{.state = "stereo", .frame = frame, .frames = frames, .path_m = 618};
     s.inliers = 318;
     s.estimate_ms = 7.9;
     return s;

@@ -6,10 +6,7 @@
 
 #include <atomic>
 #include <cerrno>
-#include <map>
-#include <string>
 #include <thread>
-#include <vector>
 
 namespace vergence::app {
 namespace {
@@ -47,9 +44,7 @@ bool mentions(const std::string& text, const std::string& part) {
 
 TEST(Realtime, urgentRolesHaveHigherPriority) {
   FakeSystem system;
-  RealtimeRequest request;
-  request.priority = 40;
-  RealtimeThreads threads(request, system);
+  RealtimeThreads threads({.priority = 40}, system);
   EXPECT_TRUE(threads.apply(kDrive).empty());
   const std::map<pid_t, int> expected{{2, 40}, {3, 39}, {4, 38}, {5, 37}};
   EXPECT_EQ(system.priorities, expected) << "solver, mock, caller and libraries stay as they are";
@@ -57,9 +52,7 @@ TEST(Realtime, urgentRolesHaveHigherPriority) {
 
 TEST(Realtime, eachThreadIsSetOnce) {
   FakeSystem system;
-  RealtimeRequest request;
-  request.priority = 40;
-  RealtimeThreads threads(request, system);
+  RealtimeThreads threads({.priority = 40}, system);
   (void)threads.apply(kDrive);
   EXPECT_EQ(system.calls, 4);
   (void)threads.apply(kDrive);
@@ -76,9 +69,7 @@ TEST(Realtime, refusalIsOneMessageWithTheFix) {
   system.fifo_error = EPERM;
   system.affinity_error = EINVAL;
   system.lock_error = ENOMEM;
-  RealtimeRequest request;
-  request.priority = 40;
-  request.lock_memory = true;
+  RealtimeRequest request{.priority = 40, .lock_memory = true};
   request.affinity = parse_cpu_list("900");
   RealtimeThreads threads(request, system);
   const auto memory = threads.lock_memory();
@@ -108,9 +99,7 @@ TEST(Realtime, kernelSchedulesAsRequested) {
   ASSERT_EQ(::sched_getaffinity(0, sizeof(here), &here), 0);
   unsigned first = 0;
   while (!CPU_ISSET(first, &here)) ++first;
-  RealtimeRequest request;
-  request.priority = 10;
-  request.affinity = parse_cpu_list(std::to_string(first));
+  RealtimeRequest request{.priority = 10, .affinity = parse_cpu_list(std::to_string(first))};
   RealtimeSystem system;
   RealtimeThreads threads(request, system);
   std::vector<ProcessThread> all;

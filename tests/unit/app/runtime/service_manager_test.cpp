@@ -6,11 +6,7 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
 #include <cstring>
-#include <filesystem>
-#include <string>
-#include <thread>
 
 #include <gtest/gtest.h>
 

@@ -1,24 +1,9 @@
 #include "app/runtime/signals.hpp"
 
-#include <csignal>
-
 #include <gtest/gtest.h>
 
 namespace vergence::app {
 namespace {
-
-TEST(SignalGuard, interruptAndTerminateHaveExitCodes) {
-  {
-    const SignalGuard guard;
-    std::raise(SIGINT);
-    EXPECT_TRUE(guard.stop_requested());
-    EXPECT_EQ(guard.stop_code(), ExitCode::interrupted);
-  }
-  const SignalGuard guard;
-  EXPECT_FALSE(guard.stop_requested()) << "a new guard starts afresh";
-  std::raise(SIGTERM);
-  EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
-}
 
 TEST(SignalGuard, restoresThePreviousHandler) {
   static int calls = 0;

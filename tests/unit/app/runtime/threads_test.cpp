@@ -3,11 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
 #include <chrono>
-#include <thread>
-
-#include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
 namespace {
@@ -47,24 +43,6 @@ TEST(BackgroundThread, resultIsVisibleWhenNotBusy) {
       while (runner.busy()) std::this_thread::yield();
     for (const int w : written) ASSERT_EQ(w, expected);
   }
-}
-
-TEST(BackgroundThread, doesNotAllocateOnItsSealedThread) {
-  if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  BackgroundThread runner;
-  bool sealed = false;
-  auto look = [&] { sealed = AllocationGuard::thread_sealed(); };
-  const auto before = AllocationGuard::runtime_allocations();
-  {
-    const SealedScope scope;
-    for (int i = 0; i < 200; ++i) {
-      runner.start(TaskRef(look));
-      runner.wait();
-    }
-  }
-  EXPECT_TRUE(sealed);
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 TEST(ThreadRunner, runsOneHalfOnEachThread) {

@@ -3,10 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <vector>
 
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <string>
 
 #include "app/session/recorder.hpp"
 #include "core/comparison/geodesy.hpp"

@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
-#include <vector>
-
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -5,8 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "app/session/recorder.hpp"
-#include "app/session/records.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {
@@ -32,9 +30,7 @@ std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last)
 
 TEST(Recorder, brieflyFullDiskLosesNothing) {
   const test::TemporaryFolder folder;
-  Recorder::Options options;
-  options.disk_full = full_from_to(20, 40);
-  Recorder recorder(folder.path(), options);
+  Recorder recorder(folder.path(), {.disk_full = full_from_to(20, 40)});
   for (std::uint64_t i = 0; i < 100; ++i)
     recorder.on_report(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
   const auto totals = recorder.close();
@@ -56,9 +52,7 @@ TEST(Recorder, longFullDiskLosesWholeCountedLines) {
   const test::TemporaryFolder folder;
   // At 170 bytes each in poses.csv, this is twice what memory holds.
   constexpr std::uint64_t kFrames = 14'000;
-  Recorder::Options options;
-  options.disk_full = full_from_to(10, kFrames - 10);
-  Recorder recorder(folder.path(), options);
+  Recorder recorder(folder.path(), {.disk_full = full_from_to(10, kFrames - 10)});
   for (std::uint64_t i = 0; i < kFrames; ++i)
     recorder.on_report(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
   const auto totals = recorder.close();

@@ -28,8 +28,7 @@ inline FrameReport pose(std::uint64_t frame, PoseStatus status, double x) {
 }
 
 inline RigCalibration two_cameras() {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k)
     rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 460, .fy = 461, .cx = 320, .cy = 240};
   rig.T_camera_left[1].t = {-0.5, 0, 0.25};

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <future>
 #include <thread>
 #include <utility>
@@ -12,8 +11,6 @@
 
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/session/records.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {

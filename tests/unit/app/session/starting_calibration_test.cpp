@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "app/config/calibration_state.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
@@ -37,22 +35,11 @@ CalibrationFile found(const Configuration& c, double t_y) {
   return file;
 }
 
-TEST(StartingCalibration, scratchThenFileThenStateThenConfiguration) {
+TEST(StartingCalibration, scratchPrecedesFileAndState) {
   const test::TemporaryFolder folder;
   const Configuration c = configuration(folder);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
-  const StartingCalibration state = starting_calibration(c, {}, kSerials);
-  EXPECT_EQ(state.trust, CalibrationTrust::state_file);
-  EXPECT_EQ(state.file.rig.T_camera_left[1].t.y(), 0.011);
-  EXPECT_STREQ(state.cause, "state_file");
-
   write_calibration(folder / "mine.yaml", found(c, 0.022));
-  const StartingCalibration given =
-      starting_calibration(c, {.file = folder / "mine.yaml"}, kSerials);
-  EXPECT_EQ(given.trust, CalibrationTrust::given);
-  EXPECT_EQ(given.file.rig.T_camera_left[1].t.y(), 0.022);
-  EXPECT_EQ(given.source, "mine.yaml");
-
   for (const CalibrationSource& wish :
        {CalibrationSource{.from_scratch = true}, CalibrationSource{true, folder / "mine.yaml"}}) {
     const StartingCalibration scratch = starting_calibration(c, wish, kSerials);

@@ -2,15 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <memory>
-#include <string>
-#include <utility>
 
-#include <nlohmann/json.hpp>
-
-#include "app/session/session_totals.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -86,8 +80,7 @@ TEST(Summary, knownScaleIsFoundAndShortDriveHasNoLongSegments) {
 }
 
 RigCalibration with_yaw_sigma(double sigma) {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   for (std::size_t k = 0; k < 2; ++k)
     rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 1500, .fy = 1500, .cx = 320, .cy = 240};
   rig.T_camera_left[1].t = {-0.1, 0, 0};

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <thread>
-#include <vector>
 
 #include "tests/support/idle_camera.hpp"
 
@@ -32,8 +31,7 @@ AcquiredFrame frame(FrameSlot slot) {
 TEST(AcquiredQueue, refusedFramesReturnTheirSlots) {
   Bench b;
   AcquiredQueue queue(b.cameras, true);
-  AcquiredQueue::Refused refused;
-  refused.set = frame(7).set;
+  AcquiredQueue::Refused refused{.set = frame(7).set};
   queue.push(refused);
   EXPECT_TRUE(b.camera.released.empty()) << "not on the producer's thread";
   queue.finish();

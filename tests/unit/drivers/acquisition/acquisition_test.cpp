@@ -2,14 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
-#include <atomic>
 #include <chrono>
-#include <memory>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/acquired.hpp"
@@ -182,8 +175,7 @@ TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
 }
 
 TEST(Acquisition, cameraSilentDuringPulsesIsRestarted) {
-  BenchOptions o{.mode = SyncMode::board, .seconds = 18};
-  Bench b({}, o);
+  Bench b({}, {.mode = SyncMode::board, .seconds = 18});
   b.watched[1]->hangs_from = b.rig->start() + Duration::seconds(4);
   const std::vector<Acquired> items = b.drive();
   EXPECT_EQ(b.watched[0]->starts, 1);

@@ -17,10 +17,7 @@ struct Counting final : Notifier {
 };
 
 Frame frame(FrameSlot slot, FrameStatus status = FrameStatus::complete) {
-  Frame f;
-  f.slot = slot;
-  f.counter = slot + 100U;
-  f.status = status;
+  Frame f{.slot = slot, .counter = slot + 100U, .status = status};
   return f;
 }
 

@@ -1,8 +1,5 @@
 #include "drivers/gige/gige.hpp"
 
-#include <memory>
-#include <stdexcept>
-
 #include "tests/support/camera_options.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"

@@ -120,8 +120,7 @@ void ShadowCamera::trigger_if_asked() {
 
 DeviceStatus ShadowCamera::wait(Duration limit) {
   trigger_if_asked();
-  Frame frame;
-  frame.slot = 0xFFFF;
+  Frame frame{.slot = 0xFFFF};
   const auto begin = steady_clock::now();
   const DeviceStatus status = camera_.wait(limit, &frame);
   const auto took = Duration::nanoseconds((steady_clock::now() - begin).count());

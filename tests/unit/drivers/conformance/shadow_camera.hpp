@@ -1,7 +1,5 @@
 #pragma once
 #include <atomic>
-#include <cstdint>
-#include <vector>
 
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"
 

@@ -16,8 +16,7 @@ float real(std::uint32_t word) { return std::bit_cast<float>(word); }
 
 TEST(GigeCamera, isConfiguredByOldAndNewFeatureNames) {
   for (const bool old_names : {false, true}) {
-    GigeCameraOptions o{.old_names = old_names};
-    GigeBench b(o);
+    GigeBench b({.old_names = old_names});
     CameraConfiguration c = b.wish();
     c.width = 160;
     c.height = 120;
@@ -148,8 +147,7 @@ TEST(GigeCamera, chunkModeIsSwitchedOff) {
 }
 
 TEST(GigeCamera, cameraWithoutClockIsStampedByArrival) {
-  GigeCameraOptions o{.tick_frequency = 0};
-  GigeBench b(o);
+  GigeBench b({.tick_frequency = 0});
   b.configure(b.wish());
   EXPECT_TRUE(mentions(b.camera->remark(), "no clock"));
   b.start();
@@ -166,8 +164,7 @@ TEST(GigeCamera, ptpIsEnabledAndItsStateReported) {
   EXPECT_EQ(b.camera->remark().find("PTP"), std::string::npos)
       << "it is a slave: " << b.camera->remark();
   EXPECT_EQ(b.camera->timing().resolution, Duration::nanoseconds(1));
-  GigeCameraOptions old{.old_names = true};
-  GigeBench without(old, 1);
+  GigeBench without({.old_names = true}, 1);
   EXPECT_EQ(without.camera->configure(c, nullptr), DeviceStatus::unsupported);
   EXPECT_TRUE(mentions(without.camera->last_error(), "PTP"));
 }

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "drivers/gige/gige.hpp"
@@ -30,17 +29,20 @@ struct GigeBench {
   }
 
   [[nodiscard]] CameraConfiguration wish() const {
-    return {simulator->options().sensor_width,
-            simulator->options().sensor_height,
-            50,
-            Duration::milliseconds(2),
-            0,
-            CameraTrigger::free};
+    const GigeCameraOptions& o = simulator->options();
+    return {o.sensor_width, o.sensor_height, 50, Duration::milliseconds(2), 0, CameraTrigger::free};
   }
   void configure(const CameraConfiguration& c) {
     ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   }
   void start() { ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error(); }
+
+  /// Until three frames have come.
+  void stream() {
+    configure(wish());
+    start();
+    EXPECT_EQ(read(3).size(), 3U);
+  }
 
   /// Collects frames until `count` are complete or nothing comes for a second; all slots given
   /// back.

@@ -46,8 +46,7 @@ TEST(GigeLoss, damagedFramesAreIncompleteOthersWhole) {
 
 TEST(GigeLoss, everyRandomPacketLossIsCounted) {
   for (const std::uint64_t seed : {1, 2}) {
-    GigeCameraOptions o{.seed = seed};
-    GigeBench b(o);
+    GigeBench b({.seed = seed});
     b.configure(many_packets(b, "off"));
     b.start();
     std::size_t received = b.read(3).size();

@@ -68,9 +68,7 @@ TEST(GigeTrouble, cameraOfAnotherProgramIsBusy) {
 
 TEST(GigeTrouble, silentCameraIsReportedAndComesBack) {
   GigeBench b;
-  b.configure(b.wish());
-  b.start();
-  EXPECT_EQ(b.read(3).size(), 3U);
+  b.stream();
   b.simulator->silence(true);
   ASSERT_TRUE(goes(&b, 6));
   EXPECT_TRUE(mentions(b.camera->last_error(), "sends no images"));
@@ -85,9 +83,7 @@ TEST(GigeTrouble, silentCameraIsReportedAndComesBack) {
 TEST(GigeTrouble, otherImageSizeIsReportedAndIncomplete) {
   for (const auto& [width, height] : {std::pair{160, 120}, {640, 480}}) {
     GigeBench b;
-    b.configure(b.wish());
-    b.start();
-    EXPECT_EQ(b.read(3).size(), 3U);
+    b.stream();
     const std::size_t whole = b.numbers.size();
     b.simulator->lie_about_size(width, height);
     ASSERT_TRUE(goes(&b, 6)) << width;
@@ -122,9 +118,7 @@ TEST(GigeTrouble, cameraIsFoundAtItsNewAddress) {
   GigeBench b({}, 202);
   if (gige::make_driver()->enumerate().empty())
     GTEST_SKIP() << "needs broadcasts on the loopback interface: run it outside of this container";
-  b.configure(b.wish());
-  b.start();
-  EXPECT_EQ(b.read(3).size(), 3U);
+  b.stream();
   const GigeCameraOptions other = at_address_of(b, "OTHER");
   GigeCameraOptions moved = b.simulator->options();
   moved.address = GigeCamera::address(203);
@@ -139,9 +133,7 @@ TEST(GigeTrouble, cameraIsFoundAtItsNewAddress) {
 
 TEST(GigeTrouble, lostControlIsADisconnect) {
   GigeBench b;
-  b.configure(b.wish());
-  b.start();
-  EXPECT_EQ(b.read(3).size(), 3U);
+  b.stream();
   b.simulator->take_control(true);
   EXPECT_TRUE(goes(&b, 12));
 }

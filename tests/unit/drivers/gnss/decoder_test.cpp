@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <vector>
 
 #include "tests/support/gnss_bytes.hpp"
 
@@ -207,16 +206,6 @@ TEST(GnssDecoder, singleShortStepIsNoInterval) {
   read_fixes(&d, {0, 100, 200, 300, 960, 1000, 1100, 1200, 1300, 1400});
   EXPECT_EQ(d.period(), Duration::milliseconds(100));
   EXPECT_EQ(d.counters().lost, 6U) << "between 300 and 960 ms";
-}
-
-TEST(GnssDecoder, firstStepIsTheIntervalUntilConfirmed) {
-  for (const int first : {40, 700}) {
-    Decoder d({Protocol::ubx, 0, {}});
-    read_fixes(&d, {0, first});
-    EXPECT_EQ(d.period(), Duration::milliseconds(first));
-    read_fixes(&d, {first + 100, first + 200, first + 300});
-    EXPECT_EQ(d.period(), Duration::milliseconds(100));
-  }
 }
 
 TEST(GnssDecoder, oldOrUntimedFixesAreNotDelivered) {

@@ -1,13 +1,6 @@
 #include "drivers/gnss/device.hpp"
 
-#include <gtest/gtest.h>
-
-#include <atomic>
 #include <chrono>
-#include <memory>
-#include <span>
-#include <string>
-#include <thread>
 
 #include "drivers/gnss/gnss.hpp"
 #include "tests/support/device_terminal.hpp"

@@ -1,8 +1,5 @@
-#include <gtest/gtest.h>
 
-#include <vector>
 
-#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/conformance/shadow_camera.hpp"
 #include "tests/unit/drivers/iidc/camera_under_test.hpp"
 

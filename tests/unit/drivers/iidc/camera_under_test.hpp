@@ -2,8 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <string>
-#include <utility>
 
 #include "drivers/iidc/iidc_camera.hpp"
 #include "tests/support/camera_options.hpp"

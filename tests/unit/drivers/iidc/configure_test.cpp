@@ -1,6 +1,4 @@
-#include <gtest/gtest.h>
 
-#include "tests/support/camera_options.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/iidc/camera_under_test.hpp"
 

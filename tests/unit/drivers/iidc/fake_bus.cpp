@@ -7,8 +7,6 @@
 
 namespace vergence::test {
 
-using iidc::CycleTime;
-
 FakeBus::FakeBus(bool isochronous, bool beta) {
   iidc_init(&model_, 0);
   if (beta) iidc_init_beta(&model_);
@@ -82,7 +80,7 @@ void FakeBus::replug() {
 std::vector<std::uint8_t> FakeBus::draw(std::int64_t end_of_exposure) {
   std::vector<std::uint8_t> image(std::max(iidc_frame_bytes(&model_), shape_.frame_bytes));
   iidc_draw(&model_, image.data(), static_cast<std::uint64_t>(end_of_exposure),
-            CycleTime::at(end_of_exposure).quadlet());
+            iidc::CycleTime::at(end_of_exposure).quadlet());
   return image;
 }
 

@@ -1,4 +1,3 @@
-#include <gtest/gtest.h>
 
 #include "drivers/clock.hpp"
 #include "tests/support/mentions.hpp"

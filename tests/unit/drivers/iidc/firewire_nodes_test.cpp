@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/drivers/iidc/fake_bus.hpp"
 

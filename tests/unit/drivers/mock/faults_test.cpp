@@ -1,10 +1,6 @@
 #include "drivers/mock/faults.hpp"
 
-#include <gtest/gtest.h>
-
 #include <numbers>
-#include <stdexcept>
-#include <string>
 
 #include "tests/support/mentions.hpp"
 #include "tests/support/temporary_folder.hpp"

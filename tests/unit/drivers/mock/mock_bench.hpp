@@ -2,12 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <memory>
 #include <optional>
-#include <string>
-#include <vector>
 
-#include "drivers/mock/mock_rig.hpp"
 #include "tests/support/small_mock.hpp"
 
 namespace vergence::mock {
@@ -27,8 +23,8 @@ struct Seen {
   double mean = 0;
 };
 
-/// A drive in virtual time with tiny pictures of an almost empty town, and all that its cameras,
-/// its INS and its board bring; frames are released at once.
+/// A drive in virtual time with tiny pictures of an almost empty town, and all that its cameras and
+/// its board bring; frames are released at once.
 struct MockBench {
   MockBench(const std::vector<std::string>& faults, MockRigOptions options,
             const TriggerConfiguration& board = {kRate}) {
@@ -50,9 +46,7 @@ struct MockBench {
     while (!(ended[0] && ended[1] && ended[2] && ended[3])) {
       for (std::size_t k = 0; k < 2; ++k) ended[k] = read_frame(k) || ended[k];
       InsReading r;
-      const DeviceStatus status = rig->ins().wait(Duration::microseconds(50), &r);
-      if (status == DeviceStatus::ok) readings.push_back(r);
-      ended[2] = ended[2] || status == DeviceStatus::ended;
+      ended[2] = rig->ins().wait(Duration::microseconds(50), &r) == DeviceStatus::ended || ended[2];
       ended[3] = read_pulse(pause_at) || ended[3];
     }
     for (std::size_t k = 0; k < 2; ++k)
@@ -64,7 +58,6 @@ struct MockBench {
   // Number of disconnects followed by a reconnect, per camera.
   std::array<int, 2> disconnects{};
   std::array<CameraStatistics, 2> statistics;
-  std::vector<InsReading> readings;
   std::vector<Pulse> pulses;
   int board_disconnected = 0;
 

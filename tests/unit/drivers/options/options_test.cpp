@@ -3,11 +3,7 @@
 #include <fstream>
 #include <map>
 #include <set>
-#include <string>
 #include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "tests/support/mentions.hpp"
 
@@ -84,8 +80,7 @@ TEST(CameraOptions, invalidValueChangesNothing) {
 }
 
 TEST(CameraOptions, driverTakesOnlyItsKindAndValidValues) {
-  gige::Options taken;
-  taken.buffers = 7;
+  gige::Options taken{.buffers = 7};
   std::string error;
   EXPECT_FALSE(
       parse_options(v4l2::Options{}, gige::option_table(), "GigE cameras", &taken, &error));

@@ -1,9 +1,6 @@
-#include <gtest/gtest.h>
 
-#include <cstdint>
 
 #include "core/math/random.hpp"
-#include "drivers/sync/rig_synchronizer.hpp"
 #include "tests/unit/drivers/sync/rig_frames.hpp"
 
 /// Pairing by the stamps of one clock: the bus's, PTP's, the host's.

@@ -218,8 +218,7 @@ class PulseRig {
     for (double& since : waiting_since_) since = since == 0 ? t : since;
     const bool calm = quiet(t), resumed = std::exchange(resumed_, false);
     if (calm || random_.uniform() >= o_.unreported) {
-      Event e;
-      e.is_pulse = true;
+      Event e{.is_pulse = true};
       Pulse& p = e.pulse;
       p.number = number_;
       p.boot = boot_;

@@ -1,4 +1,3 @@
-#include <gtest/gtest.h>
 
 #include "tests/unit/drivers/sync/pulse_rules.hpp"
 

@@ -1,15 +1,11 @@
-#include <gtest/gtest.h>
 
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "core/math/random.hpp"
 #include "core/memory/allocation_guard.hpp"
-#include "drivers/sync/rig_synchronizer.hpp"
 #include "drivers/sync/sync_out_pulses.hpp"
 #include "firmware_iface/trigger/trigger.h"
-#include "tests/support/no_allocations.hpp"
 #include "tests/unit/drivers/sync/rig_frames.hpp"
 
 /// The modes with other pulses than a board's: the INS's, those of one camera that triggers the
@@ -238,32 +234,6 @@ TEST(RigModes, contradictingReportUnverifiesItsSet) {
   EXPECT_EQ(sync.counters().contradictions[0], 1U);
   EXPECT_EQ(sync.counters().contradictions[1], 1U);
   EXPECT_FALSE(sync.verified(0));
-}
-
-TEST(RigModes, synchronisationAllocatesNothing) {
-  if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
-  RigSynchronizer sync(rig_options(SyncMode::board));
-  ClockMapper clock{ClockMapperOptions{}};
-  HostStamp t(80'000'000'000);
-  std::uint64_t sets = 0;
-  test::expect_no_allocations([&] {
-    for (std::uint64_t n = 0; n < 500; ++n) {
-      clock.ping(t, DeviceStamp(t.ns() + 1000), DeviceStamp(t.ns() + 2000),
-                 t + Duration::microseconds(3));
-      (void)clock.at(DeviceStamp(t.ns()));
-      if (n == 200) sync.restarted(1);
-      sync.pulse(pulse_at(n, t));
-      for (int k = 0; k < 2; ++k) {
-        (void)sync.offer(rig_frame(k, static_cast<int>(n), n, t,
-                                   DeviceStamp(t.ns() * (n < 300 || k == 1 ? 1 : -1))));
-        for (SyncedSet set; sync.next(&set);) ++sets;
-      }
-      (void)sync.wants_pause();
-      t = t + varied(n);
-    }
-  });
-  EXPECT_GT(sets, 400U);
 }
 
 }  // namespace

@@ -44,19 +44,6 @@ std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f,
   return drain(sync);
 }
 
-TEST(RigSynchronizer, nextImageShowsTheLostOne) {
-  RigSynchronizer sync(options());
-  EXPECT_TRUE(offer(&sync, frame(0, 0, 0)).empty());
-  EXPECT_TRUE(offer(&sync, frame(0, 1, 1)).empty());
-  const auto sets = offer(&sync, frame(1, 1, 1));
-  ASSERT_EQ(sets.size(), 2U);
-  EXPECT_FALSE(sets[0].complete);
-  EXPECT_FALSE(sets[0].present[1]);
-  EXPECT_TRUE(sets[1].complete);
-  EXPECT_EQ(sync.counters().lost[1], 1U);
-  EXPECT_EQ(sync.counters().missed, 0U);
-}
-
 TEST(RigSynchronizer, pulseUnseenByAllCamerasIsMissedNotLost) {
   RigSynchronizer sync(options());
   (void)offer(&sync, frame(0, 0, 0));

@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdint>
-#include <optional>
-
 /// The rate of the pulses is written with six digits, the device's own is 400 Hz / n: over a long
 /// drive the difference must add up to nothing.
 namespace vergence {

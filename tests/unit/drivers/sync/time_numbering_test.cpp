@@ -34,16 +34,5 @@ TEST(TimeNumbering, busClockWrapIsUnwrapped) {
   EXPECT_EQ(numbering.time_of(frame, sets), 127'895 * kMs) << "another camera's count of wraps";
 }
 
-TEST(TimeNumbering, timeOutsideEverySetHasNoNumber) {
-  TimeNumbering numbering(options(SyncMode::ptp));
-  OpenSets sets;
-  open(&sets, 0, 1000 * kMs);
-  EXPECT_FALSE(numbering.number_of(1, 980 * kMs, &sets).number);
-  open(&sets, 1, 1050 * kMs);
-  EXPECT_FALSE(numbering.number_of(1, 1020 * kMs, &sets).number);
-  sets.close(sets.oldest());
-  EXPECT_EQ(numbering.number_of(1, 1020 * kMs, &sets).number, 0U) << "has gone out";
-}
-
 }  // namespace
 }  // namespace vergence

@@ -4,19 +4,16 @@
 
 #include <vector>
 
-#include "drivers/trigger_board/pulse_counter.hpp"
-
 namespace vergence::trigger_board {
 namespace {
 
 constexpr std::uint64_t kPeriod = 33'333;
 constexpr std::uint32_t kBoot = 7, kMark = 0x1234;
 
-TriggerFrame frame_of(std::uint8_t type, std::size_t size, std::uint8_t sequence = 0) {
+TriggerFrame frame_of(std::uint8_t type, std::size_t size) {
   TriggerFrame frame{};
   frame.type = type;
   frame.size = static_cast<decltype(frame.size)>(size);
-  frame.sequence = sequence;
   return frame;
 }
 
@@ -37,15 +34,6 @@ struct Receiving : ::testing::Test {
     for (TriggerExposure& x : e.exposure) x = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
     TriggerFrame frame = frame_of(trigger_event, trigger_event_payload_size);
     trigger_put_event(&e, frame.payload);
-    accept(frame);
-  }
-  void status(std::uint8_t state, std::uint32_t mark, std::uint8_t sequence = 0) {
-    TriggerStatus s{};
-    s.boot_id = kBoot;
-    s.state = state;
-    s.configuration = mark;
-    TriggerFrame frame = frame_of(trigger_status, trigger_status_payload_size, sequence);
-    trigger_put_status(&s, frame.payload);
     accept(frame);
   }
   void accept(const TriggerFrame& frame) {

@@ -1,7 +1,5 @@
 #include "drivers/trigger_board/device.hpp"
 
-#include <gtest/gtest.h>
-
 #include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 

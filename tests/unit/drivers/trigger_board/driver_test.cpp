@@ -1,4 +1,3 @@
-#include <gtest/gtest.h>
 
 #include "drivers/serial/serial.hpp"
 #include "tests/support/mentions.hpp"

@@ -1,14 +1,11 @@
-#include <gtest/gtest.h>
 #include <pthread.h>
 
-#include <array>
-#include <atomic>
 #include <chrono>
 
-#include "core/memory/allocation_guard.hpp"
 #include "core/memory/thread_allocations.hpp"
 #include "drivers/serial/serial.hpp"
 #include "tests/support/device_terminal.hpp"
+#include "tests/support/no_allocations.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
@@ -25,8 +22,7 @@ struct TerminalRig {
     return std::make_unique<test::BoardSimulator>(test::PulseSource{}, o);
   }
   static Options options() {
-    Options o;
-    o.native_usb = true;
+    Options o{.native_usb = true};
     return o;
   }
   test::DeviceOnTerminal board{simulator()};
@@ -75,17 +71,14 @@ TEST(RealTime, deviceThreadAllocatesNothingWhileReading) {
   ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
   Pulse p;
   ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
-  const std::uint64_t before = AllocationGuard::runtime_allocations();
   ThreadAllocations::begin();
-  {
-    const SealedScope sealed;
+  test::expect_no_allocations([&] {
     (void)rig.device.pause(2);
     for (int i = 0; i < 50; ++i)
       ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
     (void)rig.device.statistics();
-  }
+  });
   ThreadAllocations::end();
-  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   // The simulator's thread, which has the name of the test's, allocates what it sends.
   std::array<char, ThreadAllocations::kNameBytes> own{};
   ASSERT_EQ(pthread_getname_np(pthread_self(), own.data(), own.size()), 0);

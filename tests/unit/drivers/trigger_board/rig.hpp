@@ -1,12 +1,7 @@
 #pragma once
 #include <map>
-#include <memory>
-#include <utility>
-#include <vector>
 
 #include "drivers/trigger_board/trigger_board.hpp"
-#include "tests/support/simulators/simulators.hpp"
-#include "tests/support/tampered.hpp"
 #include "tests/unit/drivers/conformance/serial_conformance.hpp"
 
 namespace vergence::test {

@@ -30,10 +30,7 @@ struct Exchange : ::testing::Test {
              FrameStatus status = FrameStatus::complete) {
     const auto slot = exchange.hold_buffer(buffer, 0, kBufferReserve);
     if (!slot) return false;
-    Frame offered;
-    offered.slot = *slot;
-    offered.counter = counter;
-    offered.status = status;
+    Frame offered{.slot = *slot, .counter = counter, .status = status};
     exchange.offer(offered);
     return true;
   }

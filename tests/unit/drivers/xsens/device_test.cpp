@@ -1,14 +1,8 @@
 #include "drivers/xsens/device.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdint>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "tests/support/mentions.hpp"
 #include "tests/support/quantile.hpp"
@@ -90,9 +84,7 @@ std::pair<std::int64_t, std::int64_t> gap_in(const Times& times, const OfTime& n
 // Cameras that SyncOut triggers are paired by a gap: every pulse on either side of it has to have
 // its reading, also behind a converter that keeps bytes for 16 ms.
 TEST(XsensDevice, pauseLosesNoReadingAndIsMarked) {
-  Options options;
-  options.sync_out_hz = 25;
-  XsensRig rig(simulated(Generation::mark4, 30), {}, options);
+  XsensRig rig(simulated(Generation::mark4, 30), {}, {.sync_out_hz = 25});
   ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.device->pause(Duration::milliseconds(200)), DeviceStatus::stopped);
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
@@ -115,9 +107,7 @@ TEST(XsensDevice, pauseLosesNoReadingAndIsMarked) {
 }
 
 TEST(XsensDevice, stopEndsSyncOutPulses) {
-  Options options;
-  options.sync_out_hz = 25;
-  XsensRig rig(simulated(Generation::mark4), {}, options);
+  XsensRig rig(simulated(Generation::mark4), {}, {.sync_out_hz = 25});
   rig.start();
   (void)rig.readings(20);
   rig.device->stop();
@@ -125,9 +115,7 @@ TEST(XsensDevice, stopEndsSyncOutPulses) {
 }
 
 TEST_P(BothGenerations, unchangedSettingsAreNotWrittenAgain) {
-  Options options;
-  options.sync_out_hz = 25;
-  XsensRig rig(simulated(GetParam()), {}, options);
+  XsensRig rig(simulated(GetParam()), {}, {.sync_out_hz = 25});
   ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->last_error();
   const test::XsensWrites first = rig.simulator->writes();
   EXPECT_GT(first.outputs + first.layout, 0);
@@ -143,10 +131,7 @@ TEST_P(BothGenerations, unchangedSettingsAreNotWrittenAgain) {
 }
 
 TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
-  Options options;
-  options.sync_out_hz = 30;
-  options.sync_out_width_ms = 2;
-  XsensRig rig(simulated(GetParam()), {}, options);
+  XsensRig rig(simulated(GetParam()), {}, {.sync_out_hz = 30, .sync_out_width_ms = 2});
   double actual = 0;
   ASSERT_EQ(rig.device->configure(legacy() ? 120 : 100, &actual), DeviceStatus::ok)
       << rig.device->last_error();
@@ -171,9 +156,7 @@ TEST_P(BothGenerations, otherBaudRateIsFoundAndChanged) {
   sensor.baud = 57600;
   // The baud rate can carry this layout.
   sensor.layout = {0x0004, 0x001};
-  Options options;
-  options.baud = 460800;
-  XsensRig rig(sensor, {}, options);
+  XsensRig rig(sensor, {}, {.baud = 460800});
   ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.simulator->baud(), 460800U);
   EXPECT_EQ(rig.simulator->writes().baud, 1);

@@ -1,11 +1,7 @@
 #pragma once
 #include <cmath>
-#include <memory>
-#include <vector>
 
 #include "drivers/xsens/device.hpp"
-#include "tests/support/simulators/simulators.hpp"
-#include "tests/support/tampered.hpp"
 #include "tests/unit/drivers/conformance/serial_conformance.hpp"
 
 namespace vergence::test {

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <string_view>
-
 #include "tests/unit/firmware_iface/iidc/rom_vector.hpp"
 
 namespace vergence::iidc {
@@ -35,27 +33,24 @@ TEST(ConfigRom, truncatedRomIsRefusedOrLosesItsTexts) {
 }
 
 TEST(ConfigRom, otherDevicesAreRefusedByReason) {
-  ConfigRom rom;
-  auto q = example_rom();
-  q[1] = 0;
-  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::not_1394);
-  q = example_rom();
-  q[5] = 0xFFFF'0000;
-  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::broken_root);
-  q = example_rom();
-  // The unit is an SBP-2 disk.
-  q[11] = 0x1200'609E;
-  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_camera);
-  q = example_rom();
-  // The unit directory is far outside the ROM.
-  q[8] = 0xD1FF'FFFF;
-  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_camera);
-  q = example_rom();
-  q[13] = 0xD4FF'FFFF;
-  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_command_base);
-  q = example_rom();
-  q[16] = 0x3900'0000;
-  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_command_base);
+  struct Row {
+    std::size_t at;
+    std::uint32_t quadlet;
+    RomStatus status;
+  };
+  for (const Row& row : {Row{1, 0, RomStatus::not_1394},
+                         {5, 0xFFFF'0000, RomStatus::broken_root},
+                         // The unit is an SBP-2 disk.
+                         {11, 0x1200'609E, RomStatus::no_camera},
+                         // The unit directory is far outside the ROM.
+                         {8, 0xD1FF'FFFF, RomStatus::no_camera},
+                         {13, 0xD4FF'FFFF, RomStatus::no_command_base},
+                         {16, 0x3900'0000, RomStatus::no_command_base}}) {
+    ConfigRom rom;
+    auto q = example_rom();
+    q[row.at] = row.quadlet;
+    EXPECT_EQ(parse_config_rom(q, &rom), row.status) << row.at;
+  }
 }
 
 TEST(ConfigRom, textLeafOfWrongLengthIsLeftOut) {

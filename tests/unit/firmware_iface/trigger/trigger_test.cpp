@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
+#include <numeric>
 #include <vector>
 
 namespace vergence {
@@ -116,18 +118,9 @@ TEST(TriggerFrames, idleZerosAreIgnored) {
 
 /// The bytes of firmware_iface/trigger/README.md, worked out by hand from its tables.
 TEST(TriggerPayloads, layoutsAreThoseOfTheReadme) {
-  EXPECT_EQ((laid<trigger_info_payload_size, TriggerInfo>(
-                trigger_put_info, {1,
-                                   2,
-                                   3,
-                                   4,
-                                   0x11223344,
-                                   84'000'000,
-                                   4,
-                                   2,
-                                   1,
-                                   0,
-                                   {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}})),
+  TriggerInfo info{1, 2, 3, 4, 0x11223344, 84'000'000, 4, 2, 1, 0, {}};
+  std::iota(std::begin(info.serial), std::end(info.serial), std::uint8_t{1});
+  EXPECT_EQ((laid<trigger_info_payload_size, TriggerInfo>(trigger_put_info, info)),
             (Bytes{1, 2, 3, 4, 0x44, 0x33, 0x22, 0x11, 0x00, 0xBD, 0x01, 0x05, 4,  2,
                    1, 0, 1, 2, 3,    4,    5,    6,    7,    8,    9,    10,   11, 12}));
   EXPECT_EQ((laid<trigger_config_payload_size, TriggerConfig>(

@@ -89,8 +89,7 @@ TEST(Commands, outputConfigurationIsPairsOfIdAndRate) {
   ASSERT_EQ(write_output_configuration(outputs, payload), payload.size());
   EXPECT_EQ(frame(MessageId::output_configuration, payload),
             from_hex("FA FF C0 2C 10 10 FF FF 10 20 FF FF 10 60 FF FF 20 13 00 64 40 20 00 64 80 "
-                     "20 00 64 50 42 00 64 50 22 00 64 D0 12 00 64 "
-                     "E0 20 FF FF 70 10 00 04 68"));
+                     "20 00 64 50 42 00 64 50 22 00 64 D0 12 00 64 E0 20 FF FF 70 10 00 04 68"));
   OutputConfiguration back;
   ASSERT_TRUE(read_output_configuration(payload, &back));
   EXPECT_EQ(back, outputs);
@@ -123,12 +122,6 @@ TEST(Configuration, configurationMessageRoundTrips) {
   EXPECT_EQ(read.firmware[2], 6);
   EXPECT_FALSE(read_configuration(Bytes(kConfigurationSize - 1), &read)) << "short";
   EXPECT_FALSE(read_configuration(Bytes(kConfigurationSize), &read)) << "of no device";
-}
-
-TEST(Configuration, deviceIdGivesTheGeneration) {
-  EXPECT_EQ(generation_of_device_id(0x00500123), Generation::legacy);
-  EXPECT_EQ(generation_of_device_id(0x07701234), Generation::mark4);
-  EXPECT_EQ(generation_of_device_id(0x00300001), std::nullopt);
 }
 
 TEST(Configuration, baudCodesRoundTripPerGeneration) {

@@ -43,10 +43,9 @@ void expect_attitude(const Mtdata& m, double tolerance) {
 TEST(Mtdata, floatFieldsAreDecoded) {
   const Mtdata m =
       decoded(from_hex("FA FF 32 4F 3E 00 00 00 BE 80 00 00 41 1D 00 00 3B 00 00 00 BC 00 00 00 3D "
-                       "00 00 00 3F 00 00 00 BE 80 00 00 BF 40 00 00 3F "
-                       "35 04 F3 00 00 00 00 00 00 00 00 3F 35 04 F3 C1 DB CF F6 43 19 07 5D 42 51 "
-                       "00 00 41 28 00 00 BE 00 00 00 3D 80 00 00 07 12 34 "
-                       "3B"),
+                       "00 00 00 3F 00 00 00 BE 80 00 00 BF 40 00 00 3F 35 04 F3 00 00 00 00 00 00 "
+                       "00 00 3F 35 04 F3 C1 DB CF F6 43 19 07 5D 42 51 00 00 41 28 00 00 BE 00 00 "
+                       "00 3D 80 00 00 07 12 34 3B"),
               {0x0836, 0x001});
   expect_attitude(m, 1e-7);
   // The tolerance is half a step of a float at 153.
@@ -68,11 +67,10 @@ void expect_same(const Utc& a, const Utc& b) {
 TEST(Mtdata, receiverFixStaysIntegerInEveryFormat) {
   const Mtdata m =
       decoded(from_hex("FA FF 32 77 C5 E7 02 12 06 42 FA EF 9F 69 8A 5B 36 56 22 00 00 CC 1A 00 00 "
-                       "04 1A FF FF FF F4 00 00 00 06 00 00 09 C4 00 00 "
-                       "0E D8 00 00 00 2D 03 B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 "
-                       "B5 04 F3 00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 "
-                       "99 40 00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 "
-                       "07 12 34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 96"),
+                       "04 1A FF FF FF F4 00 00 00 06 00 00 09 C4 00 00 0E D8 00 00 00 2D 03 B5 04 "
+                       "F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 B5 04 F3 00 00 00 86 01 47 "
+                       "28 FF E4 07 5D 24 9E 00 99 40 00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 "
+                       "FF FF 10 00 00 00 00 00 07 12 34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 96"),
               {0x1834, 0x203});
   ASSERT_TRUE(m.fix);
   const LegacyFix& f = *m.fix;

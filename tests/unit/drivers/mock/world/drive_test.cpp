@@ -16,10 +16,7 @@ const World& bare_world() {
   return world;
 }
 
-Drive make(DriveKind kind) {
-  DriveOptions options{.kind = kind};
-  return Drive(options, bare_world());
-}
+Drive make(DriveKind kind) { return Drive({.kind = kind}, bare_world()); }
 
 TEST(Drive, derivativesMatchCentralDifferences) {
   // Central differences over ±h miss a derivative by h²/6 of the one two orders higher: a 12 Hz
@@ -62,8 +59,7 @@ TEST(Drive, speedAndAccelerationStayWithinLimits) {
 }
 
 TEST(Drive, vehicleFollowsGroundAndHeading) {
-  DriveOptions options{.suspension = 0, .vibration = 0};
-  const Drive drive(options, bare_world());
+  const Drive drive({.suspension = 0, .vibration = 0}, bare_world());
   for (Duration t = Duration::seconds(5); t < drive.duration();
        t = t + Duration::milliseconds(310)) {
     const BodyState s = drive.at(t);

@@ -38,12 +38,5 @@ TEST(BoardInvalidInput, pingFloodDropsOnlyItsAnswers) {
   EXPECT_EQ(b.board.outbox.dropped, 1000U - (outbox_capacity - 1));
 }
 
-TEST(BoardInvalidInput, lostEdgesAreCountedInTheStatus) {
-  VirtualBoard b;
-  board_edges_lost(&b.board, 17);
-  b.run_for_us(1'100'000);
-  EXPECT_EQ(b.status().edges_dropped, 17U);
-}
-
 }  // namespace
 }  // namespace vergence

@@ -38,12 +38,6 @@ TEST(BoardSchedule, variedIntervalsFollowTheSharedBits) {
   }
 }
 
-TEST(BoardSchedule, variationIsRoundedToOneCount) {
-  PulseSchedule s{};
-  schedule_set(&s, 1'500'000, 1000, 1);
-  EXPECT_EQ(s.vary, 2U);
-}
-
 TEST(BoardPulses, keepGridWidthAndLines) {
   VirtualBoard b;
   TriggerConfig c = VirtualBoard::config(29'970);
@@ -171,22 +165,6 @@ TEST_F(WithFeedback, eventFollowsAllExposuresAndCarriesThem) {
     EXPECT_EQ(e.exposure[1].start_us, 14);
     EXPECT_EQ(e.exposure[1].end_us, 4000);
     EXPECT_EQ(e.exposure[2].start_us, TRIGGER_NOT_SEEN);
-  }
-}
-
-TEST_F(WithFeedback, missedTriggerGivesEventWithoutExposure) {
-  b.on_pulse = [this](const BoardPulse& p) {
-    if (p.number != 3) exposure(0, p.count, 10, 5000);
-    exposure(1, p.count, 10, 5000);
-  };
-  begin();
-  b.run_for_us(100'000);
-  const auto events = b.events();
-  ASSERT_GT(events.size(), 6U);
-  for (const TriggerEvent& e : events) {
-    EXPECT_EQ(e.exposure[0].start_us, e.pulse == 3 ? TRIGGER_NOT_SEEN : 10);
-    EXPECT_EQ(e.exposure[0].end_us, e.pulse == 3 ? TRIGGER_NOT_SEEN : 5000);
-    EXPECT_EQ(e.exposure[1].end_us, 5000);
   }
 }
 

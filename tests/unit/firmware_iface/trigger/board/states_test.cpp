@@ -121,15 +121,6 @@ TEST(BoardConfig, edgesOfAbsentInputsAreRefused) {
   EXPECT_EQ(b.error(), trigger_error_line);
 }
 
-TEST(BoardConfig, statusCarriesItsCrc) {
-  VirtualBoard b;
-  const TriggerConfig c = VirtualBoard::config(12'345);
-  Bytes payload(trigger_config_payload_size);
-  trigger_put_config(&c, payload.data());
-  b.configure(c);
-  EXPECT_EQ(b.status().configuration, trigger_crc32(payload.data(), payload.size()));
-}
-
 TEST(BoardStates, statusIsSentEverySecond) {
   VirtualBoard b;
   b.run_for_us(10'500'000);
