@@ -22,6 +22,8 @@ constexpr double kMinDamping = 1e-12;
 constexpr double kMinGaugeDamping = 1e-9;
 // Maximum damping, at which steps are shorter than any tolerance.
 constexpr double kLargestDamping = 1e10;
+// Relative update below which rounding dominates.
+constexpr double kSmallUpdate = 1e-10;
 // Minimum relative pivot of the damped system; below it the system counts as singular.
 constexpr double kPivotTolerance = 1e-14;
 // Minimum relative pivot of the undamped system.
@@ -122,38 +124,46 @@ class Solve {
       }
       watch_rank();
       detail::solve_factored(w_.A.data(), system_.rows(), system_.ld(), w_.delta.data());
-      double decrement = system_.point_decrement();
-      for (std::size_t i = 0; i < system_.rows(); ++i) decrement += w_.delta[i] * w_.rhs[i];
       system_.move(best(), w_.delta.data(), &other());
-      const double tolerance = options_.update_tolerance;
-      const bool small = std::sqrt(system_.update_squared()) <=
-                         tolerance * (std::sqrt(system_.norm_squared()) + tolerance);
-      const bool expected_last = 0.5 * decrement <= options_.cost_tolerance * cost_ || small ||
-                                 result_.steps == options_.max_steps;
+      const bool converged = small_step();
+      const bool last = converged || result_.steps == options_.max_steps;
       const double next_damping = std::max(damping_ * 0.1, min_damping_);
-      const bool valid = std::isfinite(system_.update_squared()) &&
-                         (expected_last ? system_.evaluate(other(), false)
-                                        : system_.linearise(other(), next_damping));
+      const bool valid =
+          std::isfinite(system_.update_squared()) &&
+          (last ? system_.evaluate(other(), false) : system_.linearise(other(), next_damping));
       if (valid && system_.cost() <= cost_) {
-        const double change = cost_ - system_.cost();
         best_ = 1 - best_;
         cost_ = system_.cost();
         squared_px_ = system_.squared_px();
         damping_ = next_damping;
         ++result_.accepted;
-        if (small) return end(BundleTermination::small_update);
-        if (change <= options_.cost_tolerance * cost_)
-          return end(BundleTermination::small_cost_change);
-        if (expected_last && result_.steps < options_.max_steps &&
-            !system_.linearise(best(), damping_))
-          return end(BundleTermination::diverged);
+        if (converged) return end(BundleTermination::converged);
         continue;
       }
-      if (small) return end(BundleTermination::small_update);
-      if (0.5 * decrement <= options_.cost_tolerance * cost_)
-        return end(BundleTermination::small_cost_change);
+      if (converged) return end(BundleTermination::converged);
       if (!retreat()) return end(BundleTermination::diverged);
     }
+  }
+
+  /// True if the step moves the newest pose and the shared parameters by less than the tolerance.
+  /// Points may still move between the minima of a robust loss, which takes many steps and changes
+  /// nothing else.
+  [[nodiscard]] bool small_step() const noexcept {
+    if (std::sqrt(system_.update_squared()) <=
+        kSmallUpdate * (std::sqrt(system_.norm_squared()) + kSmallUpdate))
+      return true;
+    // |Lᵀ δ|² over the last rows of the factor is δᵀ times these parameters' marginal information
+    // times δ.
+    const std::size_t rows = system_.rows(), ld = system_.ld();
+    const auto first = static_cast<std::size_t>(std::max(0, w_.free_poses - 1)) * detail::kBlock;
+    double squared = 0;
+    for (std::size_t c = first; c < rows; ++c) {
+      double sum = 0;
+      for (std::size_t r = c; r < rows; ++r) sum += w_.A[c * ld + r] * w_.delta[r];
+      squared += sum * sum;
+    }
+    const double variance = cost_ / static_cast<double>(problem_.observations.size());
+    return rows > 0 && squared <= options_.tolerance_sigmas * options_.tolerance_sigmas * variance;
   }
 
   /// Increases the damping about the best state. Returns false at its maximum.

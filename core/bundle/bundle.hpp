@@ -121,10 +121,9 @@ struct BundleOptions {
 
   /// Maximum number of solver steps, accepted or not, 1 … 1000.
   int max_steps = 30;
-  /// Stops if a step changes the cost by less than this share, ≥ 0.
-  double cost_tolerance = 1e-6;
-  /// Stops if |δ| ≤ tolerance · (|θ| + tolerance), ≥ 0.
-  double update_tolerance = 1e-10;
+  /// Stops if a step moves the free pose with the highest index and the shared parameters together
+  /// by less than this many standard deviations, ≥ 0.
+  double tolerance_sigmas = 1e-3;
   /// Initial λ in (0, 1e6], by which diagonals are multiplied as 1 + λ; λ is divided by 10 after a
   /// success and multiplied by 10 after a failure.
   double initial_damping = 1e-4;
@@ -140,10 +139,8 @@ struct BundleOptions {
 };
 
 enum class BundleTermination : std::uint8_t {
-  /// Converged: |δ| is below update_tolerance.
-  small_update,
-  /// Converged.
-  small_cost_change,
+  /// The last step was below the tolerance, or below rounding.
+  converged,
   /// Not converged; the result is the best so far.
   max_steps,
   /// No damping lowers the cost; the result is the best so far.
@@ -200,9 +197,9 @@ struct BundleResult {
   /// R, t ← Exp(φ) t + τ.
   Mat6 pose_covariance = Mat6::Zero();
 
-  /// True if the parameters are at a minimum within the tolerances.
+  /// True if the parameters are at a minimum within the tolerance.
   [[nodiscard]] bool converged() const noexcept {
-    return termination <= BundleTermination::small_cost_change;
+    return termination == BundleTermination::converged;
   }
   /// True if the caller's arrays contain a finite result no worse than the start.
   [[nodiscard]] bool usable() const noexcept { return termination <= BundleTermination::diverged; }

@@ -34,10 +34,9 @@ bool BundleOptions::valid() const noexcept {
                        [](const auto& one) { return vergence::valid(one); });
   };
   return positive(loss_threshold) && max_steps >= 1 && max_steps <= kMaxSteps &&
-         cost_tolerance >= 0 && update_tolerance >= 0 && initial_damping > 0 &&
-         initial_damping <= kMaxDamping && each_valid(length) && each_valid(intrinsics) &&
-         cells >= 0 && cells <= detail::kMaxCells && positive(shared_errors) &&
-         positive(shared_prior.weight);
+         tolerance_sigmas >= 0 && initial_damping > 0 && initial_damping <= kMaxDamping &&
+         each_valid(length) && each_valid(intrinsics) && cells >= 0 && cells <= detail::kMaxCells &&
+         positive(shared_errors) && positive(shared_prior.weight);
 }
 
 }  // namespace vergence

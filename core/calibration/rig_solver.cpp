@@ -23,6 +23,9 @@ constexpr double kLossThreshold = 2.5;
 // Maximum number of steps of the last adjustment; a focal length with an error of a quarter takes
 // more than a hundred.
 constexpr int kMaxSteps = 200;
+// Distances of the shared parameters from the optimum, in standard deviations: before outliers are
+// removed, and of the result, whose error it is not to increase.
+constexpr double kRough = 1, kPrecise = 0.05;
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -165,7 +168,7 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexc
   how.loss = BundleLoss::huber;
   how.loss_threshold = kLossThreshold;
   how.max_steps = 12;
-  how.cost_tolerance = 1e-3;
+  how.tolerance_sigmas = kRough;
   BundleResult r = adjust(how);
   s->steps = r.steps;
   for (const bool last : {false, true}) {
@@ -175,7 +178,7 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexc
     how.loss = BundleLoss::cauchy;
     how.loss_threshold = kLossThreshold * scale;
     how.max_steps = last ? kMaxSteps : 8;
-    how.cost_tolerance = last ? 3e-6 : 1e-4;
+    how.tolerance_sigmas = last ? kPrecise : kRough;
     how.covariance = how.pose_covariance = last;
     r = adjust(how);
     s->steps += r.steps;

@@ -181,7 +181,10 @@ WindowOutcome WindowAdjuster::solve(bool linked, const FrameWorkload& effort) no
   how.loss = BundleLoss::huber;
   how.loss_threshold = kHuber;
   how.max_steps = std::min<int>(options_.window_steps, effort.window_steps);
-  how.cost_tolerance = 1e-4;
+  // An error of that many sigmas adds 5 % to that of the pose.
+  how.tolerance_sigmas = 0.3;
+  // The window starts near its optimum, which needs a step less than with the default.
+  how.initial_damping = 1e-6;
   if (how.configuration == BundleConfiguration::stereo_calibration)
     how.shared_prior = {&prior_rig_, kInflation};
   const BundleResult result = adjuster_.solve(problem, how);

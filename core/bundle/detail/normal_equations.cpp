@@ -359,7 +359,6 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
   job.cost += 0.5 * sum;
   job.weighted += robust ? total(weighted) : sum;
   job.squared_px += total(squared);
-  job.decrement += total(hn::MulAdd(z[0], z[0], hn::MulAdd(z[1], z[1], hn::Mul(z[2], z[2]))));
   job.behind = job.behind || total(behind) > 0;
 }
 

@@ -88,7 +88,7 @@ void System::prepare(const BundleState& state) noexcept {
     if (job_.shared.exact[k]) c.basis = tangent_basis((T.R.transpose() * T.t).normalized());
   }
   job_.points = state.points.data();
-  job_.cost = job_.squared_px = job_.weighted = job_.decrement = 0;
+  job_.cost = job_.squared_px = job_.weighted = 0;
   job_.behind = false;
 }
 

@@ -31,7 +31,6 @@ class System {
   [[nodiscard]] double cost() const noexcept { return cost_; }
   [[nodiscard]] double squared_px() const noexcept { return job_.squared_px; }
   [[nodiscard]] double weighted() const noexcept { return job_.weighted; }
-  [[nodiscard]] double point_decrement() const noexcept { return job_.decrement; }
   /// |δ|² and |θ|² of the last move().
   [[nodiscard]] double update_squared() const noexcept { return update_; }
   [[nodiscard]] double norm_squared() const noexcept { return norm_; }

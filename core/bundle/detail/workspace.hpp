@@ -142,8 +142,6 @@ struct KernelJob {
   double squared_px = 0;
   /// Output: Σ w |ε|²/σ².
   double weighted = 0;
-  /// Output: Σ |z|².
-  double decrement = 0;
   /// Output of back_substitute(): Σ |δ|² and Σ |X|² of the points.
   double update = 0;
   double norm = 0;

@@ -15,7 +15,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 /// To the very minimum.
 BundleOptions to_the_minimum() {
   BundleOptions o = with_covariance();
-  o.cost_tolerance = 1e-12;
+  o.tolerance_sigmas = 1e-6;
   return o;
 }
 
