@@ -34,18 +34,13 @@ FocalMeasurement check_focal_length(const RigSolution& found,
   return m;
 }
 
-void FocalCheck::measure(RigSolver& solver, RigSolveRequest request,
+void FocalCheck::measure(RigSolver& solver, const RigSolveRequest& request,
                          const RigSolution& solved) noexcept {
   solved_ = {};
   solve_ms_ = 0;
   if (!enabled_ || known_ || solved.status != RigSolveStatus::ok || request.given == nullptr)
     return;
-  request.measure_focal_lengths = true;
-  request.rig.T_camera_left = solved.rig.T_camera_left;
-  request.rig.intrinsics = solved.rig.intrinsics;
-  request.from_rig = true;
-  request.known = nullptr;
-  const RigSolution found = solver.solve(request);
+  const RigSolution found = solver.free_focal_lengths(request);
   solved_ = check_focal_length(found, *request.given);
   solve_ms_ = found.solve_ms;
 }

@@ -7,9 +7,8 @@ namespace vergence::calibration {
 /// Compares the configured focal length with the one that the images show.
 ///
 /// An error of the focal length scales all distances, and neither epipolar lines nor a solve with
-/// fixed intrinsics show it. A solve that frees every focal length within kFocalPriorSigma
-/// (RigSolveRequest::measure_focal_lengths) does, by rotations and by the optical flow of straight
-/// motion with the known baseline.
+/// fixed intrinsics show it. A solve that frees every focal length within kFocalPriorSigma does, by
+/// rotations and by the optical flow of straight motion with the known baseline.
 ///
 /// `found`: such a solve. `given`: the initial calibration. Pure.
 [[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,
@@ -24,10 +23,9 @@ class FocalCheck {
   explicit FocalCheck(bool enabled) noexcept : enabled_(enabled) {}
 
   /// Measures the focal length, unless a solve of the maximum number of frames has agreed with the
-  /// configured value. Call after `solved`, the result of `request` on the solver's log, which is
-  /// the starting point. The posterior of earlier frames is not used, because it assumes the focal
-  /// length.
-  void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& solved) noexcept;
+  /// configured value. Call after `solved`, the result of `request`, the solver's last one.
+  void measure(RigSolver& solver, const RigSolveRequest& request,
+               const RigSolution& solved) noexcept;
   /// Accepts the measurement of a finished solve. `full`: it had the maximum number of frames.
   void accept(bool full) noexcept;
 

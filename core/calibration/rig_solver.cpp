@@ -162,8 +162,20 @@ void RigSolver::drop_outliers(double limit) noexcept {
   observations_.truncate(kept);
 }
 
-/// Solves with Huber's loss, then twice with Cauchy's after removing outliers; the last solve
-/// computes covariances.
+BundleResult RigSolver::readjust(BundleOptions how, bool last, RigSolution* s) noexcept {
+  const double scale = residual_scale();
+  drop_outliers(kOutlierSigmas * scale);
+  how.loss = BundleLoss::cauchy;
+  how.loss_threshold = kLossThreshold * scale;
+  how.max_steps = last ? kMaxSteps : 8;
+  how.tolerance_sigmas = last ? kPrecise : kRough;
+  how.covariance = how.pose_covariance = last;
+  const BundleResult r = adjust(how);
+  s->steps += r.steps;
+  return r;
+}
+
+/// Solves with Huber's loss, then twice with Cauchy's after removing outliers.
 BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexcept {
   how.loss = BundleLoss::huber;
   how.loss_threshold = kLossThreshold;
@@ -173,17 +185,21 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexc
   s->steps = r.steps;
   for (const bool last : {false, true}) {
     if (!r.usable()) return r;
-    const double scale = residual_scale();
-    drop_outliers(kOutlierSigmas * scale);
-    how.loss = BundleLoss::cauchy;
-    how.loss_threshold = kLossThreshold * scale;
-    how.max_steps = last ? kMaxSteps : 8;
-    how.tolerance_sigmas = last ? kPrecise : kRough;
-    how.covariance = how.pose_covariance = last;
-    r = adjust(how);
-    s->steps += r.steps;
+    r = readjust(how, last, s);
   }
   return r;
+}
+
+bool RigSolver::finish(const BundleResult& r, RigSolution* s) noexcept {
+  s->status = RigSolveStatus::not_converged;
+  if (!r.converged()) {
+    // Report the focal length reached so far.
+    if (r.usable()) s->rig.intrinsics[0] = cameras_[0].intrinsics();
+    return false;
+  }
+  s->status = r.has_covariance ? RigSolveStatus::ok : RigSolveStatus::not_observable;
+  if (s->status == RigSolveStatus::ok) write_result(r, s);
+  return s->status == RigSolveStatus::ok;
 }
 
 RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
@@ -204,22 +220,24 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   make_points();
   if (points_.size() < static_cast<std::size_t>(kMinTracks)) return s;
   hold_pieces();
-  s.status = RigSolveStatus::not_converged;
-  const BundleResult r = adjust_robustly(bundle_options(request), &s);
-  if (!r.converged()) {
-    // Report the focal length reached so far.
-    if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();
-    return s;
-  }
-  describe(&s);
-  s.status = r.has_covariance ? RigSolveStatus::ok : RigSolveStatus::not_observable;
-  if (s.status == RigSolveStatus::ok) {
-    write_result(r, &s);
+  const BundleResult r = adjust_robustly(bundle_options(request, false), &s);
+  if (r.converged()) describe(&s);
+  if (finish(r, &s)) {
     // Limit the sum, which grows over months.
     if (request.known != nullptr)
       s.rig.frames += std::min(request.known->frames, std::numeric_limits<int>::max() / 2);
     watch_frames(&s);
   }
+  s.solve_ms = milliseconds_since(start);
+  return s;
+}
+
+RigSolution RigSolver::free_focal_lengths(RigSolveRequest request) noexcept {
+  const auto start = std::chrono::steady_clock::now();
+  RigSolution s;
+  s.rig = request.rig;
+  request.known = nullptr;
+  (void)finish(readjust(bundle_options(request, true), true, &s), &s);
   s.solve_ms = milliseconds_since(start);
   return s;
 }

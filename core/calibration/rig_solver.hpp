@@ -22,7 +22,7 @@ enum class RigSolveStatus : std::uint8_t {
   not_observable,
 };
 
-/// Relative prior sigma of every focal length in a solve with `measure_focal_lengths`.
+/// Relative prior sigma of every focal length that RigSolver::free_focal_lengths() estimates.
 inline constexpr double kFocalPriorSigma = 0.1;
 
 /// Start, prior and free parameters of a solve. `known` and `given` are read during solve() only.
@@ -30,9 +30,6 @@ inline constexpr double kFocalPriorSigma = 0.1;
 struct RigSolveRequest {
   /// Cameras, intrinsics and baseline; with from_rig also T_camera_left.
   RigCalibration rig{};
-  /// True: also estimate every focal length, including the left camera's, with the prior sigma
-  /// kFocalPriorSigma.
-  bool measure_focal_lengths = false;
   /// True: start from T_camera_left of `rig`. False: start from that of the logged frame that fits
   /// best.
   bool from_rig = false;
@@ -92,6 +89,9 @@ class RigSolver {
   [[nodiscard]] RigSolution solve(const RigCalibration& rig) noexcept {
     return solve(RigSolveRequest{rig});
   }
+  /// Continues the last solve(), which was of `request` and successful, with every focal length
+  /// free, including the left camera's, and without `request.known`, which assumes them.
+  [[nodiscard]] RigSolution free_focal_lengths(RigSolveRequest request) noexcept;
 
  private:
   struct Reference {
@@ -111,8 +111,14 @@ class RigSolver {
   void make_points() noexcept;
   void hold_pieces() noexcept;
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
-  [[nodiscard]] BundleOptions bundle_options(const RigSolveRequest& request) const noexcept;
+  [[nodiscard]] BundleOptions bundle_options(const RigSolveRequest& request,
+                                             bool focal_lengths) const noexcept;
   [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, RigSolution* s) noexcept;
+  /// Removes the outliers of the last adjustment and adjusts again with Cauchy's loss. `last`: to
+  /// the end, with covariances.
+  [[nodiscard]] BundleResult readjust(BundleOptions how, bool last, RigSolution* s) noexcept;
+  /// Sets status, rig and sigmas. Returns true if they can be used.
+  bool finish(const BundleResult& r, RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] double residual_scale() noexcept;
   void drop_outliers(double limit) noexcept;

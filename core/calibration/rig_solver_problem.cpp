@@ -130,11 +130,11 @@ void RigSolver::hold_pieces() noexcept {
   }
 }
 
-BundleOptions RigSolver::bundle_options(const RigSolveRequest& request) const noexcept {
+BundleOptions RigSolver::bundle_options(const RigSolveRequest& request,
+                                        bool focal_lengths) const noexcept {
   // Bits of fx fy; of fx fy cx cy; and of k1 k2 p1 p2 or k1 … k4.
   constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111, kFourCoefficients = 0b1111'0000;
   const RigCalibration& rig = request.rig;
-  const bool focal_lengths = request.measure_focal_lengths;
   const bool lenses = options_.intrinsics == IntrinsicsEstimation::full;
   BundleOptions how;
   how.configuration = BundleConfiguration::stereo_calibration;

@@ -126,7 +126,7 @@ TEST(RecordedCalibration, focalLengthOffByAFifthIsNeverOk) {
     for (const StartingCalibration& begin : {wrong, blank(wrong)}) {
       const DriveOutcome o = drive_recorded(*d, d->sequence, configuration(), begin);
       EXPECT_EQ(o.ok, 0) << factor;
-      EXPECT_TRUE(o.focal.contradicted) << factor;
+      EXPECT_TRUE(o.focal.doubted) << factor;
     }
   }
 }

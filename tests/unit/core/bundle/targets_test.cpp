@@ -13,7 +13,7 @@ TEST(BundleTargets, everySimdTargetFindsTheSameOptimum) {
   Simulated s(22, {.points = 61});
   SimulatedRig reference = s.rig;
   BundleOptions o = calibration_options();
-  o.tolerance_sigmas = 1e-7;
+  o.tolerance_sigmas = 1e-6;
   const BundleResult expected = s.own.adjuster.solve(reference.problem(), o);
   test::on_every_target([&](const char* target) {
     SimulatedRig rig = s.rig;
@@ -21,10 +21,10 @@ TEST(BundleTargets, everySimdTargetFindsTheSameOptimum) {
     EXPECT_EQ(r.steps, expected.steps) << target;
     // Sums of 2440 squares in another order: about √2440 roundings of 1e-16.
     EXPECT_NEAR(r.final_cost, expected.final_cost, 1e-12 * expected.final_cost) << target;
-    EXPECT_LT((rig.T_camera_left[1].t - reference.T_camera_left[1].t).norm(), 1e-9) << target;
-    // Points are tens of metres away, their depth three digits weaker than a direction.
+    // The last step is less than 1e-6 standard deviations, which are of some millimetres.
+    EXPECT_LT((rig.T_camera_left[1].t - reference.T_camera_left[1].t).norm(), 1e-8) << target;
     for (std::size_t i = 0; i < rig.T_left_world.size(); ++i)
-      EXPECT_LT((rig.T_left_world[i].centre() - reference.T_left_world[i].centre()).norm(), 1e-9)
+      EXPECT_LT((rig.T_left_world[i].centre() - reference.T_left_world[i].centre()).norm(), 1e-8)
           << target << ", rig " << i;
   });
 }

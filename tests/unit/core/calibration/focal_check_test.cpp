@@ -26,13 +26,9 @@ RigSolution measure(const FeatureDriveOptions& drive_options, const RigCalibrati
   SolverInArena s({.max_frames = 60});
   FeatureDrive drive(drive_options);
   log_drive(drive, 60, {2e-3, 0.02, 5e-3, 0.02}, s.solver.log());
-  RigSolveRequest request{.rig = given, .given = &given};
-  const RigSolution lenses = s.solver.solve(request);
-  EXPECT_EQ(lenses.status, RigSolveStatus::ok);
-  request.measure_focal_lengths = true;
-  request.rig.T_camera_left = lenses.rig.T_camera_left;
-  request.from_rig = true;
-  return s.solver.solve(request);
+  const RigSolveRequest request{.rig = given, .given = &given};
+  EXPECT_EQ(s.solver.solve(request).status, RigSolveStatus::ok);
+  return s.solver.free_focal_lengths(request);
 }
 
 TEST(FocalCheck, trueFocalLengthIsNotContradicted) {
