@@ -146,8 +146,9 @@ void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
     degradations.clear(Degradation::window);
   else if (out.gap_s > 0 || out.map_rebuilt)
     degradations.enter(Degradation::window, Reason::time_gap, last_number, kWindowFrames + 1);
-  else if (degradations.active(Degradation::rig))
-    degradations.enter(Degradation::window, Reason::recalibrating, last_number,
+  else if ((out.keyframe || degradations.active(Degradation::window)) &&
+           degradations.any_up_to(Degradation::rig))
+    degradations.enter(Degradation::window, degradations.strongest(true)->reason, last_number,
                        std::min(degradations[Degradation::window].left + 2, kWindowFrames + 1));
 }
 
