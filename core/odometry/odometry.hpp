@@ -152,7 +152,10 @@ class Odometry {
                               FrameOutcome* out) noexcept;
   /// True if camera k should see a point of its own frame.
   [[nodiscard]] bool in_view(int k, const Vec3& p_camera) const noexcept;
-  [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
+  /// Number of points that the left camera should see, without those of `revived`, which were not
+  /// found before.
+  [[nodiscard]] int points_in_view(const Transform& T_left_world,
+                                   const std::bitset<kMaxPoints>& revived) const noexcept;
   /// Estimates the pose from all map points, without a prediction. Dormant points are followed
   /// again and marked in *revived.
   [[nodiscard]] PoseFit relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived) noexcept;

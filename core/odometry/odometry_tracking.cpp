@@ -1,5 +1,6 @@
 #include "core/odometry/odometry.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <limits>
 
@@ -51,12 +52,14 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
-  bool unreliable = frames_lost_ > 0 || out->gap_s > 0;
+  // Share of the points in view that must be found. Facades look alike; directly after a posed
+  // frame the right place is in view, too, and has more points than its likeness.
+  double share = frames_lost_ > 0 || out->gap_s > 0 ? kMajority : 0;
   std::bitset<kMaxPoints> revived;
   if (!sample_agrees(fit, kChanceShare)) {
     fit = relocalise(out, &revived);
     if (!fit.found) return fit;
-    unreliable = true;
+    share = std::max(share, kMinSeenAgain);
   }
   const Transform coarse = fit.T_left_world;
   if (link_ == Link::unlinked) recover_cameras(fit);
@@ -64,8 +67,8 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   clock.mark(Stage::track);
   fit = this->fit(coarse, false);
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
-  // Facades look alike: a place is recognised only if most points in view are found.
-  if (unreliable && fit.inliers < kMajority * points_in_view(fit.T_left_world)) fit.found = false;
+  if (share > 0 && fit.inliers < share * points_in_view(fit.T_left_world, revived))
+    fit.found = false;
   // If they stayed active, they would count as missing in the next attempt.
   for (std::size_t i = 0; !fit.found && i < map_.points().size(); ++i)
     if (revived[i]) map_.points()[i].stage = PointStage::dormant;
@@ -90,10 +93,13 @@ bool Odometry::in_view(int k, const Vec3& p_camera) const noexcept {
          camera.inside(pixel, kImageMargin) && !front_end_.hides(k, pixel);
 }
 
-int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
+int Odometry::points_in_view(const Transform& T_left_world,
+                             const std::bitset<kMaxPoints>& revived) const noexcept {
   int n = 0;
-  for (const MapPoint& p : map_.points())
-    if (p.stage == PointStage::active && in_view(0, T_left_world * p.p_world)) ++n;
+  for (std::size_t i = 0; i < map_.points().size(); ++i) {
+    const MapPoint& p = map_.points()[i];
+    if (p.stage == PointStage::active && !revived[i] && in_view(0, T_left_world * p.p_world)) ++n;
+  }
   return n;
 }
 
@@ -103,10 +109,10 @@ PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived
   const int candidates = front_end_.relocalise(map_, 0);
   clock.mark(Stage::match);
   PoseFit fit;
-  if (candidates < kCameraAlone) return fit;
+  if (candidates < kMinAgreeing) return fit;
   fit = this->fit(motion_.T_left_world(), true);
   clock.mark(Stage::pose);
-  fit.found = fit.inliers >= kCameraAlone;
+  fit.found = sample_agrees(fit, kChanceShare);
   if (!fit.found) return fit;
   out->relocalised = true;
   // Points that are not found are dropped as usual.
