@@ -1,6 +1,7 @@
 #include <fstream>
 
 #include "drivers/iidc/iidc.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 
 namespace vergence::test {
 

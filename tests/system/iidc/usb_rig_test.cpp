@@ -1,4 +1,5 @@
 #include "drivers/iidc/iidc.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 
 namespace vergence::test {
 

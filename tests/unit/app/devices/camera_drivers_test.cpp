@@ -32,13 +32,11 @@ std::string refusal(const Configuration& c) {
 }
 
 test::GigeCameraOptions small(int k) {
-  test::GigeCameraOptions o;
-  o.address = test::GigeCamera::address(100 + k);
-  o.serial = "TABLE-" + std::to_string(k);
-  o.sensor_width = 320;
-  o.sensor_height = 240;
-  o.discoverable = false;
-  return o;
+  return {.address = test::GigeCamera::address(100 + k),
+          .serial = "TABLE-" + std::to_string(k),
+          .sensor_width = 320,
+          .sensor_height = 240,
+          .discoverable = false};
 }
 
 TEST(CameraDrivers, impossibleSizeIsRefusedWithTheCamerasName) {

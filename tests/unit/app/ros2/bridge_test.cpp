@@ -82,15 +82,8 @@ struct Odometry {
 
 Odometry odometry(const std::vector<std::uint8_t>& message) {
   Reader in(message);
-  Odometry o;
-  o.frame = in.text();
-  o.child = in.text();
-  o.pose = in.pose();
-  o.pose_covariance = in.covariance();
-  o.linear = in.vector();
-  o.angular = in.vector();
-  o.twist_covariance = in.covariance();
-  return o;
+  return {in.text(),   in.text(),   in.pose(),      in.covariance(),
+          in.vector(), in.vector(), in.covariance()};
 }
 
 /// Upper triangle, row by row.

@@ -34,13 +34,12 @@ struct Bench {
     EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
     TriggerConfiguration pulses{.rate_hz = 20, .vary = b.vary};
     EXPECT_EQ(rig->trigger().configure(pulses, nullptr), DeviceStatus::ok);
-    Acquisition::Options options;
-    options.sync.interval = Duration::milliseconds(50);
-    options.sync.mode = b.mode;
-    options.wait_when_full = true;
-    options.tie_stamp = kStart;
-    options.tie_host = rig->start();
-    options.stamp_grid = b.grid;
+    const Acquisition::Options options{
+        .sync = {.interval = Duration::milliseconds(50), .mode = b.mode},
+        .wait_when_full = true,
+        .tie_stamp = kStart,
+        .tie_host = rig->start(),
+        .stamp_grid = b.grid};
     for (int k = 0; k < 2; ++k) watched.push_back(std::make_unique<WatchedCamera>(&rig->camera(k)));
     source = std::make_unique<Acquisition>(
         std::vector<CameraDevice*>{watched[0].get(), watched[1].get()}, &rig->ins(),
@@ -155,9 +154,8 @@ class EmptyBoard final : public TriggerDevice {
 TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
   EmptyCamera left, right;
   EmptyBoard board;
-  Acquisition::Options options;
-  options.sync.interval = Duration::milliseconds(50);
-  options.sync.mode = SyncMode::approximate_time;
+  const Acquisition::Options options{
+      .sync = {.interval = Duration::milliseconds(50), .mode = SyncMode::approximate_time}};
   Acquisition source({&left, &right}, nullptr, &board, options);
   ASSERT_FALSE(source.start());
   // Number of starts.
