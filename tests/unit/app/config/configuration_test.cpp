@@ -64,8 +64,7 @@ TEST(Configuration, wrongYamlIsExplainedWithLine) {
     const std::string message = refusal(text);
     EXPECT_TRUE(contains(message, part)) << text << ": " << message;
   }
-  EXPECT_TRUE(contains(refusal("", {"cameras.0.size=[3"}), "size=[3: is not YAML: a `{` or `[`"))
-      << refusal("", {"cameras.0.size=[3"});
+  EXPECT_TRUE(mentions(refusal("", {"cameras.0.size=[3"}), "size=[3: is not YAML: a `{` or `[`"));
 }
 
 TEST(Configuration, listItemsAreNamedByNumber) {
@@ -187,8 +186,7 @@ TEST(Configuration, strayBracketOrCommaIsRefused) {
     EXPECT_TRUE(contains(message, "is not YAML") || contains(message, "several YAML documents"))
         << text << ": " << message;
   }
-  EXPECT_TRUE(contains(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"))
-      << refusal("\n,a: 1}");
+  EXPECT_TRUE(mentions(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"));
 }
 
 TEST(CameraOptionKeys, typesFollowTheDriversTable) {
@@ -207,9 +205,8 @@ cameras:
   EXPECT_EQ(iidc.packet_bytes, std::optional<std::size_t>(1024));
   EXPECT_FALSE(iidc.embedded);
   EXPECT_EQ(std::get<v4l2::Options>(c.cameras[2].options).thin, 4);
-  EXPECT_NE(canonical_text(c).find("cameras.1.options=embedded=off packet_bytes=1024\n"),
-            std::string::npos)
-      << canonical_text(c);
+  EXPECT_TRUE(
+      test::mentions(canonical_text(c), "cameras.1.options=embedded=off packet_bytes=1024\n"));
 }
 
 TEST(CameraOptionKeys, impossibleOptionsNamePlaceAndChoices) {

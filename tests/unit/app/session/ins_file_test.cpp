@@ -74,16 +74,11 @@ TEST(InsFile, refusalNamesPlaceOfMalformedLine) {
   const std::string good = line_of(reading(1));
   ASSERT_TRUE(refusal(kHead + good).empty());
   const auto with = [&](std::size_t column, const std::string& value) {
-    std::vector<std::string> fields(1);
-    for (const char c : good.substr(0, good.size() - 1))
-      if (c == ',')
-        fields.emplace_back();
-      else
-        fields.back() += c;
-    fields[column] = value;
-    std::string line;
-    for (const std::string& f : fields) line += (line.empty() ? "" : ",") + f;
-    return refusal(kHead + line_of(reading(0)) + line + "\n");
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < column; ++i) at = good.find(',', at) + 1;
+    std::string line = good;
+    line.replace(at, line.find_first_of(",\n", at) - at, value);
+    return refusal(kHead + line_of(reading(0)) + line);
   };
   EXPECT_TRUE(
       test::contains(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds"))

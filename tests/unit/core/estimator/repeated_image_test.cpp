@@ -1,10 +1,7 @@
 // A camera that gives the same image again and again while the rig drives on.
 #include <gtest/gtest.h>
 
-#include <optional>
-
-#include "core/estimator/estimator.hpp"
-#include "tests/unit/core/odometry/corridor.hpp"
+#include "tests/unit/core/estimator/corridor_drive.hpp"
 
 namespace vergence {
 namespace {
@@ -17,21 +14,19 @@ class RepeatedImage : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(RepeatedImage, repeatedImageIsNotTakenForStandstill) {
   constexpr int kFrozen = 30, kGoesOn = 47, kLast = 60;
-  Corridor corridor;
-  EstimatorOptions options{.online = false};
-  Arena arena;
-  SequentialRunner runner;
-  ImmediateRunner solver;
-  Estimator estimator(options, corridor.rig(), corridor.rig(), arena, runner, solver);
+  test::CorridorDrive d;
+  d.options.online = false;
+  d.given = d.nominal = d.corridor.rig();
+  d.begin();
   std::optional<Image> kept;
   int posed = 0;
   for (int i = 0; i < kLast; ++i) {
-    RigFrame frame = corridor.frame(i);
+    RigFrame frame = d.corridor.frame(i);
     ImageView& image = frame.images[GetParam()];
     if (i == kFrozen) kept = copy_of(image);
     const bool repeated = i > kFrozen && i < kGoesOn;
     if (repeated) image = kept->view();
-    const PoseSample s = estimator.process(frame);
+    const PoseSample s = d.give(frame);
     if (repeated) {
       EXPECT_NE(s.status, PoseStatus::ok) << i;
       EXPECT_EQ(s.reason, Reason::image_repeated) << i;

@@ -11,15 +11,12 @@ constexpr int kFrames = 20;
 /// A drive with `budget` a frame; `given`: as much work as these frames say instead.
 std::vector<FrameOutcome> drive(Duration budget, const std::vector<FrameOutcome>& given = {}) {
   test::Corridor corridor;
-  const OdometryOptions options;
-  Arena arena;
-  SequentialRunner runner;
-  Odometry odometry(options, corridor.rig(), true, arena, runner);
+  test::LinkedOdometry linked(corridor.rig());
   std::vector<FrameOutcome> all;
   for (int i = 0; i < kFrames; ++i) {
     RigFrame frame = corridor.frame(i);
     if (!given.empty()) frame.effort = given[static_cast<std::size_t>(i)].effort;
-    all.push_back(odometry.process(frame, budget));
+    all.push_back(linked.odometry.process(frame, budget));
   }
   return all;
 }

@@ -6,6 +6,7 @@
 
 #include "core/math/random.hpp"
 #include "drivers/sync/clock_mapper.hpp"
+#include "tests/support/quantile.hpp"
 
 /// Accuracy of the clocks over a link with delays of a constant floor and exponential jitter, and
 /// that the bounds they state hold.
@@ -50,10 +51,9 @@ struct Errors {
     return std::sqrt(sum / static_cast<double>(ns.size()));
   }
   [[nodiscard]] double p99() const {
-    std::vector<double> sorted;
-    for (const double e : ns) sorted.push_back(std::abs(e));
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[sorted.size() * 99 / 100];
+    std::vector<double> absolute;
+    for (const double e : ns) absolute.push_back(std::abs(e));
+    return test::quantile(absolute, 0.99);
   }
 };
 
