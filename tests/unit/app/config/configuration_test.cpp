@@ -64,7 +64,8 @@ TEST(Configuration, wrongYamlIsExplainedWithLine) {
     const std::string message = refusal(text);
     EXPECT_TRUE(contains(message, part)) << text << ": " << message;
   }
-  EXPECT_TRUE(mentions(refusal("", {"cameras.0.size=[3"}), "size=[3: is not YAML: a `{` or `[`"));
+  EXPECT_TRUE(
+      test::mentions(refusal("", {"cameras.0.size=[3"}), "size=[3: is not YAML: a `{` or `[`"));
 }
 
 TEST(Configuration, listItemsAreNamedByNumber) {
@@ -186,7 +187,7 @@ TEST(Configuration, strayBracketOrCommaIsRefused) {
     EXPECT_TRUE(contains(message, "is not YAML") || contains(message, "several YAML documents"))
         << text << ": " << message;
   }
-  EXPECT_TRUE(mentions(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"));
+  EXPECT_TRUE(test::mentions(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"));
 }
 
 TEST(CameraOptionKeys, typesFollowTheDriversTable) {
