@@ -2,6 +2,8 @@
 
 #include <map>
 
+#include <fmt/ranges.h>
+
 #include "app/checkerboard/view_collector.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/app/checkerboard/board_picture.hpp"
@@ -23,9 +25,7 @@ Coverage nothing_yet(const RigCalibration& rig) {
 }
 
 std::string all(const std::vector<std::string>& needs) {
-  std::string text;
-  for (const std::string& need : needs) text += need + "\n";
-  return text;
+  return fmt::format("{}\n", fmt::join(needs, "\n"));
 }
 
 /// Face to face at a place in the left image, in shares of it.

@@ -220,9 +220,7 @@ TEST(StLuciaIns, infersAxesFromMotion) {
           ASSERT_EQ(ins.readings.size(), 800U);
           const InsSample& s = ins.readings[333].sample;
           const double t = 333 / Way::kRate;
-          const Mat3 R =
-              Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2])
-                  .toRotationMatrix();
+          const Mat3 R = Eigen::Quaterniond(s.q_enu_ins.data()).toRotationMatrix();
           EXPECT_LT(log_so3(R.transpose() * Way::R(t)).norm(), 1e-8);
           EXPECT_LT(
               (Vec3(s.velocity_enu[0], s.velocity_enu[1], s.velocity_enu[2]) - Way::velocity(t))

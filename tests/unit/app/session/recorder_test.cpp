@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <future>
 #include <thread>
@@ -12,6 +13,9 @@
 
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/session/session_quota.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/support/within.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {
@@ -139,13 +143,9 @@ TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   recorder.on_report(pose(0, PoseStatus::ok, 0));
-  bool found = false;
-  // The loop waits two seconds at most; one is promised.
-  for (int i = 0; i < 200 && !found; ++i) {
-    found = test::read_lines(folder / "trajectory.tum").size() == 1;
-    if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  EXPECT_TRUE(found);
+  // One second is promised.
+  EXPECT_TRUE(
+      test::within(2, [&] { return test::read_lines(folder / "trajectory.tum").size() == 1; }));
 }
 
 /// Sentences of the events of one kind.
@@ -216,6 +216,34 @@ TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
   EXPECT_TRUE(file.close());
   EXPECT_EQ(file.lost_lines(), 0U);
   EXPECT_EQ(test::read_file(folder / "a.txt"), all);
+}
+
+namespace fs = std::filesystem;
+
+TEST(SessionQuota, removesOldestEndedSessions) {
+  const test::TemporaryFolder folder;
+  const auto make = [&](const std::string& name, bool ended, int age_h) {
+    fs::create_directories(folder / name);
+    folder.write(name + "/poses.csv", std::string(600, 'x'));
+    if (!ended) return;
+    folder.write(name + "/summary.json", std::string(400, 'x'));
+    fs::last_write_time(folder / name / "summary.json",
+                        fs::file_time_type::clock::now() - std::chrono::hours(age_h));
+  };
+  make("oldest", true, 3);
+  make("older", true, 2);
+  make("new", true, 1);
+  make("cut_off", false, 0);
+  make("now", true, 9);
+  fs::create_directories(folder / "photos");
+  folder.write("photos/summary.json", std::string(5000, 'x'));
+  EXPECT_TRUE(keep_session_quota(folder / "now", 3000).empty()) << "three sessions of 1000 bytes";
+  EXPECT_EQ(keep_session_quota(folder / "now/", 1500).size(), 2U);
+  for (const char* removed : {"oldest", "older"})
+    EXPECT_FALSE(fs::exists(folder / removed)) << removed;
+  for (const char* stays : {"new", "cut_off", "now", "photos"})
+    EXPECT_TRUE(fs::exists(folder / stays)) << stays;
+  EXPECT_TRUE(keep_session_quota(folder / "nowhere" / "now", 0).empty());
 }
 
 }  // namespace

@@ -73,9 +73,7 @@ Drove drove(const How& how) {
     const InsSample s = ins.sample(number++, Duration::seconds(t));
     const Mat3 R_enu_local = plane.rotation_from(s.position);
     MountReference r{.stamp = kStart + Duration::seconds(t + how.late_s)};
-    r.T_enu_ref.R = R_enu_local * Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1],
-                                                     s.q_enu_ins[2])
-                                      .toRotationMatrix();
+    r.T_enu_ref.R = R_enu_local * Eigen::Quaterniond(s.q_enu_ins.data()).toRotationMatrix();
     r.T_enu_ref.t = plane.to_enu(s.position);
     r.v_enu_ref = R_enu_local * Vec3(s.velocity_enu[0], s.velocity_enu[1], s.velocity_enu[2]);
     r.has_velocity = how.velocity;

@@ -74,8 +74,7 @@ using namespace features::test;
 /// The front end of a pair whose pyramids have one level: images are compared as they are.
 struct Pair {
   OdometryOptions options{.pyramid_levels = 1};
-  RigCalibration rig = vergence::test::parallel_rig(
-      {.width = kWidth, .height = kHeight, .fx = 300, .fy = 300, .cx = 160, .cy = 120}, 0);
+  RigCalibration rig = blank_rig();
   SequentialRunner runner;
   Arena arena;
   FrontEnd front_end{options, rig, arena, runner};
