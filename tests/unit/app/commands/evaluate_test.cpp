@@ -25,7 +25,8 @@ Outcome evaluate_command(const std::vector<std::string>& words) {
 /// eight).
 void expect_same(const nlohmann::json& expected, const nlohmann::json& got,
                  const std::string& name) {
-  for (const auto& [place, value] : expected.flatten().items()) {
+  const nlohmann::json figures = expected.flatten();
+  for (const auto& [place, value] : figures.items()) {
     SCOPED_TRACE(name + place);
     const nlohmann::json::json_pointer at(place);
     ASSERT_TRUE(got.contains(at));
@@ -56,6 +57,8 @@ TEST(EvaluateCommand, matchesReferenceToSixDigits) {
       ASSERT_EQ(o.code, 0) << o.err;
       auto expected = answer;
       expected["segments"] = nlohmann::json::array({segments});
+      // Compared below; where nothing was dropped, it has no figures.
+      expected.erase("dropped");
       const auto got = nlohmann::json::parse(o.out);
       expect_same(expected, got, name);
       EXPECT_EQ(got["dropped"], answer["dropped"]);

@@ -13,9 +13,7 @@ namespace {
 
 constexpr int kWidth = 80, kHeight = 60;
 
-RigCalibration small_rig() {
-  return test::parallel_rig(test::pinhole(kWidth, kHeight, 50), 0.5);
-}
+RigCalibration small_rig() { return test::parallel_rig(test::pinhole(kWidth, kHeight, 50), 0.5); }
 
 std::string pgm(const std::string& head, char value = 1) {
   return head + std::string(kWidth * kHeight, value);

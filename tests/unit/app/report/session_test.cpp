@@ -88,7 +88,8 @@ TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
                                "3,3000,dancing,splendid,,1,2,1e300,0,0,0,1,100,5\n"
                                "4,4000,stereo_odometry,ok,,nan,2,3,0,0,0,1,-1e99,inf\n"
                                "5,5000,stereo_odometry,ok,,1,2,3,0,0,0,0,100,5\n");
-  EXPECT_TRUE(test::mentions(missing(s), "3 damaged lines", "1 line skipped because the stamp does not increase"));
+  EXPECT_TRUE(test::mentions(missing(s), "3 damaged lines",
+                             "1 line skipped because the stamp does not increase"));
   ASSERT_EQ(s.frames.size(), 3U);
   EXPECT_FALSE(s.frames[1].posed);
   EXPECT_EQ(s.frames[1].inliers, -1);
