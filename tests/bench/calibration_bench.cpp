@@ -247,19 +247,7 @@ int for_drives(const std::vector<std::string>& set, const std::string& only,
                const std::function<void(const RecordedSequence&, const app::Configuration&)>& each,
                std::span<const char* const> drives = test::kRecordedSequences) {
   const app::Configuration c = app::load_configuration(std::nullopt, set);
-  int n = 0;
-  for (const char* name : drives) {
-    if (!only.empty() && only != name) continue;
-    if (const auto d = test::open_recorded(name)) {
-      each(*d, c);
-      ++n;
-    }
-  }
-  if (n > 0) return 0;
-  fmt::print(stderr,
-             "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that holds "
-             "data/\n");
-  return 2;
+  return test::for_recorded(drives, only, [&](RecordedSequence* d) { each(*d, c); }) ? 0 : 2;
 }
 
 int run_stretches(const std::vector<std::string>& set, const std::string& only) {
@@ -270,7 +258,7 @@ int run_stretches(const std::vector<std::string>& set, const std::string& only) 
             app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size()}, given);
         print_stretches(d.name, found.stretches);
       });
-  if (only.empty() || only == "mock") {
+  if (only == "all" || only == "mock") {
     rendered_stretches(app::load_configuration(std::nullopt, set));
     return 0;
   }
@@ -282,7 +270,7 @@ int run_stretches(const std::vector<std::string>& set, const std::string& only) 
 
 int main(int argc, char** argv) {
   using namespace vergence::bench;
-  std::string what, only;
+  std::string what, only = "all";
   std::vector<std::string> set;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];

@@ -193,13 +193,10 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
 int main(int argc, char** argv) {
   using namespace vergence;
   const std::string drive = argc > 1 ? argv[1] : "all";
-  for (const char* name : test::kRecordedSequences) {
-    if (drive != "all" && drive != name) continue;
-    if (const auto d = test::open_recorded(name))
-      bench::print(name, d->name == "euroc_mh01" ? bench::kEuroc : bench::kKitti, bench::drive(*d));
-    else
-      fmt::print("{}: VERGENCE_SHARED has no such data\n", name);
-  }
+  test::for_recorded(test::kRecordedSequences, drive, [](test::RecordedSequence* d) {
+    bench::print(d->name, d->name == "euroc_mh01" ? bench::kEuroc : bench::kKitti,
+                 bench::drive(*d));
+  });
   if (drive == "all" || drive == "rendered")
     bench::print("rendered", bench::kExact, bench::drive_rendered(300));
   return EXIT_SUCCESS;

@@ -171,16 +171,11 @@ int main(int argc, char** argv) {
   using namespace vergence;
   const std::string drive = argc > 1 ? argv[1] : "all", filter = argc > 2 ? argv[2] : "";
   bench::Tally tally;
-  for (const char* name : test::kRecordedDrives) {
-    if ((drive != "all" && drive != name) || name == std::string_view("sand_rover")) continue;
-    auto d = test::open_recorded(name);
-    if (!d) {
-      fmt::print("{}: VERGENCE_SHARED has no such data\n", name);
-      continue;
-    }
-    bench::leave_out_what_is_no_truth(&*d);
+  test::for_recorded(test::kRecordedDrives, drive, [&](test::RecordedSequence* d) {
+    if (d->name == "sand_rover") return;
+    bench::leave_out_what_is_no_truth(d);
     bench::run(*d, filter, argc > 3, &tally);
-  }
+  });
   fmt::print("{} runs, {} poses ok, {} of them wrong, in {} runs; {} without truth, {} cut short\n",
              tally.runs, tally.ok, tally.wrong, tally.wrong_runs, tally.not_evaluated,
              tally.cut_short);

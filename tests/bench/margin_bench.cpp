@@ -184,7 +184,7 @@ void print(const std::array<Summary, kDecisions>& all) {
 
 int main(int argc, char** argv) {
   using namespace vergence;
-  std::string only;
+  std::string only = "all";
   std::vector<std::string> set;
   for (int i = 1; i + 1 < argc; i += 2) {
     if (std::string_view(argv[i]) == "--set") set.emplace_back(argv[i + 1]);
@@ -193,15 +193,9 @@ int main(int argc, char** argv) {
   try {
     const app::Configuration c = app::load_configuration(std::nullopt, set);
     std::array<bench::Summary, bench::kDecisions> all;
-    bool any = false;
-    for (const char* name : test::kRecordedDrives) {
-      if (!only.empty() && only != name) continue;
-      const auto drive = test::open_recorded(name);
-      if (!drive) continue;
-      bench::run_drive(*drive, c, &all);
-      any = true;
-    }
-    if (any) {
+    if (test::for_recorded(test::kRecordedDrives, only, [&](test::RecordedSequence* drive) {
+          bench::run_drive(*drive, c, &all);
+        })) {
       bench::print(all);
       return EXIT_SUCCESS;
     }
@@ -209,8 +203,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "margin_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(stderr,
-             "margin_bench: no recorded drives; set VERGENCE_SHARED to the folder that holds "
-             "data/\n");
   return 2;
 }

@@ -274,13 +274,9 @@ int main(int argc, char** argv) {
           variant};
   b.off.online = 0;
   std::vector<RecordedSequence> drives;
-  for (const char* name : test::kRecordedDrives)
-    if (only == "all" || only == name)
-      if (auto d = test::open_recorded(name)) drives.push_back(std::move(*d));
-  if (drives.empty()) {
-    fmt::print("VERGENCE_SHARED has no such drive\n");
+  if (!test::for_recorded(test::kRecordedDrives, only,
+                          [&](RecordedSequence* d) { drives.push_back(std::move(*d)); }))
     return 2;
-  }
   bool started = true;
   const auto section = [&](const char* name, const char* heading, int columns, const auto& run) {
     if (what != "all" && what != name) return;

@@ -9,11 +9,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 
 #include "tests/support/mutated.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
@@ -29,8 +28,8 @@ std::vector<Bytes> read_corpus(const std::filesystem::path& folder) {
   std::sort(files.begin(), files.end());
   std::vector<Bytes> inputs;
   for (const auto& file : files) {
-    std::ifstream in(file, std::ios::binary);
-    inputs.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+    const std::string bytes = vergence::test::read_file(file);
+    inputs.emplace_back(bytes.begin(), bytes.end());
   }
   return inputs;
 }

@@ -11,8 +11,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence::app;
   static const vergence::test::ScratchFolder folder;
-  folder.write("t", {reinterpret_cast<const char*>(data), size});
-  const auto file = folder.path() / "t";
+  const auto file = folder.write("t", {reinterpret_cast<const char*>(data), size});
   vergence::test::probe([&] {
     const TrajectoryFile t = read_trajectory_file(file);
     if (t.poses.empty()) std::abort();

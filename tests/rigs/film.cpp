@@ -43,13 +43,10 @@ bool there_already(const std::filesystem::path& folder) {
 void render_film(const std::filesystem::path& folder) {
   if (there_already(folder)) return;
   std::filesystem::create_directories(folder);
-  RenderedDriveOptions options;
-  options.rig = nominal_rig();
-  options.drive.kind = mock::DriveKind::brief;
-  options.drive.speed = kSpeed;
-  options.from_s = kStart;
-  options.rate = kRateHz;
-  RenderedDrive drive(options);
+  RenderedDrive drive({.rig = nominal_rig(),
+                       .drive = {.kind = mock::DriveKind::brief, .speed = kSpeed},
+                       .from_s = kStart,
+                       .rate = kRateHz});
   std::ofstream poses(folder / "truth.txt");
   poses << std::setprecision(17);
   std::array<std::ofstream, 2> images;

@@ -32,12 +32,8 @@ std::uint64_t little_endian(const std::uint8_t* p, int bytes) {
 
 ImageStamp read_stamp(ImageView image) {
   const std::uint8_t* p = image.row(0) + 64;
-  ImageStamp s;
-  s.valid = std::memcmp(p, "VRGF", 4) == 0;
-  s.number = static_cast<std::uint32_t>(little_endian(p + 4, 4));
-  s.middle_ns = static_cast<std::int64_t>(little_endian(p + 8, 8));
-  s.guid = little_endian(p + 16, 8);
-  return s;
+  return {std::memcmp(p, "VRGF", 4) == 0, static_cast<std::uint32_t>(little_endian(p + 4, 4)),
+          static_cast<std::int64_t>(little_endian(p + 8, 8)), little_endian(p + 16, 8)};
 }
 
 bool shows_pattern(ImageView image, std::uint32_t number) {

@@ -1,6 +1,5 @@
 #include "tests/support/recorded_sequence.hpp"
 
-#include <functional>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -44,6 +43,21 @@ std::optional<RecordedSequence> open_recorded(const std::string& name) {
   RecordedSequence d{name, app::open_sequence(app::find_format(*folder).value(), *folder), {}};
   if (app::find_truth(*folder)) d.truth = app::read_trajectory_file(*folder).poses;
   return d;
+}
+
+bool for_recorded(std::span<const char* const> drives, const std::string& only,
+                  const std::function<void(RecordedSequence*)>& each) {
+  bool any = false;
+  for (const char* name : drives) {
+    if (only != "all" && only != name) continue;
+    auto drive = open_recorded(name);
+    if (drive)
+      each(&*drive);
+    else
+      fmt::print(stderr, "{}: VERGENCE_SHARED has no such data\n", name);
+    any = any || drive;
+  }
+  return any;
 }
 
 StereoSequence with_right_turned(const RecordedSequence& drive, const Vec3& degrees,

@@ -1,7 +1,9 @@
 #pragma once
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,6 +30,10 @@ inline constexpr std::array kRecordedDrives = {"kitti06_51",     "kitti01_51",  
                                                "boofcv_backyard"};
 /// By the name of its folder below data/; empty: it is not there.
 [[nodiscard]] std::optional<RecordedSequence> open_recorded(const std::string& name);
+/// Opens the drives named `only`, or all of them if it is "all", one after the other. Returns
+/// whether there was any; those that are not there are named on the standard error output.
+bool for_recorded(std::span<const char* const> drives, const std::string& only,
+                  const std::function<void(RecordedSequence*)>& each);
 
 /// The right camera turned about its centre from a frame on, its images written into `folder`: by a
 /// homography, which is exact for a lens without distortion.

@@ -27,7 +27,7 @@ struct RenderedDriveOptions {
   // Frame rate in Hz.
   double rate = 30;
   /// The true T_camera_left of camera k in frame i; empty: the rig's.
-  std::function<Transform(int k, std::uint64_t frame)> placed;
+  std::function<Transform(int k, std::uint64_t frame)> placed{};
 };
 
 /// A drive through the mock's suburb, rendered frame by frame as it is asked for; two threads. The

@@ -16,8 +16,9 @@ namespace vergence::test {
 /// A folder of its own for one test, gone with all that is in it when the object goes.
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "vergence-test-XXXXXX").string();
+  explicit TemporaryFolder(
+      const std::filesystem::path& above = std::filesystem::temp_directory_path()) {
+    std::string name = (above / "vergence-test-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
       throw std::runtime_error("cannot make a temporary folder like " + name);
     path_ = name;

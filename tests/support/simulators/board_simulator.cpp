@@ -50,14 +50,9 @@ HostStamp BoardSimulator::host_at(std::uint64_t count) const noexcept {
 // ---- its life
 
 void BoardSimulator::start(HostStamp at) {
-  BoardDescription d{};
-  d.counts_hz = options_.counts_hz;
-  d.crystal_ppm = 100;
-  d.max_millihertz = kMaxMillihertz;
-  d.lines = options_.lines;
-  d.feedback_inputs = options_.feedback_inputs;
-  d.has_pps = options_.has_pps;
-  d.has_ins = options_.has_ins;
+  const auto& o = options_;
+  BoardDescription d{o.counts_hz,       100,       kMaxMillihertz, o.lines,
+                     o.feedback_inputs, o.has_pps, o.has_ins,      {}};
   std::copy(options_.serial.begin(), options_.serial.end(), d.serial);
   Random ids(options_.seed, 64);
   std::uint32_t id = 0;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/math/types.hpp"
+
 namespace vergence::test {
 namespace {
 
@@ -11,61 +13,26 @@ using namespace xbus;
 
 std::int32_t rounded(double v) noexcept { return static_cast<std::int32_t>(std::llround(v)); }
 
-using Matrix = std::array<std::array<double, 3>, 3>;
-
-/// v_local = M v_enu, row by row: written out so that the driver's way through quaternions is
-/// checked against another.
-Matrix local_from_enu(LocalFrame frame) noexcept {
-  switch (frame) {
-    case LocalFrame::ned:
-      return {{{0, 1, 0}, {1, 0, 0}, {0, 0, -1}}};
-    case LocalFrame::nwu:
-      return {{{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}}};
-    case LocalFrame::enu:
-      break;
-  }
-  return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+/// v_local = M v_enu: by rotation matrices, so that the driver's way through quaternions is checked
+/// against another.
+Mat3 local_from_enu(LocalFrame frame) noexcept {
+  Mat3 M = Mat3::Identity();
+  if (frame == LocalFrame::ned) M << 0, 1, 0, 1, 0, 0, 0, 0, -1;
+  if (frame == LocalFrame::nwu) M << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+  return M;
 }
 
-/// Rotation matrix sensor → local frame.
-Matrix attitude_in(LocalFrame frame, const InsSample& s) noexcept {
-  const double x = s.q_enu_ins[0], y = s.q_enu_ins[1], z = s.q_enu_ins[2], w = s.q_enu_ins[3];
-  const Matrix R{{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-                  {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-                  {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
-  const Matrix M = local_from_enu(frame);
-  Matrix out{};
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j)
-      for (std::size_t k = 0; k < 3; ++k) out[i][j] += M[i][k] * R[k][j];
-  return out;
+/// Rotation sensor → local frame, w x y z.
+std::array<double, 4> attitude_in(LocalFrame frame, const InsSample& s) noexcept {
+  const auto& p = s.q_enu_ins;
+  const Mat3 R = Eigen::Quaterniond(p[3], p[0], p[1], p[2]).toRotationMatrix();
+  const Eigen::Quaterniond q(local_from_enu(frame) * R);
+  return {q.w(), q.x(), q.y(), q.z()};
 }
 
 Three in_frame(LocalFrame frame, const std::array<double, 3>& v) noexcept {
-  const Matrix M = local_from_enu(frame);
-  Three out{};
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t k = 0; k < 3; ++k) out[i] += M[i][k] * v[k];
-  return out;
-}
-
-/// w x y z of a rotation matrix, by its largest component.
-std::array<double, 4> quaternion_of(const Matrix& R) noexcept {
-  const double t = R[0][0] + R[1][1] + R[2][2];
-  if (t > 0) {
-    const double s = 2 * std::sqrt(t + 1);
-    return {s / 4, (R[2][1] - R[1][2]) / s, (R[0][2] - R[2][0]) / s, (R[1][0] - R[0][1]) / s};
-  }
-  std::size_t i = R[1][1] > R[0][0] ? 1 : 0;
-  if (R[2][2] > R[i][i]) i = 2;
-  const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
-  const double s = 2 * std::sqrt(1 + R[i][i] - R[j][j] - R[k][k]);
-  std::array<double, 4> q{};
-  q[0] = (R[k][j] - R[j][k]) / s;
-  q[i + 1] = s / 4;
-  q[j + 1] = (R[j][i] + R[i][j]) / s;
-  q[k + 1] = (R[k][i] + R[i][k]) / s;
-  return q;
+  const Vec3 local = local_from_enu(frame) * Vec3(v[0], v[1], v[2]);
+  return {local.x(), local.y(), local.z()};
 }
 
 std::uint32_t status_of(const InsSample& s) noexcept {
@@ -110,8 +77,7 @@ XsensMessages::Message XsensMessages::legacy(const Sample& now) {
   Mtdata d;
   const LocalFrame frame = settings_.layout().frame();
   const InsSample& s = now.sample;
-  const Matrix R = attitude_in(frame, s);
-  d.quaternion = quaternion_of(R);
+  d.quaternion = attitude_in(frame, s);
   d.latitude_longitude_deg = std::array{s.position.latitude_deg, s.position.longitude_deg};
   d.altitude_m = s.position.height_m;
   d.velocity = in_frame(frame, s.velocity_enu);
@@ -167,7 +133,7 @@ XsensMessages::Message XsensMessages::mark4(const Sample& now, Random* random) {
     const auto frame = static_cast<LocalFrame>((e.id >> 2U) & 3U);
     switch (packet_id(e.id)) {
       case PacketId::quaternion:
-        packets.put_numbers(e.id, quaternion_of(attitude_in(frame, s)));
+        packets.put_numbers(e.id, attitude_in(frame, s));
         break;
       case PacketId::latitude_longitude:
         if (place)

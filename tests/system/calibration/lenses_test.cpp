@@ -2,7 +2,6 @@
 // drives` prints all figures.
 #include <gtest/gtest.h>
 
-#include <cstdio>
 #include <numbers>
 #include <numeric>
 
@@ -56,8 +55,6 @@ TEST_P(RecordedLenses, selfCalibratedDriveHasScaleAndNoKnock) {
   const auto d = open_recorded(reach.name);
   if (!d) GTEST_SKIP() << missing(reach.name);
   const DriveOutcome o = calibrated_first(*d, d->sequence);
-  std::printf("%s: segments %.3f %%, ATE %.4f m, scale %.4f, verified at %d\n", reach.name,
-              o.segments_percent, o.ate_m, o.scale, o.verified_at);
   EXPECT_LE(o.segments_percent, reach.segments_percent);
   EXPECT_LE(o.ate_m, reach.ate_m);
   EXPECT_NEAR(o.scale, 1, reach.scale);
@@ -111,7 +108,6 @@ TEST(RecordedCalibration, rotationFromTheStartIsEstimatedAndNoKnock) {
     ASSERT_TRUE(found.rig) << found.why;
     const Mat3 R = exp_so3(kDegree * degrees) * straight.rig->T_camera_left[1].R;
     const Vec3 off = log_so3(found.rig->T_camera_left[1].R * R.transpose()) / kDegree;
-    std::printf("turned by %.2f deg: %.4f deg off\n", degrees.norm(), off.norm());
     // The intrinsics are estimated, too.
     EXPECT_LT(off.norm(), 0.05) << off.transpose();
   }

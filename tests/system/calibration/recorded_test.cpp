@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 #include "core/math/so3.hpp"
@@ -28,7 +27,6 @@ TEST_P(RecordedExcerpt, suppliedCalibrationIsUsableAndAccurate) {
   const app::Configuration c = app::load_configuration(std::nullopt, {});
   const DriveOutcome o =
       drive_recorded(*d, d->sequence, c, app::replayed_calibration(c, d->sequence, false));
-  std::printf("%s: ATE %.4f m\n", GetParam().name, o.ate_m);
   EXPECT_LT(o.ate_m, GetParam().ate_m);
   EXPECT_TRUE(std::all_of(o.samples.begin(), o.samples.end(), [](const PoseSample& s) {
     return s.status == PoseStatus::ok || s.reason == Reason::unverified_calibration;
@@ -58,8 +56,6 @@ TEST(RecordedFromScratch, eurocTransformIsFoundFromBaselineLength) {
   begin.file.rig = *scratch.rig;
   const double found_m = drive_recorded(*d, d->sequence, c, begin).ate_m,
                published_m = drive_recorded(*d, d->sequence, c, published).ate_m;
-  std::printf("euroc: ATE %.2f mm with it, %.2f mm with the published one\n", 1e3 * found_m,
-              1e3 * published_m);
   EXPECT_LT(found_m, published_m + 1e-3);
 }
 

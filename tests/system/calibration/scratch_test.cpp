@@ -44,7 +44,6 @@ void expect_found(const EstimatorRun& run, const Transform& truth) {
   const CalibrationDecision* d = run.accepted();
   ASSERT_NE(d, nullptr) << run.describe();
   const RigError e = rig_error(d->calibration, 1, truth);
-  std::printf("%s\n", to_string(e).c_str());
   EXPECT_LT(e.rotation, kRotation) << to_string(e);
   EXPECT_LT(std::abs(e.t.y()), kAcross) << to_string(e);
   EXPECT_LT(std::abs(e.t.z()), kAlong) << to_string(e);
@@ -173,7 +172,6 @@ TEST(ThreeCameras, bothTransformsOfThreeCamerasAreFound) {
   const RigCalibration& found = run.accepted()->calibration;
   for (int k = 1; k < 3; ++k) {
     const RigError e = rig_error(found, k, rig.T_camera_left[static_cast<std::size_t>(k)]);
-    std::printf("camera %d: %s\n", k, to_string(e).c_str());
     EXPECT_LT(e.sigmas, 4.0) << k << ' ' << to_string(e);
     EXPECT_LT(e.rotation, 1247.0 / 550.0 * kRotation) << k << ' ' << to_string(e);
     EXPECT_LT(std::abs(e.t.y()), 1247.0 / 550.0 * kAcross) << k << ' ' << to_string(e);

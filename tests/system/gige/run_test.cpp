@@ -23,14 +23,11 @@ const std::string kExample = std::string(VERGENCE_SOURCE_DIR) + "/app/config/gig
 
 /// Four seconds of the mock's drive, from its standing start on; rows of 640 px have no padding.
 test::StereoDrive rendered() {
-  test::RenderedDriveOptions o;
-  o.rig = test::nominal_rig();
-  o.drive.kind = mock::DriveKind::brief;
-  o.drive.speed = 8;
-  o.drive.stop_s = 1;
-  o.from_s = 0;
-  o.rate = kRate;
-  return test::render(o, kPairs);
+  return test::render({.rig = test::nominal_rig(),
+                       .drive = {.kind = mock::DriveKind::brief, .speed = 8, .stop_s = 1},
+                       .from_s = 0,
+                       .rate = kRate},
+                      kPairs);
 }
 
 /// The two cameras of the example, which show the drive.

@@ -2,9 +2,7 @@
 // configurations do on real stacks.
 
 #include <atomic>
-#include <chrono>
 #include <cstdlib>
-#include <thread>
 
 #include "app/report/session.hpp"
 #include "drivers/iidc/iidc.hpp"
@@ -12,6 +10,7 @@
 #include "tests/rigs/film.hpp"
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/thread_allocations.hpp"
+#include "tests/support/within.hpp"
 #include "tests/support/xsens_terminal.hpp"
 #include "tests/system/run/session.hpp"
 
@@ -143,9 +142,7 @@ TEST(BoardRun, triggerBoardCamerasAndInsMakeOneSession) {
     return test::SimulatedExposures{};
   });
   const auto await_port = [](const char* port) {
-    for (int i = 0; i < 1000 && !std::filesystem::exists(port); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    return std::filesystem::exists(port);
+    return within(10, [port] { return std::filesystem::exists(port); });
   };
   ASSERT_TRUE(await_port("/dev/ttyUSB0"));
   constexpr const char* kInsWire = "/run/vergence-wire";

@@ -1,4 +1,6 @@
 #include "drivers/iidc/iidc.hpp"
+#include "tests/rigs/iidc_rig.hpp"
+#include "tests/support/within.hpp"
 
 namespace vergence::test {
 
@@ -27,11 +29,10 @@ TEST_F(IidcRig, cameraIsOpenedByItsUsbSerial) {
   const Emulator emulator("sim_usb_iidc", {"--cameras", "1"});
   DeviceStatus status = DeviceStatus::failed;
   std::unique_ptr<CameraDevice> camera;
-  for (int i = 0; i < 100 && camera == nullptr; ++i) {
+  ASSERT_TRUE(within(5, [&] {
     camera = driver_->open("10240000", &status);
-    if (camera == nullptr) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
-  ASSERT_NE(camera, nullptr) << driver_->last_error();
+    return camera != nullptr;
+  })) << driver_->last_error();
   EXPECT_EQ(camera->info().serial, emulated_serial(0));
 }
 

@@ -24,23 +24,14 @@ RigCalibration nominal_of(const RigCalibration& rig) {
 
 /// One line for every run of frames with the same status and reason.
 std::string describe_frames(const std::vector<FrameResult>& results) {
-  std::string text;
-  for (std::size_t i = 0; i < results.size();) {
-    const PoseSample& first = results[i].sample;
-    std::size_t end = i;
-    int inliers = first.inliers;
-    for (; end < results.size(); ++end) {
-      const PoseSample& s = results[end].sample;
-      if (s.status != first.status || s.reason != first.reason ||
-          (results[end].map_reset && end != i))
-        break;
-      inliers = std::min(inliers, s.inliers);
-    }
-    text +=
-        fmt::format("frames {} to {}: {} {}, at least {} inliers{}\n", first.frame,
-                    results[end - 1].sample.frame, to_string(first.status), to_string(first.reason),
-                    inliers, results[i].map_reset ? ", map reset" : "");
-    i = end;
+  std::string text, last;
+  for (const FrameResult& r : results) {
+    const PoseSample& s = r.sample;
+    const std::string state = fmt::format("{} {}", to_string(s.status), to_string(s.reason));
+    if (state != last || r.map_reset)
+      text += fmt::format("from frame {}: {}, {} inliers{}\n", s.frame, state, s.inliers,
+                          r.map_reset ? ", map reset" : "");
+    last = state;
   }
   return text;
 }

@@ -41,14 +41,10 @@ RigCalibration distorted_rig() {
 }
 
 RenderedDriveOptions brief_options(const RigCalibration& rig, double from_s) {
-  RenderedDriveOptions options;
-  options.rig = rig;
-  options.drive.kind = mock::DriveKind::brief;
-  options.drive.speed = 9.0;
-  options.drive.stop_s = 1.0;
-  options.from_s = from_s;
-  options.rate = 20;
-  return options;
+  return {.rig = rig,
+          .drive = {.kind = mock::DriveKind::brief, .speed = 9, .stop_s = 1},
+          .from_s = from_s,
+          .rate = 20};
 }
 
 const StereoDrive& brief_drive() {

@@ -25,12 +25,11 @@ class ReplayedFolder : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     master_ = new TemporaryFolder;
-    RenderedDriveOptions options;
-    options.rig = distorted_rig();
-    options.drive.kind = mock::DriveKind::brief;
-    options.from_s = 6;
-    options.rate = 20;
-    const StereoDrive drive = render(options, kFrames);
+    const StereoDrive drive = render({.rig = distorted_rig(),
+                                      .drive = {.kind = mock::DriveKind::brief},
+                                      .from_s = 6,
+                                      .rate = 20},
+                                     kFrames);
     std::string times;
     for (std::size_t i = 0; i < drive.size(); ++i) {
       times += fmt::format("{}\n", drive.stamps[i].ns());

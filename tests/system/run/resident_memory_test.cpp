@@ -101,8 +101,6 @@ void expect_flat(const Growth& growth, int least) {
   const std::int64_t grown = growth.at_the_end - *growth.settled;
   EXPECT_LE(grown, kMost) << "after " << growth.frames << " frames";
   EXPECT_EQ(growth.handles_at_the_end, growth.handles_settled);
-  testing::Test::RecordProperty("frames", growth.frames);
-  testing::Test::RecordProperty("growth_bytes", std::to_string(grown));
 }
 
 TEST(ResidentMemory, twentyMinutesTakeNoMoreThanOne) {

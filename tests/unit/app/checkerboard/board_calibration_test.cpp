@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "app/checkerboard/board_detector.hpp"
+#include "app/checkerboard/board_images.hpp"
 #include "tests/support/refusal.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/checkerboard/board_scene.hpp"
 
 namespace vergence::app {
@@ -155,6 +159,98 @@ TEST(BoardPattern, refusesAmbiguousCheckerboards) {
     EXPECT_THROW((void)parse_checkerboard("9x6", bad), InputError) << bad;
   EXPECT_TRUE(parse_checkerboard("9x6", 0.1).is_asymmetric());
   EXPECT_FALSE(parse_checkerboard("8x6", 0.1).is_asymmetric());
+}
+
+using Paths = std::vector<std::filesystem::path>;
+
+TEST(BoardImages, globsGiveSortedFilesOnce) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"left2.png", "left1.png", "right1.png"}) (void)folder.write(name, "x");
+  const std::string all = (folder / "left*.png").string(), one = (folder / "left1.png").string();
+  const Paths files = matching_files({all, one}, "--left");
+  EXPECT_EQ(files, (Paths{folder / "left1.png", folder / "left2.png"}));
+  EXPECT_THROW((void)matching_files({(folder / "none*.png").string()}, "--left"), InputError);
+}
+
+TEST(BoardImages, viewsArePairedByNumberElseByOrder) {
+  std::vector<std::string> remarks;
+  auto views = group_views(
+      {{"left01.png", "left02.png", "left04.png"}, {"right01.png", "right03.png", "right04.png"}},
+      &remarks);
+  EXPECT_EQ(views,
+            (std::vector<Paths>{{"left01.png", "right01.png"}, {"left04.png", "right04.png"}}));
+  EXPECT_EQ(remarks.size(), 2U);
+  remarks.clear();
+  views = group_views({{"a10.png", "a11.png"}, {"b20.png", "b21.png"}}, &remarks);
+  EXPECT_EQ(views, (std::vector<Paths>{{"a10.png", "b20.png"}, {"a11.png", "b21.png"}}))
+      << "numbers that have nothing in common";
+  EXPECT_TRUE(remarks.empty());
+  views = group_views({{"a.png", "b.png"}, {"c.png", "d.png"}}, &remarks);
+  EXPECT_EQ(views[1], (Paths{"b.png", "d.png"}));
+  EXPECT_THROW((void)group_views({{"a.png", "b.png"}, {"c.png"}}, &remarks), InputError);
+}
+
+TEST(BoardImages, unreadableImagesAreRemarks) {
+  const test::TemporaryFolder folder;
+  const Paths view{folder.write("left.png", "no image"), folder / "gone.png"};
+  const BoardImages images = read_board_images({view}, parse_checkerboard("9x6", 0.1), {});
+  EXPECT_TRUE(images.views.empty());
+  ASSERT_EQ(images.remarks.size(), 2U);
+  EXPECT_TRUE(test::mentions(images.remarks[1], "gone.png is missing"));
+}
+
+/// OpenCV throws at a view whose corners determine no homography, and at all views together.
+TEST(BoardImages, cornersOnALineHaveNoHomography) {
+  const BoardPattern board = parse_charuco("8x7", 0.06, 0.044, "5X5_100");
+  const auto determined = [&board](const std::vector<std::size_t>& corners) {
+    BoardCorners seen;
+    for (const std::size_t index : corners) seen.push_back({index, Vec2::Zero()});
+    return determine_a_homography(seen, board);
+  };
+  EXPECT_TRUE(determined({0, 1, 2, 7, 8, 9}));
+  EXPECT_FALSE(determined({0, 1, 2, 7, 8}));
+  EXPECT_FALSE(determined({0, 7, 14, 21, 28, 35})) << "a column";
+  EXPECT_FALSE(determined({0, 7, 14, 21, 28, 35, 36})) << "all but one";
+  EXPECT_FALSE(determined({0, 8, 16, 24, 32, 40})) << "a diagonal";
+}
+
+// Thirteen pairs of a chessboard whose calibration by OpenCV is known
+// (checkerboards/opencv/README.md of the shared data).
+
+namespace fs = std::filesystem;
+constexpr const char* kFolder = "data/checkerboards/opencv";
+constexpr double kDegree = M_PI / 180;
+
+BoardCalibrationOptions options() {
+  BoardCalibrationOptions o;
+  o.board = parse_checkerboard("9x6", 0.025);
+  o.sizes = {{640, 480}, {640, 480}};
+  return o;
+}
+
+TEST(KnownAnswers, imagesGiveTheKnownCalibration) {
+  const auto folder = test::shared_data(kFolder);
+  if (!folder) GTEST_SKIP() << test::shared_data_missing(kFolder);
+  std::vector<std::string> remarks;
+  const auto files = group_views({matching_files({(*folder / "left*.jpg").string()}, "--left"),
+                                  matching_files({(*folder / "right*.jpg").string()}, "--right")},
+                                 &remarks);
+  EXPECT_TRUE(remarks.empty());
+  const BoardImages images = read_board_images(files, options().board, {});
+  EXPECT_TRUE(images.remarks.empty()) << images.remarks.front();
+  ASSERT_EQ(images.views.size(), 13U) << "the board is found in all 26 images";
+  const BoardCalibration c = calibrate_boards(images.views, options());
+  ASSERT_EQ(c.error, "");
+  // The corners are refined in another window than the listed ones: "within 0.5 mm and 0.15° is the
+  // same answer", rms up to 0.25 px.
+  EXPECT_LE(c.rig.reprojection_px, 0.2153) << "not worse than the listed corners";
+  EXPECT_EQ(c.rig.frames, 13);
+  const Vec3 t = 1e3 * c.rig.T_camera_left[1].t, r = log_so3(c.rig.T_camera_left[1].R) / kDegree;
+  EXPECT_LT((t - Vec3(-83.178, 0.918, -0.119)).norm(), 0.5) << t.transpose();
+  EXPECT_LT((r - Vec3(0.4102, 0.2449, -0.2010)).norm(), 0.15) << r.transpose();
+  for (std::size_t k = 0; k < 2; ++k)
+    EXPECT_NEAR(c.rig.intrinsics[k].fx, k == 0 ? 533.5633 : 536.8943, 3 * 0.7)
+        << "listed sigmas 0.61, 0.70";
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <map>
 
+#include <fmt/ranges.h>
+
 #include "app/checkerboard/view_collector.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/app/checkerboard/board_picture.hpp"
@@ -23,9 +25,7 @@ Coverage nothing_yet(const RigCalibration& rig) {
 }
 
 std::string all(const std::vector<std::string>& needs) {
-  std::string text;
-  for (const std::string& need : needs) text += need + "\n";
-  return text;
+  return fmt::format("{}\n", fmt::join(needs, "\n"));
 }
 
 /// Face to face at a place in the left image, in shares of it.
@@ -48,9 +48,8 @@ TEST(Coverage, namesMissingPartsTiltsAndSizes) {
   const std::string needs = all(c.needs());
   EXPECT_TRUE(contains(needs, "top left")) << needs;
   EXPECT_FALSE(contains(needs, "the middle")) << needs;
-  EXPECT_TRUE(contains(needs, "nearer\n")) << needs;
-  EXPECT_TRUE(contains(needs, "tilted, each edge nearer in turn")) << needs;
-  EXPECT_TRUE(contains(needs, "11 more views")) << needs;
+  EXPECT_TRUE(
+      test::mentions(needs, "nearer\n", "tilted, each edge nearer in turn", "11 more views"));
 
   // Which edge is the nearer one is asked of the board's own corners.
   const Transform turned = flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)),
@@ -59,10 +58,9 @@ TEST(Coverage, namesMissingPartsTiltsAndSizes) {
   c.add(seen_board(rig, kBoard, tipped));
   const bool left_nearer = (turned * kBoard.corner(0)).z() < (turned * kBoard.corner(8)).z();
   const bool top_nearer = (tipped * kBoard.corner(0)).z() < (tipped * kBoard.corner(45)).z();
-  EXPECT_TRUE(contains(all(c.needs()),
-                       std::string("tilted, the ") + (left_nearer ? "right" : "left") + " and " +
-                           (top_nearer ? "bottom" : "top") + " edges nearer in turn"))
-      << all(c.needs());
+  EXPECT_TRUE(test::mentions(
+      all(c.needs()), std::string("tilted, the ") + (left_nearer ? "right" : "left") + " and " +
+                          (top_nearer ? "bottom" : "top") + " edges nearer in turn"));
   c.add(seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.45)));
   const auto last = c.needs();
   EXPECT_EQ(std::count(last.begin(), last.end(), "nearer") +

@@ -1,4 +1,8 @@
+#include <gtest/gtest.h>
+
 #include <algorithm>
+
+#include <nlohmann/json.hpp>
 
 #include "app/runtime/nearest.hpp"
 #include "tests/support/mentions.hpp"
@@ -42,8 +46,8 @@ TEST(Program, renamedWordsAreRefusedWithTheirNewName) {
 TEST(Program, unknownCommandNamesNearest) {
   const Outcome outcome = run_vergence("evalute a b");
   EXPECT_TRUE(refused_in_one_message(outcome));
-  EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?"))
-      << outcome.err;
+  EXPECT_TRUE(
+      test::mentions(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?"));
   EXPECT_TRUE(refused_in_one_message(run_vergence("''")));
 }
 
@@ -56,14 +60,54 @@ TEST(Program, controlCodesOfArgumentsAreRemoved) {
 TEST(Program, smallStackIsReportedBeforeOverflow) {
   const test::Outcome o = test::run_vergence("--version", "ulimit -S -s 64;");
   EXPECT_EQ(o.code, 2);
-  EXPECT_NE(o.err.find("the stack is limited to 64 kB, and 1024 are needed: raise the limit"),
-            std::string::npos)
-      << o.err;
+  EXPECT_TRUE(
+      test::mentions(o.err, "the stack is limited to 64 kB, and 1024 are needed: raise the limit"));
 }
 
 TEST(Program, unwritableStandardOutputIsAnError) {
   constexpr const char* kCommand = "'" VERGENCE_PROGRAM "' --help >/dev/full 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(kCommand)), 2);
+}
+
+nlohmann::json simulate(const std::string& options) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path file = folder / "simulation.json";
+  const Outcome outcome =
+      run_vergence("simulate --quiet --json '" + file.string() + "' " + options);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  std::ifstream in(file);
+  return nlohmann::json::parse(in);
+}
+
+TEST(Simulate, jsonHasOneObjectPerNoiseLevel) {
+  const nlohmann::json levels = simulate("--points 60 --runs 20 --noise 0,0.1,0.2");
+  ASSERT_EQ(levels.size(), 3U);
+  for (const nlohmann::json& level : levels) {
+    for (const char* key :
+         {"pixel_noise", "runs", "failed", "mean_reprojection_px", "mean_pose_error_m",
+          "mean_rotation_error_rad", "mean_translation_error_m", "median_ms", "mean_steps"})
+      EXPECT_TRUE(level.contains(key)) << key;
+    EXPECT_EQ(level["runs"], 20);
+    EXPECT_EQ(level["failed"], 0);
+  }
+  EXPECT_LT(levels[0]["mean_reprojection_px"], 1e-10);
+  // Every level has the same geometry: errors grow with the noise, up to the curvature of the
+  // problem.
+  for (const char* key : {"mean_reprojection_px", "mean_pose_error_m", "mean_rotation_error_rad",
+                          "mean_translation_error_m"})
+    EXPECT_NEAR(levels[2][key].get<double>() / levels[1][key].get<double>(), 2.0, 0.05) << key;
+  // This is the mean length of a 2-D Gaussian, less the degrees of freedom used.
+  EXPECT_NEAR(levels[1]["mean_reprojection_px"].get<double>(), 0.1 * 1.2533, 0.01);
+}
+
+TEST(Simulate, refusesImpossibleOptionsInOneLine) {
+  for (const char* options : {"--points 0", "--runs 0", "--noise -1", "--noise x", "--cameras 9",
+                              "--radius 1000", "--json /nowhere/file.json", "--shape cube"}) {
+    const Outcome outcome = run_vergence(std::string("simulate --quiet ") + options);
+    EXPECT_EQ(outcome.code, 2) << options;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "tests/support/parallel_rig.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -64,13 +65,9 @@ TEST(StateFile, nameOfRigNeverLeavesFolder) {
 
 CalibrationFile two_cameras() {
   CalibrationFile file;
-  file.rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k)
-    file.rig.intrinsics[k] = {
-        .width = 640, .height = 480, .fx = 460, .fy = 460, .cx = 320, .cy = 240};
+  file.rig = test::parallel_rig(test::pinhole(640, 480, 460), 0.75);
   file.rig.T_camera_left[1].t = {-0.75, 0.001, 0.002};
   file.rig.T_camera_left[1].t *= 0.75 / file.rig.T_camera_left[1].t.norm();
-  file.rig.baseline = 0.75;
   file.serials = {"101", "102", "", ""};
   file.source = "online";
   return file;

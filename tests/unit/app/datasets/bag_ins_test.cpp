@@ -4,6 +4,8 @@
 #include <limits>
 #include <numbers>
 
+#include <fmt/ranges.h>
+
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/comparison/geodesy.hpp"
@@ -29,8 +31,7 @@ std::array<double, 4> coefficients(const Mat3& R) {
   return {q.x(), q.y(), q.z(), q.w()};
 }
 Mat3 rotation_of(const InsSample& s) {
-  return Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2])
-      .toRotationMatrix();
+  return Eigen::Quaterniond(s.q_enu_ins.data()).toRotationMatrix();
 }
 Mat3 yaw(double angle) { return exp_so3(Vec3(0, 0, angle)); }
 
@@ -77,9 +78,7 @@ class BagIns : public ::testing::TestWithParam<BagKind> {
     return *test::bag_in_memory(GetParam().is_mcap(), writer_->bytes(), true, topics).ins;
   }
   [[nodiscard]] static std::string all(const RecordedIns& ins) {
-    std::string text;
-    for (const std::string& message : ins.remarks) text += message + "\n";
-    return text;
+    return fmt::format("{}", fmt::join(ins.remarks, "\n"));
   }
   [[nodiscard]] Vec3 error(const InsSample& s) const {
     return plane_.to_enu(s.position) - place((s.stamp - Stamp(kStart)).to_seconds());

@@ -243,8 +243,7 @@ TEST(KittiRaw, stampsAreUtcNanoseconds) {
 // ---- INS
 
 Mat3 rotation_of(const InsSample& s) {
-  return Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2])
-      .toRotationMatrix();
+  return Eigen::Quaterniond(s.q_enu_ins.data()).toRotationMatrix();
 }
 
 TEST(KittiRawIns, convertsPacketsToEnuWithMount) {

@@ -4,6 +4,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/support/parallel_rig.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -12,14 +13,7 @@ namespace {
 
 constexpr int kWidth = 80, kHeight = 60;
 
-RigCalibration small_rig() {
-  RigCalibration rig{.cameras = 2};
-  for (std::size_t k = 0; k < 2; ++k) {
-    rig.intrinsics[k].width = kWidth;
-    rig.intrinsics[k].height = kHeight;
-  }
-  return rig;
-}
+RigCalibration small_rig() { return test::parallel_rig(test::pinhole(kWidth, kHeight, 50), 0.5); }
 
 std::string pgm(const std::string& head, char value = 1) {
   return head + std::string(kWidth * kHeight, value);

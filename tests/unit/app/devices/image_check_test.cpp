@@ -93,8 +93,7 @@ TEST(ImageCheck, detectsOneDefocusedCamera) {
   const auto remarks = issues_of({sharp, blurred});
   ASSERT_EQ(remarks.size(), 1U);
   EXPECT_FALSE(remarks[0].unusable);
-  EXPECT_TRUE(contains(remarks[0].message, "right is much less sharp than left"))
-      << remarks[0].message;
+  EXPECT_TRUE(test::mentions(remarks[0].message, "right is much less sharp than left"));
 }
 
 TEST(ImageFileNames, cameraNamesGiveFileNames) {

@@ -25,13 +25,12 @@ testing::AssertionResult holds_as_rules(const std::string& rules) {
 }
 
 UsbDevice usb(std::uint16_t vendor, const std::string& serial, std::vector<std::string> video) {
-  UsbDevice d;
-  d.port = "1-2";
-  d.vendor = vendor;
-  d.product = 0x2005;
-  d.serial = d.title = serial;
-  d.video = std::move(video);
-  return d;
+  return {.port = "1-2",
+          .vendor = vendor,
+          .product = 0x2005,
+          .serial = serial,
+          .title = serial,
+          .video = std::move(video)};
 }
 
 TEST(UdevRules, everyDeviceIsNamedByItsSerial) {

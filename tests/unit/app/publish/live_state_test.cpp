@@ -31,8 +31,7 @@ EventRecord event(const char* kind, std::string_view message) {
 CalibrationRecord calibration(bool is_refinement, double x) {
   CalibrationRecord c;
   c.accepted = !is_refinement;
-  c.is_refinement = is_refinement;
-  c.decided = is_refinement;
+  c.is_refinement = c.decided = is_refinement;
   c.cause = CalibrationCause::refinement;
   c.calibration.cameras = 2;
   c.calibration.T_camera_left[1].t = {x, 0, 0};

@@ -18,19 +18,20 @@ namespace vergence::app {
 namespace {
 
 PoseSample sample() {
-  PoseSample s{.frame = 12, .stamp = Stamp(1'577'836'800'500'000'001)};
-  s.state = State::stereo_odometry;
-  s.status = PoseStatus::degraded;
-  s.reason = Reason::few_inliers;
-  s.T_world_left = {exp_so3({0.1, -0.2, 0.3}), {1.25, -2.5, 3.125}};
+  PoseSample s{.frame = 12,
+               .stamp = Stamp(1'577'836'800'500'000'001),
+               .state = State::stereo_odometry,
+               .status = PoseStatus::degraded,
+               .reason = Reason::few_inliers,
+               .T_world_left = {exp_so3({0.1, -0.2, 0.3}), {1.25, -2.5, 3.125}},
+               .length_sigma = 0.0125F,
+               .inliers = 44,
+               .stereo_inliers = 33,
+               .reprojection_px = 0.25,
+               .estimate_ms = 7.5F};
   s.covariance[0] = 0.25F;
   s.covariance[20] = 1e-6F;
   s.motion_covariance[6] = 0.0004F;
-  s.length_sigma = 0.0125F;
-  s.inliers = 44;
-  s.stereo_inliers = 33;
-  s.reprojection_px = 0.25;
-  s.estimate_ms = 7.5F;
   return s;
 }
 

@@ -2,18 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/ranges.h>
+
 #include "app/datasets/detail/ros_messages.hpp"
 
 namespace vergence::app {
 namespace {
 
 std::string hex(const std::span<const std::uint8_t>& bytes) {
-  std::string out;
-  for (const std::uint8_t b : bytes) {
-    constexpr const char* kDigits = "0123456789ABCDEF";
-    out += {kDigits[b >> 4U], kDigits[b & 15U]};
-  }
-  return out;
+  return fmt::format("{:02X}", fmt::join(bytes, ""));
 }
 
 struct Room {

@@ -2,9 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
+
+#include <fmt/ranges.h>
 
 namespace vergence::app::report {
 namespace {
@@ -12,8 +13,7 @@ namespace {
 using enum Grade;
 
 bool any_has(const std::vector<std::string>& messages, const std::string& part) {
-  return std::any_of(messages.begin(), messages.end(),
-                     [&](const std::string& s) { return s.find(part) != std::string::npos; });
+  return fmt::format("{}", fmt::join(messages, "\n")).find(part) != std::string::npos;
 }
 
 Stamp at(double s) { return Stamp(static_cast<std::int64_t>(std::llround(s * 1e9))); }

@@ -2,12 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/datasets/detail/ros_reader.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/math/so3.hpp"
@@ -33,43 +33,19 @@ class Kept final : public TopicWriter {
   std::vector<std::string> latched;
 };
 
-/// Texts and doubles of a message after its encapsulation and stamp.
-class Reader {
+/// Reads a message after its encapsulation and stamp.
+class Reader : public detail::RosReader {
  public:
-  explicit Reader(const std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
-  template <class T>
-  T get() {
-    at_ += (sizeof(T) - (at_ - 4) % sizeof(T)) % sizeof(T);
-    T out{};
-    std::memcpy(&out, bytes_.data() + at_, sizeof out);
-    at_ += sizeof out;
-    return out;
+  explicit Reader(const std::vector<std::uint8_t>& message)
+      : RosReader(message, detail::MessageEncoding::cdr) {
+    (void)get<std::int64_t>();
   }
-  std::string text() {
-    const auto size = get<std::uint32_t>();
-    const std::string out(reinterpret_cast<const char*>(bytes_.data()) + at_, size - 1);
-    at_ += size;
-    return out;
-  }
-  double number() { return get<double>(); }
-  Vec3 vector() {
-    const double x = number(), y = number(), z = number();
-    return {x, y, z};
-  }
+  Vec3 vector() { return Vec3(doubles<3>().data()); }
   Transform pose() {
     const Vec3 t = vector();
-    const double x = number(), y = number(), z = number(), w = number();
-    return {Eigen::Quaterniond(w, x, y, z).toRotationMatrix(), t};
+    return {Eigen::Quaterniond(doubles<4>().data()).toRotationMatrix(), t};
   }
-  Matrix6 covariance() {
-    Matrix6 m;
-    for (int i = 0; i < 36; ++i) m(i / 6, i % 6) = number();
-    return m;
-  }
-
- private:
-  const std::vector<std::uint8_t>& bytes_;
-  std::size_t at_ = 12;
+  Matrix6 covariance() { return Matrix6(doubles<36>().data()).transpose(); }
 };
 
 struct Odometry {
@@ -82,15 +58,8 @@ struct Odometry {
 
 Odometry odometry(const std::vector<std::uint8_t>& message) {
   Reader in(message);
-  Odometry o;
-  o.frame = in.text();
-  o.child = in.text();
-  o.pose = in.pose();
-  o.pose_covariance = in.covariance();
-  o.linear = in.vector();
-  o.angular = in.vector();
-  o.twist_covariance = in.covariance();
-  return o;
+  return {in.text(),   in.text(),   in.pose(),      in.covariance(),
+          in.vector(), in.vector(), in.covariance()};
 }
 
 /// Upper triangle, row by row.
@@ -372,14 +341,12 @@ TEST(Bridge, publishesEnuPoseOnceAligned) {
   EXPECT_NEAR(P(1, 1), 4, 1e-9);
   EXPECT_NEAR(P(2, 2), 9 + 1, 1e-9);
   EXPECT_NEAR(P(5, 5), 4e-4, 1e-12);
-  const auto& fix = b.kept.messages["/vergence/fix"].at(0);
-  Reader place(fix);
+  Reader place(b.kept.messages["/vergence/fix"].at(0));
   (void)place.text();
   (void)place.get<std::int8_t>();
   (void)place.get<std::uint16_t>();
-  const double latitude = place.number();
   // 120 m north by a degree of 110.8 km there.
-  EXPECT_NEAR(latitude, -27.5 + 120 / 110'800.0, 1e-6);
+  EXPECT_NEAR(place.get<double>(), -27.5 + 120 / 110'800.0, 1e-6);
 }
 
 TEST(Bridge, malformedLinesAreOnlyCounted) {

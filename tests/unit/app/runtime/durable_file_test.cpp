@@ -34,8 +34,7 @@ TEST(DurableFile, failureNamesFileAndKeepsOldOne) {
   std::filesystem::create_directory(folder / "a.yaml.new");
   EXPECT_NE(refusal(folder / "a.yaml").find("a.yaml: cannot be written"), std::string::npos);
   EXPECT_EQ(test::read_file(folder / "a.yaml"), "old");
-  EXPECT_NE(refusal(folder / "none" / "b.yaml").find("b.yaml: cannot be written"),
-            std::string::npos);
+  EXPECT_TRUE(test::mentions(refusal(folder / "none" / "b.yaml"), "b.yaml: cannot be written"));
   std::filesystem::create_directory(folder / "c.yaml");
   EXPECT_NE(refusal(folder / "c.yaml").find("c.yaml: cannot be replaced"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "c.yaml.new"));

@@ -1,4 +1,5 @@
 #include "app/runtime/realtime.hpp"
+#include "tests/support/mentions.hpp"
 
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -38,10 +39,6 @@ const std::vector<ProcessThread> kDrive{
     {1, "vergence"},        {2, "vergence-gige"},  {3, "vergence-estim"}, {4, "vergence-ins"},
     {5, "vergence-record"}, {6, "vergence-calib"}, {7, "vergence-mock"},  {8, "gmain"}};
 
-bool mentions(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 TEST(Realtime, urgentRolesHaveHigherPriority) {
   FakeSystem system;
   RealtimeThreads threads({.priority = 40}, system);
@@ -74,12 +71,11 @@ TEST(Realtime, refusalIsOneMessageWithTheFix) {
   RealtimeThreads threads(request, system);
   const auto memory = threads.lock_memory();
   ASSERT_EQ(memory.size(), 1U);
-  EXPECT_TRUE(mentions(memory[0], "LimitMEMLOCK") && mentions(memory[0], "ulimit -l")) << memory[0];
+  EXPECT_TRUE(test::mentions(memory[0], "LimitMEMLOCK", "ulimit -l"));
   const auto messages = threads.apply(kDrive);
   ASSERT_EQ(messages.size(), 2U) << "one for each key, however many threads there are";
-  EXPECT_TRUE(mentions(messages[0], "realtime.affinity")) << messages[0];
-  EXPECT_TRUE(mentions(messages[1], "setcap") && mentions(messages[1], "LimitRTPRIO=40"))
-      << messages[1];
+  EXPECT_TRUE(test::mentions(messages[0], "realtime.affinity"));
+  EXPECT_TRUE(test::mentions(messages[1], "setcap", "LimitRTPRIO=40"));
   EXPECT_TRUE(threads.apply({{20, "vergence-v4l2"}}).empty());
 }
 

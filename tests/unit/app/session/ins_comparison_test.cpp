@@ -20,16 +20,16 @@ constexpr double kSpeed = 10;
 Stamp at(double t) { return Stamp(1403636584000000000) + Duration::seconds(t); }
 
 InsRecord reading(const LocalTangentPlane& plane, double t, const Vec3& place) {
-  InsRecord r;
-  r.sample.stamp = at(t);
-  r.sample.fix = FixStatus::fix_3d;
-  r.sample.attitude_valid = true;
-  r.sample.position = plane.to_geodetic(place);
-  const Eigen::Quaterniond q = quaternion(plane.rotation_from(r.sample.position).transpose());
-  r.sample.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
-  r.sample.position_sigma = r.sample.height_sigma = 0.001;
-  r.sample.tilt_sigma = 1e-5;
-  return r;
+  const Geodetic position = plane.to_geodetic(place);
+  const Eigen::Quaterniond q = quaternion(plane.rotation_from(position).transpose());
+  return {.sample = {.stamp = at(t),
+                     .fix = FixStatus::fix_3d,
+                     .attitude_valid = true,
+                     .position = position,
+                     .q_enu_ins = {q.x(), q.y(), q.z(), q.w()},
+                     .position_sigma = 0.001,
+                     .height_sigma = 0.001,
+                     .tilt_sigma = 1e-5}};
 }
 
 /// A comparison as a session has it: with a recorder and a log of events.

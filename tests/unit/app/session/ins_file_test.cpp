@@ -9,19 +9,19 @@ namespace vergence::app {
 namespace {
 
 InsRecord reading(std::uint64_t number) {
-  InsRecord r;
-  r.sample.number = number;
-  r.sample.stamp = Stamp(1'577'836'800'123'456'789 + static_cast<std::int64_t>(number) * 8'333'333);
-  r.sample.stamp_error = Duration::nanoseconds(180'123);
-  r.sample.fix = FixStatus::fix_3d;
-  r.sample.position = {-27.4975123456, 153.0137654321, 61.12345};
-  r.sample.velocity_valid = r.sample.attitude_valid = true;
-  r.sample.velocity_enu = {12.345678, -0.5, 0.000001};
-  r.sample.q_enu_ins = {0.5, -0.5, 0.5, 0.5};
-  r.sample.position_sigma = 2.5;
-  r.sample.heading_sigma = 0.0174532925;
-  r.quality = {0xfe000007U, true, 1'577'836'800'100'000'000, 11, 0, true, false};
-  return r;
+  const Stamp stamp(1'577'836'800'123'456'789 + static_cast<std::int64_t>(number) * 8'333'333);
+  return {.sample = {.number = number,
+                     .stamp = stamp,
+                     .stamp_error = Duration::nanoseconds(180'123),
+                     .fix = FixStatus::fix_3d,
+                     .attitude_valid = true,
+                     .velocity_valid = true,
+                     .position = {-27.4975123456, 153.0137654321, 61.12345},
+                     .velocity_enu = {12.345678, -0.5, 0.000001},
+                     .q_enu_ins = {0.5, -0.5, 0.5, 0.5},
+                     .position_sigma = 2.5,
+                     .heading_sigma = 0.0174532925},
+          .quality = {0xfe000007U, true, 1'577'836'800'100'000'000, 11, 0, true, false}};
 }
 
 std::string line_of(const InsRecord& record) {
@@ -74,16 +74,11 @@ TEST(InsFile, refusalNamesPlaceOfMalformedLine) {
   const std::string good = line_of(reading(1));
   ASSERT_TRUE(refusal(kHead + good).empty());
   const auto with = [&](std::size_t column, const std::string& value) {
-    std::vector<std::string> fields(1);
-    for (const char c : good.substr(0, good.size() - 1))
-      if (c == ',')
-        fields.emplace_back();
-      else
-        fields.back() += c;
-    fields[column] = value;
-    std::string line;
-    for (const std::string& f : fields) line += (line.empty() ? "" : ",") + f;
-    return refusal(kHead + line_of(reading(0)) + line + "\n");
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < column; ++i) at = good.find(',', at) + 1;
+    std::string line = good;
+    line.replace(at, line.find_first_of(",\n", at) - at, value);
+    return refusal(kHead + line_of(reading(0)) + line);
   };
   EXPECT_TRUE(
       test::contains(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds"))

@@ -11,18 +11,16 @@ namespace vergence::app {
 inline constexpr std::int64_t kStamp = 1403636584763555584;
 
 inline FrameReport pose(std::uint64_t frame, PoseStatus status, double x) {
-  PoseSample sample;
-  sample.frame = frame;
-  sample.stamp = Stamp(kStamp + static_cast<std::int64_t>(frame) * 50'000'000);
-  sample.state = State::stereo_odometry;
-  sample.status = status;
-  sample.reason = status == PoseStatus::ok ? Reason::none : Reason::few_inliers;
-  sample.T_world_left.t = {x, 0, 0};
-  sample.inliers = 100;
-  sample.reprojection_px = 0.25;
-  sample.estimate_ms = 7.5F;
   FrameReport report;
-  report.pose = sample;
+  report.pose = {.frame = frame,
+                 .stamp = Stamp(kStamp + static_cast<std::int64_t>(frame) * 50'000'000),
+                 .state = State::stereo_odometry,
+                 .status = status,
+                 .reason = status == PoseStatus::ok ? Reason::none : Reason::few_inliers,
+                 .T_world_left = {Mat3::Identity(), {x, 0, 0}},
+                 .inliers = 100,
+                 .reprojection_px = 0.25,
+                 .estimate_ms = 7.5F};
   report.decode_ms = 2;
   return report;
 }
@@ -37,22 +35,22 @@ inline RigCalibration two_cameras() {
 }
 
 inline CalibrationDecision decision(bool accepted) {
-  CalibrationDecision d;
-  d.stamp = Stamp(kStamp);
-  d.cause = CalibrationCause::knock;
-  d.accepted = accepted;
-  d.reason = accepted ? "" : "held-out frames do not fit better";
-  d.calibration = two_cameras();
-  d.calibration.frames = 60;
-  d.calibration.reprojection_px = 0.18;
-  d.calibration.scale_sigma = 0.002;
-  d.calibration.intrinsics[1].sigma = {0.2, 0.3, 0, 0};
-  d.latency_frames = 71;
-  d.onset_frame = 840;
-  d.held_out_before_px = 1.5;
-  d.held_out_after_px = 0.125;
-  d.solve_ms = 33;
-  return d;
+  RigCalibration rig = two_cameras();
+  rig.frames = 60;
+  rig.reprojection_px = 0.18;
+  rig.scale_sigma = 0.002;
+  rig.intrinsics[1].sigma = {0.2, 0.3, 0, 0};
+  return {.stamp = Stamp(kStamp),
+          .cause = CalibrationCause::knock,
+          .accepted = accepted,
+          .reason = accepted ? "" : "held-out frames do not fit better",
+          .calibration = rig,
+          .latency_frames = 71,
+          .onset_frame = 840,
+          .held_out_before_px = 1.5,
+          .held_out_after_px = 0.125,
+          .evidence = {},
+          .solve_ms = 33};
 }
 
 }  // namespace vergence::app

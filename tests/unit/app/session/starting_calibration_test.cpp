@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "app/config/calibration_state.hpp"
+#include "tests/support/mentions.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {
@@ -68,8 +69,7 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   const StartingCalibration other = drive("4712");
   EXPECT_EQ(other.trust, CalibrationTrust::given);
   ASSERT_EQ(other.remarks.size(), 1U);
-  EXPECT_NE(other.remarks[0].find("\"4711\", the connected one \"4712\""), std::string::npos)
-      << other.remarks[0];
+  EXPECT_TRUE(test::mentions(other.remarks[0], "\"4711\", the connected one \"4712\""));
 }
 
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <limits>
 #include <string>
@@ -46,7 +44,6 @@ class MonitorKnock : public testing::TestWithParam<KnockRow> {};
 
 TEST_P(MonitorKnock, knockIsDetectedInTimeWithItsOnset) {
   const KnockRow& row = GetParam();
-  std::vector<int> latencies;
   int misplaced = 0;
   for (const double speed : {3.0, 8.0, 15.0}) {
     for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
@@ -59,17 +56,12 @@ TEST_P(MonitorKnock, knockIsDetectedInTimeWithItsOnset) {
       ASSERT_GE(trial.frame().found_stereo, 190);
       const auto frames = trial.frames_until(row.limit);
       ASSERT_TRUE(frames.has_value()) << "statistic " << trial.verdict().statistic;
-      latencies.push_back(*frames);
       for (int i = 0; i < 10; ++i) (void)trial.step();
       misplaced += !onset_fits(trial.verdict().onset_frame, *frames + 10) ? 1 : 0;
     }
   }
   // A window that happens to explain the past better than the truth: 1 of 120 knocks of t_z.
   EXPECT_LE(misplaced, 1);
-  std::sort(latencies.begin(), latencies.end());
-  std::printf("%s: noticed after %d to %d frames, median %d, of %zu drives, %d onsets misplaced\n",
-              row.name, latencies.front(), latencies.back(), latencies[latencies.size() / 2],
-              latencies.size(), misplaced);
 }
 
 INSTANTIATE_TEST_SUITE_P(Table, MonitorKnock,
@@ -111,8 +103,6 @@ TEST(Monitor, slowRotationIsDriftBefore0_03Degrees) {
                               ? frames
                               : trial.frames_until(2700 - *frames, Kind::drift);
     EXPECT_TRUE(as_drift.has_value());
-    std::printf("%+.2f deg a minute: noticed after %d frames, %.4f deg\n", rate, *frames,
-                std::abs(rate) * *frames / 1800);
   }
 }
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 
 #include "tests/unit/core/calibration/feature_log.hpp"
 
@@ -50,10 +49,6 @@ TEST(RigSolverSigmas, sigmasMatchErrorsOverFiftyDrives) {
       within += std::abs(e[k]) < 2 * std::sqrt(C(k, k)) ? 1.0 / (5 * kDrives) : 0;
     length += std::pow((found.travelled_m / driven - 1) / found.rig.scale_sigma, 2) / kDrives;
   }
-  std::printf(
-      "squared error over its dimension %.3f, %.1f %% within two sigmas; squared error of the "
-      "length over its variance %.3f\n",
-      nees, 100 * within, length);
   EXPECT_GT(nees, 0.5);
   EXPECT_LT(nees, 2.0);
   EXPECT_GE(within, 0.90);

@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <thread>
 
 #include "core/memory/allocation_guard.hpp"
+#include "drivers/acquisition/acquired_queue.hpp"
+#include "drivers/acquisition/clock_record.hpp"
+#include "drivers/sync/durations.hpp"
 #include "tests/support/acquired.hpp"
 #include "tests/support/idle_camera.hpp"
 #include "tests/support/small_mock.hpp"
@@ -34,13 +38,12 @@ struct Bench {
     EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
     TriggerConfiguration pulses{.rate_hz = 20, .vary = b.vary};
     EXPECT_EQ(rig->trigger().configure(pulses, nullptr), DeviceStatus::ok);
-    Acquisition::Options options;
-    options.sync.interval = Duration::milliseconds(50);
-    options.sync.mode = b.mode;
-    options.wait_when_full = true;
-    options.tie_stamp = kStart;
-    options.tie_host = rig->start();
-    options.stamp_grid = b.grid;
+    const Acquisition::Options options{
+        .sync = {.interval = Duration::milliseconds(50), .mode = b.mode},
+        .wait_when_full = true,
+        .tie_stamp = kStart,
+        .tie_host = rig->start(),
+        .stamp_grid = b.grid};
     for (int k = 0; k < 2; ++k) watched.push_back(std::make_unique<WatchedCamera>(&rig->camera(k)));
     source = std::make_unique<Acquisition>(
         std::vector<CameraDevice*>{watched[0].get(), watched[1].get()}, &rig->ins(),
@@ -155,9 +158,8 @@ class EmptyBoard final : public TriggerDevice {
 TEST(Acquisition, absentDeviceIsRetriedAndReportedOnce) {
   EmptyCamera left, right;
   EmptyBoard board;
-  Acquisition::Options options;
-  options.sync.interval = Duration::milliseconds(50);
-  options.sync.mode = SyncMode::approximate_time;
+  const Acquisition::Options options{
+      .sync = {.interval = Duration::milliseconds(50), .mode = SyncMode::approximate_time}};
   Acquisition source({&left, &right}, nullptr, &board, options);
   ASSERT_FALSE(source.start());
   // Number of starts.
@@ -311,6 +313,102 @@ TEST(Acquisition, stopEndsTheStream) {
   while (b.source->next(&item)) ++rest;
   EXPECT_LE(rest, 256 + 8) << "what was in the ring";
   b.source->join();
+}
+
+/// A camera that remembers which slots came back.
+struct SlotCamera final : test::IdleCamera {
+  void release(FrameSlot slot) noexcept override { released.push_back(static_cast<int>(slot)); }
+  std::vector<int> released;
+};
+
+struct QueuedCamera {
+  SlotCamera camera;
+  std::vector<CameraDevice*> cameras{&camera};
+};
+
+AcquiredFrame frame(FrameSlot slot) {
+  AcquiredFrame f;
+  f.set.number = slot;
+  f.set.present[0] = true;
+  f.set.slots[0] = slot;
+  return f;
+}
+
+TEST(AcquiredQueue, refusedFramesReturnTheirSlots) {
+  QueuedCamera b;
+  AcquiredQueue queue(b.cameras, true);
+  AcquiredQueue::Refused refused{.set = frame(7).set};
+  queue.push(refused);
+  EXPECT_TRUE(b.camera.released.empty()) << "not on the producer's thread";
+  queue.finish();
+  Acquired item;
+  EXPECT_FALSE(queue.next(&item));
+  EXPECT_EQ(b.camera.released, std::vector<int>{7});
+}
+
+TEST(AcquiredQueue, lateConsumerSkipsOldImagesOnlyLive) {
+  for (const bool wait : {false, true}) {
+    QueuedCamera b;
+    AcquiredQueue queue(b.cameras, wait);
+    for (FrameSlot slot = 0; slot < 6; ++slot) queue.push(frame(slot));
+    queue.finish();
+    Acquired item;
+    ASSERT_TRUE(queue.next(&item));
+    EXPECT_EQ(std::get<AcquiredFrame>(item).set.number, wait ? 0U : 2U);
+    EXPECT_EQ(queue.skipped_sets(), wait ? 0U : 2U);
+    EXPECT_EQ(b.camera.released.size(), wait ? 0U : 2U);
+  }
+}
+
+TEST(AcquiredQueue, fullQueueDropsOnlyReadingsLive) {
+  QueuedCamera b;
+  AcquiredQueue queue(b.cameras, false);
+  for (int i = 0; i < 300; ++i) queue.push(InsRecord{});
+  const std::uint64_t dropped = queue.dropped_readings();
+  EXPECT_EQ(dropped, 300U - queue.high_water());
+  std::thread producer([&] {
+    // The call waits for room.
+    queue.push(DeviceEvent{});
+    queue.finish();
+  });
+  std::size_t readings = 0, events = 0;
+  for (Acquired item; queue.next(&item);)
+    ++(std::holds_alternative<DeviceEvent>(item) ? events : readings);
+  producer.join();
+  EXPECT_EQ(readings, 300U - dropped);
+  EXPECT_EQ(events, 1U);
+}
+
+constexpr Duration kInterval = Duration::milliseconds(50);
+const HostStamp kHost(70'000'000'000);
+
+ClockMapperOptions exact() { return {.min_delay = Duration::milliseconds(1)}; }
+
+TEST(CameraClock, growingExposureIsNoDrift) {
+  CameraClock clock(exact());
+  for (int n = 0; n < 100; ++n) {
+    Frame frame;
+    frame.exposure = Duration::milliseconds(2) + Duration::microseconds(100) * n;
+    frame.exposure_start = DeviceStamp(0) + kInterval * n;
+    // A fixed time after the exposure's end.
+    frame.arrival = kHost + kInterval * n + frame.exposure + Duration::milliseconds(1) -
+                    Duration::milliseconds(2);
+    const MappedStamp start = clock.exposure_start(frame);
+    EXPECT_LE(magnitude(start.host - (kHost + kInterval * n)),
+              start.error + Duration::microseconds(1))
+        << n;
+  }
+  EXPECT_EQ(clock.resets(), 0U);
+}
+
+TEST(PairingTracker, cameraWithoutFramesIsNotReported) {
+  PairingTracker watch;
+  EXPECT_FALSE(watch.update(0, false, kHost));
+  watch.frame(0);
+  EXPECT_FALSE(watch.update(1, false, kHost));
+  const auto change = watch.update(0, false, kHost);
+  ASSERT_TRUE(change);
+  EXPECT_FALSE(change->verified);
 }
 
 }  // namespace

@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "drivers/iidc/identity.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/drivers/iidc/fake_bus.hpp"
 
 namespace vergence::iidc {
 namespace {
+
 namespace fs = std::filesystem;
 
 void add_node(const fs::path& root, const std::string& card, const std::string& name,
@@ -48,6 +50,22 @@ TEST(FirewireNodes, camerasAreRecognisedByTheirRom) {
   EXPECT_EQ(nodes[0].bus, nodes[1].bus);
   EXPECT_NE(nodes[0].bus, nodes[2].bus);
   EXPECT_STREQ(nodes[0].rom.model.data(), "Emulated IIDC 0");
+}
+
+TEST(Identity, guidIsGivenInHexOrAsSerialNumber) {
+  constexpr std::uint64_t kGuid = 0x00B0'9D01'00A1'2345;
+  EXPECT_EQ(guid_text(kGuid), "00b09d0100a12345");
+  EXPECT_TRUE(names_camera("", kGuid));
+  EXPECT_TRUE(names_camera("00b09d0100a12345", kGuid));
+  EXPECT_TRUE(names_camera("0x00B09D0100A12345", kGuid));
+  // The serial number is 0x00A12345.
+  EXPECT_TRUE(names_camera("10560325", kGuid));
+  EXPECT_TRUE(names_camera("F3-77", kGuid, "F3-77"));
+  EXPECT_FALSE(names_camera("10560326", kGuid));
+  EXPECT_FALSE(names_camera("F3-77", kGuid));
+  EXPECT_FALSE(names_camera("00b09d0100a1234", kGuid));
+  EXPECT_FALSE(names_camera("99999999999999999999999", kGuid));
+  EXPECT_FALSE(names_camera("0", 0));
 }
 
 }  // namespace

@@ -1,11 +1,10 @@
 #include "drivers/options/options.hpp"
 
-#include <fstream>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "tests/support/mentions.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace vergence {
 namespace {
@@ -96,17 +95,15 @@ TEST(CameraOptions, driverTakesOnlyItsKindAndValidValues) {
 }
 
 TEST(CameraOptions, documentationHasEveryRow) {
-  std::set<std::string> lines;
-  for (const char* page : {"gige", "iidc", "v4l2"}) {
-    std::ifstream file(std::string(VERGENCE_SOURCE_DIR) + "/drivers/" + page + "/README.md");
-    for (std::string line; std::getline(file, line);) lines.insert(line);
-  }
+  std::string pages;
+  for (const std::string page : {"gige", "iidc", "v4l2"})
+    pages += test::read_file(VERGENCE_SOURCE_DIR "/drivers/" + page + "/README.md");
   for (const char* driver : {"gige", "iidc-usb", "v4l2"})
     for (const OptionRow& r : option_rows(begin_of(driver))) {
       const std::string fallback = r.fallback.empty() ? "–" : r.fallback;
       const std::string line =
-          "| `" + r.name + "` | " + r.values + " | " + fallback + " | " + r.meaning + " |";
-      EXPECT_TRUE(lines.contains(line)) << line;
+          "\n| `" + r.name + "` | " + r.values + " | " + fallback + " | " + r.meaning + " |\n";
+      EXPECT_TRUE(test::contains(pages, line)) << line;
     }
 }
 

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
+#include "drivers/v4l2/settings.hpp"
+
 namespace vergence::v4l2 {
 namespace {
 
@@ -62,6 +64,18 @@ TEST(V4l2Controls, externalTriggerIsFoundByMenuNames) {
   EXPECT_EQ(trigger_on(menu({{0, "free_running"}, {1, "hardware"}})), 1);
   EXPECT_EQ(trigger_on(menu({{0, "off"}, {1, "on"}})), 1);
   EXPECT_EQ(trigger_on(integer(0, 1, 1)), 1);
+}
+
+TEST(V4l2Settings, exposureWithoutUnitsCannotBeChanged) {
+  ExposureSetting actual{Duration::milliseconds(3), 1};
+  EXPECT_EQ(change_exposure(Controls{}, Settings{}, {Duration::milliseconds(2), 0}, &actual),
+            DeviceStatus::unsupported);
+  Settings lost;
+  lost.exposure_id = 0x009a0902;
+  lost.exposure_unit_s = 1e-4;
+  EXPECT_EQ(change_exposure(Controls{}, lost, {Duration::milliseconds(2), 0}, &actual),
+            DeviceStatus::unsupported);
+  EXPECT_EQ(actual, (ExposureSetting{Duration::milliseconds(3), 1}));
 }
 
 }  // namespace

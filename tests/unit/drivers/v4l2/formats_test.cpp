@@ -47,9 +47,14 @@ TEST(V4l2Formats, lastRowNeedsNoPadding) {
       << "a last group of one pixel has its low bits, too";
 }
 
-/// Random samples of a depth are written as the kernel's documentation lays the format, and read
-/// back.
-class V4l2Luma : public ::testing::TestWithParam<std::uint32_t> {};
+/// A format as the kernel's documentation lays it: bits of a sample, and where its first byte is.
+struct Written {
+  std::uint32_t fourcc, depth;
+  std::size_t bytes_per_pixel = 2, offset = 0;
+};
+
+/// Random samples of a depth are written as such a format, and read back.
+class V4l2Luma : public ::testing::TestWithParam<Written> {};
 
 struct Laid {
   std::vector<std::uint8_t> bytes;
@@ -57,53 +62,33 @@ struct Laid {
   std::vector<std::uint8_t> grey;
 };
 
-Laid lay(std::uint32_t fourcc, int width, int height, std::size_t stride, Random* random) {
+Laid lay(const Written& f, int width, int height, std::size_t stride, Random* random) {
   Laid laid;
   laid.bytes.assign(stride * static_cast<std::size_t>(height), 0xEE);
   for (int y = 0; y < height; ++y) {
     std::uint8_t* row = laid.bytes.data() + stride * static_cast<std::size_t>(y);
     for (std::size_t x = 0; x < static_cast<std::size_t>(width); ++x) {
-      const std::uint32_t depth = fourcc == V4L2_PIX_FMT_Y10 || fourcc == V4L2_PIX_FMT_Y10P ? 10
-                                  : fourcc == V4L2_PIX_FMT_Y12                              ? 12
-                                  : fourcc == V4L2_PIX_FMT_Y14                              ? 14
-                                  : fourcc == V4L2_PIX_FMT_Y16                              ? 16
-                                                                                            : 8;
-      const std::uint32_t sample = random->below(1U << depth);
-      laid.grey.push_back(static_cast<std::uint8_t>(sample >> (depth - 8)));
-      switch (fourcc) {
-        case V4L2_PIX_FMT_GREY:
-        case V4L2_PIX_FMT_NV12:
-          row[x] = static_cast<std::uint8_t>(sample);
-          break;
-        case V4L2_PIX_FMT_Y10P:
-          row[x / 4 * 5 + x % 4] = static_cast<std::uint8_t>(sample >> 2U);
-          break;
-        case V4L2_PIX_FMT_YUYV:
-        case V4L2_PIX_FMT_YVYU:
-          row[2 * x] = static_cast<std::uint8_t>(sample);
-          break;
-        case V4L2_PIX_FMT_UYVY:
-        case V4L2_PIX_FMT_VYUY:
-          row[2 * x + 1] = static_cast<std::uint8_t>(sample);
-          break;
-        default:
-          row[2 * x] = static_cast<std::uint8_t>(sample);
-          row[2 * x + 1] = static_cast<std::uint8_t>(sample >> 8U);
-          break;
+      const std::uint32_t sample = random->below(1U << f.depth);
+      laid.grey.push_back(static_cast<std::uint8_t>(sample >> (f.depth - 8)));
+      if (f.fourcc == V4L2_PIX_FMT_Y10P) {
+        row[x / 4 * 5 + x % 4] = laid.grey.back();
+        continue;
       }
+      row[f.bytes_per_pixel * x + f.offset] = static_cast<std::uint8_t>(sample);
+      if (f.depth > 8) row[2 * x + 1] = static_cast<std::uint8_t>(sample >> 8U);
     }
   }
   return laid;
 }
 
 TEST_P(V4l2Luma, equalsTheWrittenLuma) {
-  Random random(GetParam());
-  const PixelFormat& f = format(GetParam());
+  Random random(GetParam().fourcc);
+  const PixelFormat& f = format(GetParam().fourcc);
   for (const int width : {1, 3, 4, 7, 64, 97, 640}) {
     const int height = 5;
     const std::size_t stride = min_row_bytes(f, width) + random.below(9),
                       to_stride = static_cast<std::size_t>(width) + 3;
-    const Laid laid = lay(f.fourcc, width, height, stride, &random);
+    const Laid laid = lay(GetParam(), width, height, stride, &random);
     std::vector<std::uint8_t> grey(to_stride * height, 0x55);
     to_grey(f, laid.bytes.data(), stride, width, height, grey.data(), to_stride);
     std::size_t i = 0;
@@ -117,12 +102,15 @@ TEST_P(V4l2Luma, equalsTheWrittenLuma) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, V4l2Luma,
-                         ::testing::Values(V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_Y10P,
-                                           V4L2_PIX_FMT_Y10, V4L2_PIX_FMT_Y12, V4L2_PIX_FMT_Y14,
-                                           V4L2_PIX_FMT_Y16, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_YVYU,
-                                           V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_VYUY),
-                         [](const auto& p) { return name_of(p.param); });
+INSTANTIATE_TEST_SUITE_P(
+    , V4l2Luma,
+    ::testing::Values(Written{V4L2_PIX_FMT_GREY, 8, 1}, Written{V4L2_PIX_FMT_NV12, 8, 1},
+                      Written{V4L2_PIX_FMT_Y10P, 10}, Written{V4L2_PIX_FMT_Y10, 10},
+                      Written{V4L2_PIX_FMT_Y12, 12}, Written{V4L2_PIX_FMT_Y14, 14},
+                      Written{V4L2_PIX_FMT_Y16, 16}, Written{V4L2_PIX_FMT_YUYV, 8},
+                      Written{V4L2_PIX_FMT_YVYU, 8}, Written{V4L2_PIX_FMT_UYVY, 8, 2, 1},
+                      Written{V4L2_PIX_FMT_VYUY, 8, 2, 1}),
+    [](const auto& p) { return name_of(p.param.fourcc); });
 
 TEST(V4l2Formats, wordsBeyondTheirDepthSaturate) {
   // A ten-bit sensor stores its samples in the low bits of Y16.

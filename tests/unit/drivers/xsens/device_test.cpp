@@ -168,8 +168,7 @@ TEST_P(BothGenerations, slowLineIsRefusedNamingTheNeededRate) {
   XsensRig rig(simulated(GetParam()));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok);
   EXPECT_EQ(rig.device->configure(400, nullptr), DeviceStatus::no_bandwidth);
-  EXPECT_TRUE(mentions(rig.device->last_error(), "115200 baud"));
-  EXPECT_TRUE(mentions(rig.device->last_error(), "ins.baud"));
+  EXPECT_TRUE(mentions(rig.device->last_error(), "115200 baud", "ins.baud"));
   EXPECT_EQ(rig.simulator->writes().outputs + rig.simulator->writes().layout +
                 rig.simulator->writes().period,
             0)
@@ -265,8 +264,6 @@ TEST_P(Stamps, errorIsBelow300usAfterTwentySeconds) {
             (r.host - rig.simulator->host_time(r.measured.ns() - origin)).to_seconds() * 1e6));
   }
   EXPECT_LE(test::quantile(errors_us, 0.99), 300);
-  RecordProperty("p50_us", static_cast<int>(test::quantile(errors_us, 0.5)));
-  RecordProperty("p99_us", static_cast<int>(test::quantile(errors_us, 0.99)));
 }
 
 INSTANTIATE_TEST_SUITE_P(

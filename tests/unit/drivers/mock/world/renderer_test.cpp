@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drivers/mock/world/detail/town.hpp"
+#include "tests/support/simd_targets.hpp"
 
 namespace vergence::mock {
 namespace {
@@ -178,12 +179,8 @@ TEST(Renderer, everySimdTargetDrawsTheSameImage) {
   const Transform T_town = looking_north({-1.9, 60, town->ground(-1.9, 60) + 1.7});
   RenderRequest noisy{.noise_seed = 3};
   Renderer renderer(town, Camera(lens(true)));
-  const auto targets = hwy::SupportedAndGeneratedTargets();
-  ASSERT_FALSE(targets.empty());
   RenderedImage first;
-  for (const std::int64_t target : targets) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  test::on_every_target([&](const char* target) {
     const RenderedImage p = render(&renderer, T_town, noisy);
     if (first.pixels.empty()) first = p;
     // Fused or not, a product rounds differently in the last bit: a grey value may round to its
@@ -192,13 +189,11 @@ TEST(Renderer, everySimdTargetDrawsTheSameImage) {
     int differing = 0;
     for (std::size_t i = 0; i < p.pixels.size(); ++i) {
       const int d = std::abs(p.pixels[i] - first.pixels[i]);
-      EXPECT_LE(d, 2) << hwy::TargetName(target) << " pixel " << i;
+      EXPECT_LE(d, 2) << target << " pixel " << i;
       differing += d > 0;
     }
-    EXPECT_LT(differing, static_cast<int>(p.pixels.size() / 200)) << hwy::TargetName(target);
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    EXPECT_LT(differing, static_cast<int>(p.pixels.size() / 200)) << target;
+  });
 }
 
 TEST(Renderer, oddSizesStayInsideTheirRows) {

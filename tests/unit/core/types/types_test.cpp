@@ -1,14 +1,47 @@
-#include "core/types/bayer.hpp"
+#include "core/types/time.hpp"
 
 #include <gtest/gtest.h>
 
 #include <array>
+#include <concepts>
 #include <vector>
 
 #include "core/math/random.hpp"
+#include "core/types/bayer.hpp"
+#include "core/types/calibration.hpp"
+#include "core/types/pose_sample.hpp"
 
 namespace vergence {
 namespace {
+
+template <class A, class B>
+concept Subtractable = requires(A a, B b) {
+  a - b;
+};
+static_assert(Subtractable<Stamp, Stamp>);
+static_assert(Subtractable<Stamp, Duration>);
+static_assert(!Subtractable<Stamp, HostStamp>, "two clocks have no difference");
+static_assert(!std::convertible_to<std::int64_t, Stamp>);
+static_assert(!std::convertible_to<std::int64_t, Duration>);
+
+TEST(Duration, secondsRoundToTheNearestNanosecond) {
+  EXPECT_EQ(Duration::seconds(0.049999872).ns(), 49'999'872);
+  EXPECT_EQ(Duration::seconds(-0.049999872).ns(), -49'999'872);
+  EXPECT_EQ(Duration::seconds(1.6e-9).ns(), 2);
+  EXPECT_EQ(Duration::seconds(-1.6e-9).ns(), -2);
+  EXPECT_EQ(Duration::seconds(0).ns(), 0);
+  EXPECT_DOUBLE_EQ(Duration::nanoseconds(1'500'000'000).to_seconds(), 1.5);
+}
+
+TEST(Intrinsics, equidistantIsDistortedWithoutCoefficients) {
+  Intrinsics k;
+  EXPECT_FALSE(k.has_distortion());
+  k.distortion[4] = 1e-3;
+  EXPECT_TRUE(k.has_distortion());
+  k = {};
+  k.kind = CameraModelKind::pinhole_equidistant;
+  EXPECT_TRUE(k.has_distortion());
+}
 
 /// The definition, pixel by pixel.
 int by_definition(const std::vector<std::uint8_t>& raw, int stride, int width, int height, int x,
