@@ -93,7 +93,7 @@ void evaluate(const RecordedSequence& drive_of, const std::string& what, std::si
   if (h.wrong_over_all > 0) fmt::print("  over 20 {}", h.wrong_over_all);
   if (h.wrong > 0)
     fmt::print("  WRONG {} from {}: {:.3f} m, {:.3f} deg over {} frames", h.wrong, h.first_wrong,
-               h.first_error.ins_path_m, h.first_error.turn_rad * 180 / std::numbers::pi,
+               h.first_error.shift_m, h.first_error.turn_rad * 180 / std::numbers::pi,
                h.first_over);
   fmt::print("\n");
   std::fflush(stdout);
@@ -142,8 +142,8 @@ void run(RecordedSequence d, const std::string& filter, bool events, Tally* tall
   const std::vector<test::EvaluatedPose> untouched = evaluated_poses(drive(d.sequence, c, own));
   const test::MotionError usual = test::normal_errors(untouched, d.truth)[test::kIntegrityFrames];
   fmt::print("{:12s} normal error over {} frames: {:.3f} m, {:.3f} deg\n", d.name,
-             test::kIntegrityFrames, usual.ins_path_m, usual.turn_rad * 180 / std::numbers::pi);
-  if (!(usual.ins_path_m < most_normal(d.name)) || !found.rig) {
+             test::kIntegrityFrames, usual.shift_m, usual.turn_rad * 180 / std::numbers::pi);
+  if (!(usual.shift_m < most_normal(d.name)) || !found.rig) {
     fmt::print("{}: NOTHING CAN BE JUDGED: {}\n", d.name,
                found.rig ? "that is more than it was" : "no calibration from the sequence");
     ++tally->unfit;

@@ -15,7 +15,8 @@ std::optional<MotionError> motion_error(const EvaluatedPose& from, const Evaluat
   const Transform *a = true_pose(truth, from.stamp), *b = true_pose(truth, to.stamp);
   if (a == nullptr || b == nullptr) return {};
   const Transform estimate = from.T_world_left.inverse() * to.T_world_left, is = a->inverse() * *b;
-  return MotionError{(estimate.t - is.t).norm(), rotation_angle(estimate.R * is.R.transpose())};
+  return MotionError{(estimate.t - is.t).norm(), rotation_angle(estimate.R * is.R.transpose()),
+                     is.t.norm()};
 }
 
 /// 0: not known, or no motion.
@@ -23,7 +24,7 @@ double times_normal(const std::optional<MotionError>& error, const EvaluatedPose
                     const EvaluatedPose& to, const NormalError& normal) {
   if (!error || from.stamp == to.stamp) return 0;
   const MotionError usual = normal(from.stamp, to.stamp);
-  return std::max(error->ins_path_m / usual.ins_path_m,
+  return std::max(error->shift_m / std::max(usual.shift_m, kMinNormalShift * error->length_m),
                   error->turn_rad / std::max(usual.turn_rad, kMinNormalTurn));
 }
 
@@ -32,13 +33,13 @@ class Mean {
  public:
   void add(const std::optional<MotionError>& e) {
     if (!e) return;
-    sum_.ins_path_m += e->ins_path_m;
+    sum_.shift_m += e->shift_m;
     sum_.turn_rad += e->turn_rad;
     ++count_;
   }
   [[nodiscard]] MotionError value() const {
     const double n = std::max(1, count_);
-    return {sum_.ins_path_m / n, sum_.turn_rad / n};
+    return {.shift_m = sum_.shift_m / n, .turn_rad = sum_.turn_rad / n};
   }
 
  private:
@@ -87,8 +88,8 @@ NormalError normal_error_there(std::vector<EvaluatedPose> poses, app::Trajectory
           if (poses[i].stamp >= to - kAround && poses[i].stamp <= to + kAround)
             around.add(motion_error(poses[i - frames], poses[i], truth));
         const MotionError here = around.value();
-        return MotionError{std::max(mean[frames].ins_path_m, here.ins_path_m),
-                           std::max(mean[frames].turn_rad, here.turn_rad)};
+        return MotionError{.shift_m = std::max(mean[frames].shift_m, here.shift_m),
+                           .turn_rad = std::max(mean[frames].turn_rad, here.turn_rad)};
       };
 }
 

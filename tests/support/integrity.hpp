@@ -14,7 +14,9 @@
 /// A pose is wrong when the motion over the last kIntegrityFrames frames, its way or its turn, is
 /// off by more than kHonestyTimes what is normal: what the untouched drive is off by over as long a
 /// time, on its mean or around the same place, whichever is more. Corners are several times harder
-/// than the rest: a focal length that is off turns every corner too far.
+/// than the rest: a focal length that is off turns every corner too far. Less than `ok` claims is
+/// never wrong: the depths of a calibration that was found in the drive are verified to 2 %
+/// (max_depth_error_percent), and so are the lengths of its motions.
 namespace vergence::test {
 
 // The first poses have fewer frames.
@@ -30,6 +32,9 @@ inline constexpr double kMinNormalTurn = 0.02 * std::numbers::pi / 180;
 /// `truth`.
 [[nodiscard]] const Transform* true_pose(const app::Trajectory& truth, Stamp stamp);
 
+/// An error of the way that is normal at least, as a share of it: five times it are 2 %.
+inline constexpr double kMinNormalShift = 0.004;
+
 struct EvaluatedPose {
   Stamp stamp{};
   PoseStatus status = PoseStatus::lost;
@@ -37,7 +42,9 @@ struct EvaluatedPose {
 };
 
 struct MotionError {
-  double ins_path_m = 0, turn_rad = 0;
+  double shift_m = 0, turn_rad = 0;
+  /// Length of the true motion.
+  double length_m = 0;
 };
 /// Mean error of the motion by the number of frames that it is over; of poses that are not `lost`
 /// and whose truth is known.

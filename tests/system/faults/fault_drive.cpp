@@ -93,7 +93,7 @@ Untouched untouched_drive() {
                          [status](const EvaluatedPose& p) { return p.status == status; });
   };
   u.normal = normal_error_there(poses, u.drive.truth);
-  const double usual = normal_errors(poses, u.drive.truth)[kIntegrityFrames].ins_path_m;
+  const double usual = normal_errors(poses, u.drive.truth)[kIntegrityFrames].shift_m;
   if (u.drive.code != 0 || !u.drive.whole || count(PoseStatus::lost) > 0 ||
       count(PoseStatus::ok) < kOk || !(usual > 0) || usual > kNormal)
     u.unfit = fmt::format("the untouched drive: exit {}, {}, {} ok, {} lost, {:.3f} m off\n{}",
