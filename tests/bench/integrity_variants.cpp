@@ -211,6 +211,8 @@ constexpr IntegrityVariant kTimes[] = {
     {"right one frame late", nullptr, [](Pairs* p) { lag_right(p, 0); }},
     {"right one frame late half-way", nullptr, [](Pairs* p) { lag_right(p, p->size() / 2); }},
     {"every tenth interval doubled", nullptr, leave_out_every_tenth},
+    {"every second pair", nullptr, keep_every<2>},
+    {"every third pair", nullptr, keep_every<3>},
     {"even 1 Hz", nullptr, [](Pairs* p) { restamp(p, Duration::milliseconds(1000)); }},
     {"one frame 2.5 rows off",
      [](M*, M* r, N i, N n) {
