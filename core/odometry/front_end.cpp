@@ -6,6 +6,7 @@
 #include <functional>
 #include <string_view>
 
+#include "core/features/image_shift.hpp"
 #include "core/features/patch.hpp"
 #include "core/odometry/detail/warp.hpp"
 
@@ -70,7 +71,30 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   described_ = arena.make<features::Descriptor>(kMaxPoints, "descriptors");
   free_matches_ = BoundedVector<FreeMatch>(arena.make<FreeMatch>(n, "free matches"));
   if (options.init_features != 0) blobs_ = BlobMatcher(width, height, arena);
+  const int shrink = 1 << (pyramids_[0].levels() - 1);
+  const auto coarsest = [shrink](int side) {
+    return static_cast<std::size_t>((side + shrink - 1) / shrink);
+  };
+  kept_ = arena.make<std::uint8_t>(
+      coarsest(rig.intrinsics[0].width) * coarsest(rig.intrinsics[0].height), "left image before");
   rebuild_lenses();
+}
+
+void FrontEnd::keep_left_image() noexcept {
+  if (!has_camera(structured_, 0)) return;
+  const ImageView& coarsest = pyramids_[0].level(pyramids_[0].levels() - 1);
+  for (int y = 0; y < coarsest.height; ++y)
+    std::copy_n(coarsest.row(y), coarsest.width, kept_.begin() + y * coarsest.width);
+}
+
+Mat3 FrontEnd::turn_since_kept() const noexcept {
+  if (!has_camera(structured_, 0)) return Mat3::Identity();
+  const int l = pyramids_[0].levels() - 1;
+  const ImageView& now = pyramids_[0].level(l);
+  const ImageView before{kept_.data(), now.width, now.height, now.width};
+  const Vec2 shift = std::ldexp(1.0, l) * features::image_shift(before, now);
+  const Intrinsics& lens = rig_.intrinsics[0];
+  return exp_so3({-shift.y() / lens.fy, shift.x() / lens.fx, 0});
 }
 
 void FrontEnd::rebuild_lenses() noexcept {

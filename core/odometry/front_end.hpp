@@ -84,6 +84,12 @@ class FrontEnd {
   /// Builds the pyramids of a frame's images.
   [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;
 
+  /// Keeps this frame's left image as the one that turn_since_kept() compares with.
+  void keep_left_image() noexcept;
+  /// Rotation of the left camera since the kept image, by the shift of the whole image: rough, but
+  /// up to a third of the field of view. Takes some milliseconds.
+  [[nodiscard]] Mat3 turn_since_kept() const noexcept;
+
   /// Follows about `sample` evenly chosen active points from a rough prediction, which may be off
   /// by some 8·2^coarsest px, from pyramid level `coarsest` down.
   void follow_sample(Map& map, const Transform& T_left_world, int sample, int coarsest) noexcept;
@@ -206,6 +212,8 @@ class FrontEnd {
   std::array<UndistortedCamera, kMaxCameras> lenses_{};
   std::array<features::Mask, kMaxCameras> masks_{};
   std::array<features::Pyramid, kMaxCameras> pyramids_{};
+  // Coarsest level of the left image that was kept.
+  std::span<std::uint8_t> kept_;
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;
   std::span<NewPoint> fresh_;

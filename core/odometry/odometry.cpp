@@ -148,6 +148,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
       out.relinked = true;
     }
     begin_map(frame, images, predicted, dt, &out);
+    if (out.posed) front_end_.keep_left_image();
     return out;
   }
 
@@ -165,6 +166,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     return out;
   }
   settle_points(fit);
+  front_end_.keep_left_image();
   frames_lost_ = 0;
   out.posed = true;
   out.inliers = fit.inliers;

@@ -35,18 +35,17 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
-  // Try the prediction, then with a larger range, then the pose of the last frame.
-  struct Attempt {
-    const Transform* start;
-    int coarsest;
-  };
+  // Try the prediction, then with a larger range, then the last pose as the image has turned since.
   PoseFit best;
-  for (const Attempt& a :
-       {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&motion_.T_left_world(), 3}}) {
+  for (const int attempt : {0, 1, 2}) {
+    const int coarsest = attempt == 0 ? 2 : 3;
+    Transform start = predicted;
+    if (attempt == 2)
+      start = Transform{front_end_.turn_since_kept(), Vec3::Zero()} * motion_.T_left_world();
     // A quarter of the points is enough for MLESAC, for a third of the work.
-    front_end_.follow_sample(map_, *a.start, options_.features / 4, a.coarsest);
+    front_end_.follow_sample(map_, start, options_.features / 4, coarsest);
     clock.mark(Stage::track);
-    fit = this->fit(*a.start, true);
+    fit = this->fit(start, true);
     clock.mark(Stage::pose);
     if (sample_agrees(fit, kChanceShare) && fit.inliers > best.inliers) best = fit;
     if (sample_agrees(fit, kRigidShare)) break;

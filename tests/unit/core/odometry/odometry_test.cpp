@@ -234,5 +234,25 @@ TEST(OdometryReasons, failedRebuildIsDegraded) {
   EXPECT_NE(out.reason, Reason::none);
 }
 
+// 15° in one frame move the image by 75 px, more than the 64 px that points are followed over.
+TEST(Odometry, suddenTurnIsFollowedByTheShiftOfTheImage) {
+  constexpr int kTurn = 8;
+  const Transform turn{exp_so3({0, 0.26, 0}), Vec3::Zero()};
+  test::Corridor corridor;
+  test::LinkedOdometry f(corridor.rig());
+  auto turned = corridor.rig().T_camera_left;
+  for (Transform& T : turned) T = T * turn;
+  for (int i = 0; i < kTurn + 3; ++i) {
+    const FrameOutcome out =
+        f.odometry.process(i < kTurn ? corridor.frame(i) : corridor.frame(i, turned));
+    ASSERT_TRUE(out.posed) << i;
+    EXPECT_FALSE(out.relocalised) << i;
+    if (i < kTurn) continue;
+    const Transform truth =
+        turn * test::Corridor::T_world_left(i).inverse() * test::Corridor::T_world_left(0);
+    EXPECT_LT(log_so3(out.T_left_world.R * truth.R.transpose()).norm(), 0.01) << i;
+  }
+}
+
 }  // namespace
 }  // namespace vergence::odometry
