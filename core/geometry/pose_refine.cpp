@@ -80,15 +80,14 @@ bool PoseRefiner::descend(RefinedPose* pose) noexcept {
   pose->scale = residual_scale(pose->T_left_world);
   detail::PoseProblem::Sums now = problem_.sums(pose->T_left_world, pose->scale, kHuber);
   double damping = 0;
-  int failures = 0, steps = 0;
+  int failures = 0;
   bool rescaled = false;
-  while (steps < kMaxSteps) {
+  for (int steps = 0; steps < kMaxSteps; ++steps) {
     if (!rescaled && steps >= kRescaleAfter && failures == 0) {
       rescaled = true;
       pose->scale = residual_scale(pose->T_left_world);
       now = problem_.sums(pose->T_left_world, pose->scale, kHuber);
     }
-    ++steps;
     Mat6 H = now.H;
     H.diagonal() *= 1.0 + damping;
     Vec6 delta;
@@ -117,7 +116,6 @@ bool PoseRefiner::descend(RefinedPose* pose) noexcept {
     pose->scale = residual_scale(pose->T_left_world);
     now = problem_.sums(pose->T_left_world, pose->scale, kHuber);
   }
-  pose->steps += steps;
   pose->information = now.H;
   return true;
 }
@@ -154,7 +152,6 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
   points_ = o.size();
   std::fill_n(flags_.begin(), points_, std::uint8_t{0});
   problem_.gather(o);
-  out.observations = static_cast<int>(problem_.observations());
   for (int k = 0; k < problem_.cameras(); ++k)
     for (std::size_t i = 0; i < problem_.count(k); ++i) {
       const bool counts = use.empty() || ((use[problem_.point(k, i)] >> k) & 1U) != 0;

@@ -23,8 +23,6 @@ struct RefinedPose {
 
   /// Number of points with every usable observation below the χ² threshold.
   int inliers = 0;
-  int observations = 0;
-  int steps = 0;
 };
 
 /// Refines the pose of a rig over all cameras' observations with fixed points: Levenberg–Marquardt

@@ -107,12 +107,6 @@ void PoseProblem::evaluate(const Transform& T_left_world) noexcept {
   }
 }
 
-std::size_t PoseProblem::observations() const noexcept {
-  std::size_t n = 0;
-  for (int k = 0; k < cameras_; ++k) n += count(k);
-  return n;
-}
-
 Transform moved(const Transform& T_left_world, const Vec6& delta) noexcept {
   const Mat3 turn = exp_so3(delta.head<3>());
   return {normalised(turn * T_left_world.R), turn * T_left_world.t + delta.tail<3>()};

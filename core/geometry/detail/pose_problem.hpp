@@ -49,7 +49,6 @@ class PoseProblem {
   [[nodiscard]] std::size_t count(int camera) const noexcept {
     return sets_[static_cast<std::size_t>(camera)].count;
   }
-  [[nodiscard]] std::size_t observations() const noexcept;
   [[nodiscard]] std::span<const double> errors(int camera) const noexcept {
     const Set& s = sets_[static_cast<std::size_t>(camera)];
     return s.error.first(s.count);
@@ -58,7 +57,6 @@ class PoseProblem {
   [[nodiscard]] std::size_t point(int camera, std::size_t i) const noexcept {
     return sets_[static_cast<std::size_t>(camera)].point[i];
   }
-  [[nodiscard]] std::size_t capacity() const noexcept { return sets_[0].point.size(); }
 
  private:
   struct Set {
