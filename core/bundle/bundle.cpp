@@ -239,7 +239,6 @@ class Solve {
   void write_back() noexcept {
     const BundleState& s = best();
     result_.final_cost = cost_;
-    result_.damping = damping_;
     result_.rms_px =
         problem_.observations.empty()
             ? 0

@@ -171,8 +171,6 @@ struct BundleResult {
   double final_cost = 0;
   /// Root mean of |ε|² over observations, both coordinates together, unweighted.
   double rms_px = 0;
-  /// Final λ.
-  double damping = 0;
 
   /// True if covariances were requested and the undamped system is positive definite.
   bool has_covariance = false;

@@ -162,7 +162,7 @@ void RigSolver::drop_outliers(double limit) noexcept {
   observations_.truncate(kept);
 }
 
-BundleResult RigSolver::readjust(BundleOptions how, bool last, RigSolution* s) noexcept {
+BundleResult RigSolver::readjust(BundleOptions how, bool last) noexcept {
   const double scale = residual_scale();
   drop_outliers(kOutlierSigmas * scale);
   how.loss = BundleLoss::cauchy;
@@ -170,22 +170,19 @@ BundleResult RigSolver::readjust(BundleOptions how, bool last, RigSolution* s) n
   how.max_steps = last ? kMaxSteps : 8;
   how.tolerance_sigmas = last ? kPrecise : kRough;
   how.covariance = how.pose_covariance = last;
-  const BundleResult r = adjust(how);
-  s->steps += r.steps;
-  return r;
+  return adjust(how);
 }
 
 /// Solves with Huber's loss, then twice with Cauchy's after removing outliers.
-BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexcept {
+BundleResult RigSolver::adjust_robustly(BundleOptions how) noexcept {
   how.loss = BundleLoss::huber;
   how.loss_threshold = kLossThreshold;
   how.max_steps = 12;
   how.tolerance_sigmas = kRough;
   BundleResult r = adjust(how);
-  s->steps = r.steps;
   for (const bool last : {false, true}) {
     if (!r.usable()) return r;
-    r = readjust(how, last, s);
+    r = readjust(how, last);
   }
   return r;
 }
@@ -204,8 +201,7 @@ bool RigSolver::finish(const BundleResult& r, RigSolution* s) noexcept {
 
 RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   const auto start = std::chrono::steady_clock::now();
-  RigSolution s;
-  s.rig = request.rig;
+  RigSolution s{.rig = request.rig};
   for (int k = 0; k < count_; ++k) {
     const auto c = static_cast<std::size_t>(k);
     cameras_[c] = Camera(request.rig.intrinsics[c]);
@@ -220,7 +216,7 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   make_points();
   if (points_.size() < static_cast<std::size_t>(kMinTracks)) return s;
   hold_pieces();
-  const BundleResult r = adjust_robustly(bundle_options(request, false), &s);
+  const BundleResult r = adjust_robustly(bundle_options(request, false));
   if (r.converged()) describe(&s);
   if (finish(r, &s)) {
     // Limit the sum, which grows over months.
@@ -234,10 +230,9 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
 
 RigSolution RigSolver::free_focal_lengths(RigSolveRequest request) noexcept {
   const auto start = std::chrono::steady_clock::now();
-  RigSolution s;
-  s.rig = request.rig;
+  RigSolution s{.rig = request.rig};
   request.known = nullptr;
-  (void)finish(readjust(bundle_options(request, true), true, &s), &s);
+  (void)finish(readjust(bundle_options(request, true), true), &s);
   s.solve_ms = milliseconds_since(start);
   return s;
 }

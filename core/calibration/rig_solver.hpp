@@ -47,7 +47,6 @@ struct RigSolution {
   int frames = 0;
   int tracks = 0;
   int observations = 0;
-  int steps = 0;
 
   /// Number of tracks nearer than CalibrationOptions::near_baselines.
   int near = 0;
@@ -71,7 +70,7 @@ struct RigSolution {
 ///     RigSolver solver(options, monitor, 2, features, arena);
 ///     solver.log().begin(frame);  // each posed frame and its observations
 ///     for (const LoggedObservation& seen : observations) solver.log().push(seen);
-///     const RigSolution solution = solver.solve(rig);
+///     const RigSolution solution = solver.solve({.rig = rig});
 ///     if (solution.status == RigSolveStatus::ok) use(solution.rig, solution.rig.covariance);
 ///
 /// Threads  log() is filled by the estimator's thread while no solve runs; solve() runs on the
@@ -86,9 +85,6 @@ class RigSolver {
 
   [[nodiscard]] TrackLog& log() noexcept { return log_; }
   [[nodiscard]] RigSolution solve(const RigSolveRequest& request) noexcept;
-  [[nodiscard]] RigSolution solve(const RigCalibration& rig) noexcept {
-    return solve(RigSolveRequest{rig});
-  }
   /// Continues the last solve(), which was of `request` and successful, with every focal length
   /// free, including the left camera's, and without `request.known`, which assumes them.
   [[nodiscard]] RigSolution free_focal_lengths(RigSolveRequest request) noexcept;
@@ -113,10 +109,10 @@ class RigSolver {
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
   [[nodiscard]] BundleOptions bundle_options(const RigSolveRequest& request,
                                              bool focal_lengths) const noexcept;
-  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, RigSolution* s) noexcept;
+  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how) noexcept;
   /// Removes the outliers of the last adjustment and adjusts again with Cauchy's loss. `last`: to
   /// the end, with covariances.
-  [[nodiscard]] BundleResult readjust(BundleOptions how, bool last, RigSolution* s) noexcept;
+  [[nodiscard]] BundleResult readjust(BundleOptions how, bool last) noexcept;
   /// Sets status, rig and sigmas. Returns true if they can be used.
   bool finish(const BundleResult& r, RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;

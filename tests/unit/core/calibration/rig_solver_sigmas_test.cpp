@@ -40,7 +40,7 @@ TEST(RigSolverSigmas, sigmasMatchErrorsOverFiftyDrives) {
     FeatureDrive drive(o);
     s.solver.log().clear();
     const double driven = log_drive(drive, kFrames, {2e-3, 0.02, 5e-3, 0.02}, s.solver.log());
-    const RigSolution found = s.solver.solve(rig_of(o));
+    const RigSolution found = s.solver.solve({.rig = rig_of(o)});
     EXPECT_EQ(found.status, RigSolveStatus::ok) << i;
     const Vec5 e = five_errors(found.rig, o.T_right_left);
     const Mat5 C = five_covariance(found.rig.covariance_total[1]);

@@ -34,7 +34,7 @@ struct Logged : SolverInArena {
 
 RigSolution solve(const FeatureDriveOptions& drive_options, const CalibrationOptions& o,
                   const RigCalibration& rig) {
-  return Logged(drive_options, 40, o).solver.solve(rig);
+  return Logged(drive_options, 40, o).solver.solve({.rig = rig});
 }
 
 TEST(RigSolver, exactTracksGiveTheExactTransform) {
@@ -124,7 +124,7 @@ TEST(RigSolver, scaleSigmaIsIndependentOfTheWorldOrigin) {
     Logged s(drive, 40, held_by_tracks());
     const Transform moved{exp_so3({0.1, 0.7, -0.2}), {30, -5, -20}};
     if (i == 1) s.each_frame([&](auto& f) { f.T_left_world = f.T_left_world * moved; });
-    const RigSolution solution = s.solver.solve(rig_of(drive));
+    const RigSolution solution = s.solver.solve({.rig = rig_of(drive)});
     ASSERT_EQ(solution.status, RigSolveStatus::ok);
     sigma[i] = solution.rig.scale_sigma;
   }
@@ -144,7 +144,7 @@ TEST(RigSolver, scaleSigmaIsOfTheNewestConnectedFrames) {
       for (auto& seen : frame.observations) seen.track += 1'000'000;
     };
     if (pieces == 2) s.each_frame(renumber, 20);
-    const RigSolution solution = s.solver.solve(rig_of(drive));
+    const RigSolution solution = s.solver.solve({.rig = rig_of(drive)});
     ASSERT_EQ(solution.status, RigSolveStatus::ok);
     sigma[pieces - 1] = solution.rig.scale_sigma;
   }
@@ -160,11 +160,12 @@ TEST(RigSolver, solveIsIndependentOfThePreviousOne) {
     return o;
   }();
   Logged used(first, 50), fresh(other, 30);
-  (void)used.solver.solve(rig_of(first));
+  (void)used.solver.solve({.rig = rig_of(first)});
   used.solver.log().clear();
   FeatureDrive again(other);
   log_drive(again, 30, kRough, used.solver.log());
-  const RigSolution s = used.solver.solve(rig_of(other)), t = fresh.solver.solve(rig_of(other));
+  const RigSolution s = used.solver.solve({.rig = rig_of(other)}),
+                    t = fresh.solver.solve({.rig = rig_of(other)});
   ASSERT_EQ(s.status, RigSolveStatus::ok);
   EXPECT_EQ(s.rig.T_camera_left[1].R, t.rig.T_camera_left[1].R);
   EXPECT_EQ(s.rig.T_camera_left[1].t, t.rig.T_camera_left[1].t);
@@ -183,7 +184,8 @@ TEST(RigSolver, lagOfTheSecondOrThirdCameraIsFound) {
     for (const int lag : {0, 1}) {
       drive.lags = {{0, 1.0 * lag}};
       Logged s(drive, 110, o, three ? &second : nullptr);
-      const RigSolution solution = s.solver.solve(three ? rig_of(drive, second) : rig_of(drive));
+      const RigSolution solution =
+          s.solver.solve({.rig = three ? rig_of(drive, second) : rig_of(drive)});
       ASSERT_EQ(solution.status, RigSolveStatus::ok) << three << ' ' << lag;
       EXPECT_EQ(solution.lag_frames, lag) << three;
     }
@@ -214,27 +216,27 @@ TEST(RigSolver, frameWithoutEveryPoseIsNoCandidate) {
   auto& unplaced = s.solver.log().frame(30);
   unplaced.T_camera_left[2] = Transform{};
   unplaced.reprojection_px = 0.1;
-  EXPECT_EQ(s.solver.solve(rig_of(drive, second)).status, RigSolveStatus::ok);
+  EXPECT_EQ(s.solver.solve({.rig = rig_of(drive, second)}).status, RigSolveStatus::ok);
   s.each_frame([](auto& f) { f.T_camera_left[2] = Transform{}; });
-  EXPECT_EQ(s.solver.solve(rig_of(drive, second)).status, RigSolveStatus::no_candidate);
+  EXPECT_EQ(s.solver.solve({.rig = rig_of(drive, second)}).status, RigSolveStatus::no_candidate);
 }
 
 TEST(RigSolver, insufficientTracksGiveTheirStatus) {
   const FeatureDriveOptions drive = exact_drive();
   const RigCalibration rig = rig_of(drive);
   SolverInArena empty(held());
-  EXPECT_EQ(empty.solver.solve(rig).status, RigSolveStatus::no_candidate);
+  EXPECT_EQ(empty.solver.solve({.rig = rig}).status, RigSolveStatus::no_candidate);
 
   Logged linked(drive, 30);
   linked.each_frame([](auto& f) { f.unlinked = false; });
-  EXPECT_EQ(linked.solver.solve(rig).status, RigSolveStatus::no_candidate)
+  EXPECT_EQ(linked.solver.solve({.rig = rig}).status, RigSolveStatus::no_candidate)
       << "no frame measured the cameras each for itself";
 
   Logged one_eyed(drive, 30);
   one_eyed.each_frame([](auto& f) {
     for (auto& s : f.observations) s.cameras = 1;
   });
-  EXPECT_EQ(one_eyed.solver.solve(rig).status, RigSolveStatus::too_few_tracks);
+  EXPECT_EQ(one_eyed.solver.solve({.rig = rig}).status, RigSolveStatus::too_few_tracks);
 
   Logged garbage(drive, 30);
   Random random(3);
@@ -244,7 +246,7 @@ TEST(RigSolver, insufficientTracksGiveTheirStatus) {
         p = Eigen::Vector2f(static_cast<float>(random.uniform(0, 1023)),
                             static_cast<float>(random.uniform(0, 767)));
   });
-  const RigSolution g = garbage.solver.solve(rig);
+  const RigSolution g = garbage.solver.solve({.rig = rig});
   EXPECT_NE(g.status, RigSolveStatus::ok) << g.tracks << " tracks";
 }
 
