@@ -14,8 +14,7 @@ double mean_squared_difference(const ImageView& before, const ImageView& now, in
   long long sum = 0, square = 0, n = 0;
   for (int y = std::max(0, -dy); y < before.height - std::max(0, dy); y += kStep) {
     const std::uint8_t *a = before.row(y), *b = now.row(y + dy) + dx;
-    const int end = before.width - std::max(0, dx);
-    for (int x = std::max(0, -dx); x < end; x += kStep, ++n) {
+    for (int x = std::max(0, -dx); x < before.width - std::max(0, dx); x += kStep, ++n) {
       const int d = b[x] - a[x];
       sum += d;
       square += d * d;
@@ -30,9 +29,8 @@ double mean_squared_difference(const ImageView& before, const ImageView& now, in
 Vec2 image_shift(const ImageView& before, const ImageView& now) noexcept {
   Vec2 best = Vec2::Zero();
   double least = std::numeric_limits<double>::infinity();
-  const int right = before.width / 3, down = before.height / 3;
-  for (int dy = -down; dy <= down; ++dy)
-    for (int dx = -right; dx <= right; ++dx) {
+  for (int dy = -before.height / 3; dy <= before.height / 3; ++dy)
+    for (int dx = -before.width / 3; dx <= before.width / 3; ++dx) {
       const double difference = mean_squared_difference(before, now, dx, dy);
       if (!(difference < least)) continue;
       least = difference;

@@ -72,11 +72,10 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   free_matches_ = BoundedVector<FreeMatch>(arena.make<FreeMatch>(n, "free matches"));
   if (options.init_features != 0) blobs_ = BlobMatcher(width, height, arena);
   const int shrink = 1 << (pyramids_[0].levels() - 1);
-  const auto coarsest = [shrink](int side) {
-    return static_cast<std::size_t>((side + shrink - 1) / shrink);
-  };
-  kept_ = arena.make<std::uint8_t>(
-      coarsest(rig.intrinsics[0].width) * coarsest(rig.intrinsics[0].height), "left image before");
+  kept_ =
+      arena.make<std::uint8_t>(static_cast<std::size_t>((rig.intrinsics[0].width / shrink + 1) *
+                                                        (rig.intrinsics[0].height / shrink + 1)),
+                               "left image before");
   rebuild_lenses();
 }
 
@@ -91,8 +90,8 @@ Mat3 FrontEnd::turn_since_kept() const noexcept {
   if (!has_camera(structured_, 0)) return Mat3::Identity();
   const int l = pyramids_[0].levels() - 1;
   const ImageView& now = pyramids_[0].level(l);
-  const ImageView before{kept_.data(), now.width, now.height, now.width};
-  const Vec2 shift = std::ldexp(1.0, l) * features::image_shift(before, now);
+  const Vec2 shift = std::ldexp(1.0, l) *
+                     features::image_shift({kept_.data(), now.width, now.height, now.width}, now);
   const Intrinsics& lens = rig_.intrinsics[0];
   return exp_so3({-shift.y() / lens.fy, shift.x() / lens.fx, 0});
 }
