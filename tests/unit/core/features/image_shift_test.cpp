@@ -22,6 +22,15 @@ TEST(ImageShift, shiftIsFoundWhateverTheBrightness) {
   }
 }
 
+// The coarsest level of a camera of five megapixels.
+TEST(ImageShift, largeImagesAreSearchedInSteps) {
+  const Texture texture(6, 40, 200);
+  const Vec2 shift(31, -20);
+  const Image before = draw(306, 256, texture);
+  const Image now = draw(306, 256, [&](const Vec2& p) { return texture(p - shift); });
+  EXPECT_LE((image_shift(before.view(), now.view()) - shift).lpNorm<Eigen::Infinity>(), 3);
+}
+
 TEST(ImageShift, emptyImagesHaveNone) { EXPECT_EQ(image_shift({}, {}), Vec2::Zero()); }
 
 }  // namespace
