@@ -207,7 +207,7 @@ INSTANTIATE_TEST_SUITE_P(
             }},
         Way{"eventsThatNeverCame", 0.1, true, [](Random*, Bytes* bytes) { bytes->clear(); },
             [](const Outcome& o) {
-              // One that was the last of all is not missed before somebody says that there was one.
+              // A lost pulse that was the last one is only noticed with the next report.
               EXPECT_GE(o.statistics.lost + 1, o.events);
               EXPECT_LE(o.statistics.lost, o.events);
             }},
@@ -226,7 +226,7 @@ TEST(InvalidInputBoard, clockSetBackIsFoundAndPulsesContinue) {
   EXPECT_EQ(rig.disconnects, 0);
   for (std::size_t i = 1; i < all.size(); ++i) ASSERT_GT(all[i].number, all[i - 1].number);
   EXPECT_GT(all.back().number, 880U);
-  EXPECT_LE(rig.device->statistics().lost, 2U) << "until three pings have told, 30 ms";
+  EXPECT_LE(rig.device->statistics().lost, 2U) << "until three pings are answered, 30 ms";
 }
 
 TEST(InvalidInputBoard, withoutPongsArrivalsGiveTheTime) {

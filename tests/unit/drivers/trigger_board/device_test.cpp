@@ -336,7 +336,8 @@ TEST(Driver, opensByPortSerialNumberOrTheOnlyBoard) {
   EXPECT_NE(driver.open("/dev/ttyACM0", &s), nullptr);
   m.add_board("/dev/ttyACM1", 0xBB);
   EXPECT_EQ(driver.open("", &s), nullptr);
-  EXPECT_EQ(s, DeviceStatus::bad_configuration) << "which of the two nobody has said";
+  EXPECT_EQ(s, DeviceStatus::bad_configuration)
+      << "the configuration does not say which of the two";
   EXPECT_TRUE(test::mentions(driver.last_error(), "trigger.port"));
   const auto one = driver.open("30002b000b513336343931bb", &s);
   ASSERT_NE(one, nullptr) << driver.last_error();
