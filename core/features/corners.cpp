@@ -26,9 +26,11 @@ struct Grid {
 
 /// Best unmasked local maximum of the block's scores without its outer ring; score 0 if there is
 /// none. (x0, y0): the block's first pixel in the image.
-Corner best_corner(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
+Corner best_corner(const float* score, const float* bound, int x0, int y0, int w, int h,
+                   const Mask* mask) noexcept {
   Corner best;
   for (int y = 1; y < h - 1; ++y) {
+    if (!(bound[y] > best.score)) continue;
     const float* s = score + y * detail::kMaxBlock;
     for (int x = 1; x < w - 1; ++x) {
       const float v = s[x];
@@ -62,6 +64,7 @@ bool crowded(const Corner& c, std::span<const Corner> others, float distance) no
 void scan_rows(const ImageView& image, const CornerOptions& options, const Grid& grid,
                const bool* occupied, int first, int last, Corner* found) noexcept {
   alignas(64) std::array<float, detail::kMaxBlock * detail::kMaxBlock> score;
+  std::array<float, detail::kMaxBlock> bound;
   const int low = std::max(options.border, detail::kTensorRadius + 2);
   for (int r = first; r < last; ++r) {
     for (int c = 0; c < grid.columns; ++c) {
@@ -72,8 +75,8 @@ void scan_rows(const ImageView& image, const CornerOptions& options, const Grid&
       const int x1 = std::min((c + 1) * grid.cell, image.width - std::max(low, kRightMargin)) + 1;
       const int y1 = std::min((r + 1) * grid.cell, image.height - low) + 1;
       if (x1 - x0 < 4 || y1 - y0 < 4) continue;
-      detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data());
-      Corner best = best_corner(score.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
+      detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data(), bound.data());
+      Corner best = best_corner(score.data(), bound.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
       if (!(best.score > kFlat)) continue;
       best.x += static_cast<float>(x0);
       best.y += static_cast<float>(y0);

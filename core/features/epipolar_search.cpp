@@ -113,31 +113,22 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   detail::correlate(block, view.data, view.stride, offsets.data(), places, scores.data());
 
   const int width = 2 * band + 1;
-  std::array<float, kMaxSearchSteps> best_of_step;
-  int best = 0, aside = 0;
-  float best_score = -1.F;
-  const float* score = scores.data();
-  for (int i = 0; i < n; ++i) {
-    float& of_step = best_of_step[static_cast<std::size_t>(i)];
-    of_step = 0.F;
-    for (int b = 0; b < width; ++b, ++score) {
-      of_step = std::max(of_step, *score);
-      if (*score > best_score) {
-        best_score = *score;
-        best = i;
-        aside = b - band;
-      }
-    }
-  }
-  best_score = std::sqrt(best_score);
-  const Step& at = kept[static_cast<std::size_t>(best)];
-  float second = 0.F;
+  const float best_square = detail::highest(scores.data(), places);
+  const auto best = static_cast<int>(
+      std::find(scores.begin(), scores.begin() + places, best_square) - scores.begin());
+  const float best_score = std::sqrt(best_square);
+  const Step& at = kept[static_cast<std::size_t>(best / width)];
+  const int aside = best % width - band;
   // Distance in px of the level within which positions belong to the same peak.
   constexpr int kNeighbourhood = 3;
-  for (int i = 0; i < n; ++i)
-    if (std::abs(kept[static_cast<std::size_t>(i)].index - at.index) > kNeighbourhood)
-      second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
-  second = std::sqrt(second);
+  const auto apart = [&](const Step& s) { return std::abs(s.index - at.index) > kNeighbourhood; };
+  const auto before =
+      static_cast<int>(std::find_if_not(kept.begin(), kept.begin() + n, apart) - kept.begin());
+  int after = best / width;
+  while (after < n && !apart(kept[static_cast<std::size_t>(after)])) ++after;
+  const float second =
+      std::sqrt(std::max(detail::highest(scores.data(), before * width),
+                         detail::highest(scores.data() + after * width, (n - after) * width)));
   result.zncc = best_score;
   result.rho = rho_last * at.index / steps;
   result.pixel =

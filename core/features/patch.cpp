@@ -53,6 +53,11 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
   // rows.
   const float last_x = static_cast<float>(image.width - kWindowStride - 2),
               last_y = static_cast<float>(image.height - kWindow - 2);
+  const float inverse_variance = 1.F / w.variance_sum;
+  detail::WindowSums s{};
+  float image_variance = 0.F;
+  // It need not settle to kSettled within the steps; the next finer level or the residual test
+  // decides then.
   for (int step = 0; step < kMaxSteps; ++step) {
     const float left = out.x - kHalfWindow, top = out.y - kHalfWindow;
     if (!(left >= 0.F && top >= 0.F && left <= last_x && top <= last_y)) {
@@ -60,38 +65,32 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
       return out;
     }
     const int ix = static_cast<int>(left), iy = static_cast<int>(top);
-    detail::WindowSums s{};
     detail::window_sums(w, image.data + iy * image.stride + ix, image.stride,
                         left - static_cast<float>(ix), top - static_cast<float>(iy), &s);
-    const float image_variance = s.square - s.sum * s.sum / kPixels;
-    const float norm = w.variance_sum * image_variance;
-    out.zncc = norm > 1.F ? s.value / std::sqrt(norm) : 0.F;
+    image_variance = std::max(s.square - s.sum * s.sum / kPixels, 0.F);
     // A gain near zero or negative means that nothing here resembles the window, so a step would be
     // noise.
-    const float gain =
-        std::max(s.value / w.variance_sum,
-                 0.3F * std::sqrt(std::max(image_variance, 0.F) / w.variance_sum) + 1e-3F);
+    const float gain = std::max(s.value * inverse_variance,
+                                0.3F * std::sqrt(image_variance * inverse_variance) + 1e-3F);
     float dx = (ixx * s.steep_x + ixy * s.steep_y) / gain;
     float dy = (ixy * s.steep_x + iyy * s.steep_y) / gain;
-    const float length = std::sqrt(dx * dx + dy * dy);
+    const float square = dx * dx + dy * dy;
     // Maximum step in px of the level, above which the linear model does not hold.
     constexpr float kMaxStep = 3.F;
-    if (length > kMaxStep) {
-      dx *= kMaxStep / length;
-      dy *= kMaxStep / length;
+    if (square > kMaxStep * kMaxStep) {
+      const float shorter = kMaxStep / std::sqrt(square);
+      dx *= shorter;
+      dy *= shorter;
     }
     out.x -= dx;
     out.y -= dy;
     const float moved_x = out.x - start_x, moved_y = out.y - start_y;
     if (!(moved_x * moved_x + moved_y * moved_y <= max_shift * max_shift)) return out;
-    if (length < kSettled) {
-      out.status = AlignStatus::ok;
-      return out;
-    }
+    if (square < kSettled * kSettled) break;
   }
-  // It has not settled to kSettled but moves little; the next finer level or the residual test
-  // decides.
   out.status = AlignStatus::ok;
+  const float norm = w.variance_sum * image_variance;
+  out.zncc = norm > 1.F ? s.value / std::sqrt(norm) : 0.F;
   return out;
 }
 

@@ -39,7 +39,8 @@ void gradient_products(const ImageView& image, int x, int y, int n, float* xx, f
   }
 }
 
-void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* score) {
+void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* score,
+                  float* bound) {
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   const int columns = w + 2 * kTensorRadius;
@@ -68,6 +69,7 @@ void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* s
     if (y < 0) continue;
     const auto scale = hn::Set(d, 1.F / (kWindowSide * kWindowSide));
     const auto half = hn::Set(d, 0.5F);
+    auto highest = hn::Zero(d);
     for (int x = 0; x < w; x += lanes) {
       const auto sum = [&](const float* p) {
         auto s = hn::LoadU(d, p + x);
@@ -78,8 +80,11 @@ void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* s
       const auto mean = hn::Mul(half, hn::Add(xx, yy));
       const auto difference = hn::Mul(half, hn::Sub(xx, yy));
       const auto root = hn::Sqrt(hn::MulAdd(difference, difference, hn::Mul(xy, xy)));
-      hn::StoreU(hn::Sub(mean, root), d, score + y * kMaxBlock + x);
+      const auto eigenvalue = hn::Sub(mean, root);
+      highest = hn::Max(highest, eigenvalue);
+      hn::StoreU(eigenvalue, d, score + y * kMaxBlock + x);
     }
+    bound[y] = hn::GetLane(hn::MaxOfLanes(d, highest));
   }
 }
 
@@ -91,8 +96,9 @@ HWY_AFTER_NAMESPACE();
 namespace vergence::features::detail {
 HWY_EXPORT(CornerScores);
 
-void corner_scores(const ImageView& image, int x0, int y0, int w, int h, float* score) noexcept {
-  HWY_DYNAMIC_DISPATCH(CornerScores)(image, x0, y0, w, h, score);
+void corner_scores(const ImageView& image, int x0, int y0, int w, int h, float* score,
+                   float* bound) noexcept {
+  HWY_DYNAMIC_DISPATCH(CornerScores)(image, x0, y0, w, h, score, bound);
 }
 }  // namespace vergence::features::detail
 #endif

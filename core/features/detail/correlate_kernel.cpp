@@ -75,6 +75,17 @@ void Correlate(const Block& block, const std::uint8_t* image, std::ptrdiff_t str
   }
 }
 
+float Highest(const float* scores, int n) {
+  const hn::CappedTag<float, kPlacesAtATime> d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  auto highest = hn::Zero(d);
+  int i = 0;
+  for (; i + lanes <= n; i += lanes) highest = hn::Max(highest, hn::LoadU(d, scores + i));
+  float result = hn::GetLane(hn::MaxOfLanes(d, highest));
+  for (; i < n; ++i) result = HWY_MAX(result, scores[i]);
+  return result;
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace vergence::features::detail
 HWY_AFTER_NAMESPACE();
@@ -82,10 +93,15 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace vergence::features::detail {
 HWY_EXPORT(Correlate);
+HWY_EXPORT(Highest);
 
 void correlate(const Block& block, const std::uint8_t* image, std::ptrdiff_t stride,
                const std::int32_t* offsets, int n, float* scores) noexcept {
   HWY_DYNAMIC_DISPATCH(Correlate)(block, image, stride, offsets, n, scores);
+}
+
+float highest(const float* scores, int n) noexcept {
+  return HWY_DYNAMIC_DISPATCH(Highest)(scores, n);
 }
 }  // namespace vergence::features::detail
 #endif

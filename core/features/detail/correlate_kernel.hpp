@@ -22,4 +22,7 @@ struct Block {
 void correlate(const Block& block, const std::uint8_t* image, std::ptrdiff_t stride,
                const std::int32_t* offsets, int n, float* scores) noexcept;
 
+/// The highest of n scores, 0 without any.
+[[nodiscard]] float highest(const float* scores, int n) noexcept;
+
 }  // namespace vergence::features::detail
