@@ -29,20 +29,22 @@ struct Grid {
 Corner best_corner(const float* score, const float* bound, int x0, int y0, int w, int h,
                    const Mask* mask) noexcept {
   Corner best;
-  for (int y = 1; y < h - 1; ++y) {
-    if (!(bound[y] > best.score)) continue;
+  const auto scan = [&](int y) {
     const float* s = score + y * detail::kMaxBlock;
+    const float* up = s - detail::kMaxBlock;
+    const float* down = s + detail::kMaxBlock;
     for (int x = 1; x < w - 1; ++x) {
       const float v = s[x];
-      if (!(v > best.score)) continue;
-      const float* up = s - detail::kMaxBlock;
-      const float* down = s + detail::kMaxBlock;
-      if (v >= s[x - 1] && v >= s[x + 1] && v >= up[x] && v >= down[x] && v >= up[x - 1] &&
-          v >= up[x + 1] && v >= down[x - 1] && v >= down[x + 1] &&
+      if (v > best.score && v >= s[x - 1] && v >= s[x + 1] && v >= up[x] && v >= down[x] &&
+          v >= up[x - 1] && v >= up[x + 1] && v >= down[x - 1] && v >= down[x + 1] &&
           (mask == nullptr || !mask->hides(x0 + x, y0 + y)))
         best = {static_cast<float>(x), static_cast<float>(y), v};
     }
-  }
+  };
+  // After the row with the highest score few others can hold a better corner.
+  scan(static_cast<int>(std::max_element(bound + 1, bound + h - 1) - bound));
+  for (int y = 1; y < h - 1; ++y)
+    if (bound[y] > best.score) scan(y);
   return best;
 }
 

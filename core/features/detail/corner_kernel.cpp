@@ -15,66 +15,54 @@ constexpr int kColumns = kMaxBlock + 32;
 constexpr int kWindowSide = 2 * kTensorRadius + 1;
 using Tag = hn::CappedTag<float, 16>;
 
-/// Products xx, xy and yy of the gradients of one image row from x0 − radius on, n of them rounded
-/// up to whole vectors.
-void gradient_products(const ImageView& image, int x, int y, int n, float* xx, float* xy,
-                       float* yy) {
+void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* score,
+                  float* bound) {
   const Tag d;
   const hn::Rebind<std::int32_t, Tag> d32;
   const hn::Rebind<std::uint8_t, Tag> d8;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  const std::uint8_t* above = image.row(y - 1) + x;
-  const std::uint8_t* here = image.row(y) + x;
-  const std::uint8_t* below = image.row(y + 1) + x;
   const auto half = hn::Set(d, 0.5F);
-  for (int i = 0; i < n; i += lanes) {
-    const auto load = [&](const std::uint8_t* p) {
-      return hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, p)));
-    };
-    const auto gx = hn::Mul(half, hn::Sub(load(here + i + 1), load(here + i - 1)));
-    const auto gy = hn::Mul(half, hn::Sub(load(below + i), load(above + i)));
-    hn::StoreU(hn::Mul(gx, gx), d, xx + i);
-    hn::StoreU(hn::Mul(gx, gy), d, xy + i);
-    hn::StoreU(hn::Mul(gy, gy), d, yy + i);
-  }
-}
-
-void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* score,
-                  float* bound) {
-  const Tag d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
   const int columns = w + 2 * kTensorRadius;
   // Ring buffer with the products of the seven image rows under the window.
   HWY_ALIGN float ring[kWindowSide][3][kColumns];
   HWY_ALIGN float column_sum[3][kColumns];
   for (int p = 0; p < 3; ++p)
     for (int i = 0; i < columns; i += lanes) hn::StoreU(hn::Zero(d), d, column_sum[p] + i);
-  HWY_ALIGN float newest[3][kColumns];
+  const auto load = [&](const std::uint8_t* p) {
+    return hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, p)));
+  };
   for (int row = 0; row < h + kWindowSide - 1; ++row) {
     float(*oldest)[kColumns] = ring[row % kWindowSide];
-    gradient_products(image, x0 - kTensorRadius, y0 - kTensorRadius + row, columns, newest[0],
-                      newest[1], newest[2]);
-    // The sums are multiples of 1/4 below 2²⁴/4 and thus exact in float, so adding the new row and
-    // subtracting the old one leaves no error.
-    for (int p = 0; p < 3; ++p) {
-      for (int i = 0; i < columns; i += lanes) {
-        const auto in = hn::LoadU(d, newest[p] + i);
-        auto s = hn::Add(hn::LoadU(d, column_sum[p] + i), in);
-        if (row >= kWindowSide) s = hn::Sub(s, hn::LoadU(d, oldest[p] + i));
-        hn::StoreU(s, d, column_sum[p] + i);
-        hn::StoreU(in, d, oldest[p] + i);
-      }
+    const std::uint8_t* here = image.row(y0 - kTensorRadius + row) + x0 - kTensorRadius;
+    for (int i = 0; i < columns; i += lanes) {
+      const std::uint8_t* at = here + i;
+      const auto gx = hn::Mul(half, hn::Sub(load(at + 1), load(at - 1)));
+      const auto gy = hn::Mul(half, hn::Sub(load(at + image.stride), load(at - image.stride)));
+      // The sums are multiples of 1/4 below 2²⁴/4 and thus exact in float, so adding the new row
+      // and subtracting the old one leaves no error.
+      const auto replace = [&](int product, hn::Vec<Tag> in) {
+        float* sum = column_sum[product] + i;
+        float* out = oldest[product] + i;
+        auto s = hn::Add(hn::LoadU(d, sum), in);
+        if (row >= kWindowSide) s = hn::Sub(s, hn::LoadU(d, out));
+        hn::StoreU(s, d, sum);
+        hn::StoreU(in, d, out);
+      };
+      replace(0, hn::Mul(gx, gx));
+      replace(1, hn::Mul(gx, gy));
+      replace(2, hn::Mul(gy, gy));
     }
     const int y = row - (kWindowSide - 1);
     if (y < 0) continue;
     const auto scale = hn::Set(d, 1.F / (kWindowSide * kWindowSide));
-    const auto half = hn::Set(d, 0.5F);
     auto highest = hn::Zero(d);
     for (int x = 0; x < w; x += lanes) {
+      // These sums are exact as well, so their order is free.
+      static_assert(kWindowSide == 7);
       const auto sum = [&](const float* p) {
-        auto s = hn::LoadU(d, p + x);
-        for (int k = 1; k < kWindowSide; ++k) s = hn::Add(s, hn::LoadU(d, p + x + k));
-        return hn::Mul(scale, s);
+        const auto at = [&](int k) { return hn::LoadU(d, p + x + k); };
+        const auto first = hn::Add(hn::Add(at(0), at(1)), hn::Add(at(2), at(3)));
+        return hn::Mul(scale, hn::Add(first, hn::Add(hn::Add(at(4), at(5)), at(6))));
       };
       const auto xx = sum(column_sum[0]), xy = sum(column_sum[1]), yy = sum(column_sum[2]);
       const auto mean = hn::Mul(half, hn::Add(xx, yy));
