@@ -67,7 +67,6 @@ void lay_out(BundleWorkspace& w, const BundleCapacities& c, Arena& arena) {
        c.shared ? kMaxCameras * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch : 0,
        "bundle: intrinsics");
   take(w.reduced, w.reduced_capacity * kBatch, "bundle: reduced gradient");
-  take(w.jets, std::min(c.poses * c.cameras, w.slot_capacity) * kJetRows * kBatch, "bundle: jets");
   take(w.A, ld * w.reduced_capacity, "bundle: reduced system");
   take(w.rhs, ld, "bundle: right-hand side");
   take(w.delta, ld, "bundle: step");

@@ -48,6 +48,8 @@ class Camera {
   [[nodiscard]] Eigen::Matrix<double, 2, 9> intrinsics_jacobian(const Vec3& p) const noexcept;
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return k_; }
+  /// Squared radius of (x, y) up to which the distortion is monotonic.
+  [[nodiscard]] double max_radius2() const noexcept { return max_radius2_; }
   /// True if the pixel is inside the image with a border of `margin` px.
   [[nodiscard]] bool inside(const Vec2& pixel, double margin) const noexcept {
     return pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= k_.width - 1 - margin &&
@@ -60,7 +62,6 @@ class Camera {
 
   Intrinsics k_{};
   bool distorted_ = false;
-  // Squared undistorted normalised radius up to which the model is monotonic.
   double max_radius2_ = 0;
 };
 

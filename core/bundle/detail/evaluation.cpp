@@ -21,7 +21,7 @@ namespace HWY_NAMESPACE {
 // Maximum step of a point as a share of its minimum depth.
 constexpr double kDepthShare = 0.8;
 
-template <bool kJets>
+template <bool kLenses>
 HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t lane) {
   const D d;
   const Batch& batch = job.batches[index];
@@ -30,17 +30,14 @@ HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t la
     X[r] = load(job.points + (index * 3 + static_cast<std::size_t>(r)) * kBatch + lane);
   const V zero = hn::Zero(d);
   V cost = zero, squared = zero, weighted = zero, behind = zero;
-  std::size_t jet_index = 0;
   for (std::uint32_t at = batch.block_begin; at < batch.block_end; ++at) {
     const PoseBlock& block = job.blocks[at];
     V Xi[3];
     transform(job.poses[block.pose].R, job.poses[block.pose].t, X, Xi);
     std::size_t slot = block.slot;
     for (unsigned mask = block.cameras; mask != 0; mask &= mask - 1, ++slot) {
-      const double* jet = kJets ? job.jets + jet_index++ * kJetRows * kBatch : nullptr;
       const Residual r =
-          kJets ? from_jets(jet, job.slots[slot], lane)
-                : project(job.cameras[std::countr_zero(mask)], job.slots[slot], lane, Xi, &behind);
+          project<kLenses>(job.cameras[std::countr_zero(mask)], job.slots[slot], lane, Xi, &behind);
       const V r2 = hn::MulAdd(r.x, r.x, hn::Mul(r.y, r.y));
       const V s = hn::Mul(r.weight, r2);
       V factor;
@@ -111,8 +108,7 @@ HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::si
 void evaluate_one(KernelJob& job, std::size_t first, std::size_t last) {
   for (std::size_t i = first; i < last; ++i)
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
-      job.jets != nullptr ? evaluate_lanes<true>(job, i, lane)
-                          : evaluate_lanes<false>(job, i, lane);
+      job.lenses ? evaluate_lanes<true>(job, i, lane) : evaluate_lanes<false>(job, i, lane);
 }
 
 void back_substitute_one(KernelJob& job, std::size_t first, std::size_t last, const double* delta) {

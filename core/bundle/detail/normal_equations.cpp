@@ -66,8 +66,38 @@ HWY_INLINE void add_pose_sums(const V Q[6], const V q[3], const V X[3], double* 
   }
 }
 
+/// ∂pixel/∂(intrinsic number `index` of fx, fy, cx, cy, d0 … d4).
+HWY_INLINE void by_intrinsic(const KernelCamera& camera, const Residual& r, int index, V J[2]) {
+  const V zero = hn::Zero(D());
+  J[0] = J[1] = zero;
+  if (index < 4) {
+    J[index % 2] = index < 2 ? r.distorted[index] : set(1.0);
+    return;
+  }
+  const V r2 = hn::MulAdd(r.xn, r.xn, hn::Mul(r.yn, r.yn));
+  if (!camera.equidistant && (index == 6 || index == 7)) {
+    // Tangential: 2 x y of one axis and r² + 2 of the other's square.
+    const int own = 7 - index;
+    const V n = own == 0 ? r.xn : r.yn;
+    J[1 - own] = hn::Mul(set(2.0), hn::Mul(r.xn, r.yn));
+    J[own] = hn::MulAdd(set(2.0), hn::Mul(n, n), r2);
+  } else {
+    // Radial: a power of r², or of θ² with θ/r.
+    const int power = camera.equidistant ? index - 3 : index == 8 ? 3 : index - 3;
+    V factor = set(1.0), base = r2;
+    if (camera.equidistant) {
+      const V radius = hn::Sqrt(hn::Max(r2, set(1e-18))), theta = hn::Atan(D(), radius);
+      factor = hn::Div(theta, radius);
+      base = hn::Mul(theta, theta);
+    }
+    for (int i = 0; i < power; ++i) factor = hn::Mul(factor, base);
+    J[0] = hn::Mul(factor, r.xn), J[1] = hn::Mul(factor, r.yn);
+  }
+  J[0] = hn::Mul(set(camera.fx), J[0]), J[1] = hn::Mul(set(camera.fy), J[1]);
+}
+
 /// Adds the intrinsics of one slot: their own equations, those with the pose, and their rows of N.
-HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, std::size_t lane,
+HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const Residual& r, std::size_t lane,
                                std::uint16_t pose, V wx, V wy, const V F[6], V weight,
                                const V Xi[3], const double* R, double* HWY_RESTRICT rows) {
   const int count = job.shared.intrinsic_count[camera];
@@ -79,16 +109,13 @@ HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, st
       (static_cast<std::size_t>(pose) * kMaxCameras + static_cast<std::size_t>(camera)) *
           kIntrinsicsSize * 6 * kBatch +
       lane;
+  V J[kIntrinsicsSize][2];
   for (int i = 0; i < count; ++i) {
-    const double* J =
-        jet + (kJetIntrinsics + 2 * job.shared.intrinsic_index[camera][i]) * kBatch + lane;
-    const V jx = load(J), jy = load(J + kBatch);
-    for (int k = 0; k <= i; ++k) {
-      const double* K =
-          jet + (kJetIntrinsics + 2 * job.shared.intrinsic_index[camera][k]) * kBatch + lane;
-      add_to(hn::Mul(weight, hn::MulAdd(jx, load(K), hn::Mul(jy, load(K + kBatch)))),
+    by_intrinsic(job.cameras[camera], r, job.shared.intrinsic_index[camera][i], J[i]);
+    const V jx = J[i][0], jy = J[i][1];
+    for (int k = 0; k <= i; ++k)
+      add_to(hn::Mul(weight, hn::MulAdd(jx, J[k][0], hn::Mul(jy, J[k][1]))),
              own + (i * (kIntrinsicsSize + 1) + k) * kBatch);
-    }
     add_to(hn::MulAdd(jx, wx, hn::Mul(jy, wy)),
            own + (i * (kIntrinsicsSize + 1) + kIntrinsicsSize) * kBatch);
     // w Jᵀ F.
@@ -106,8 +133,8 @@ HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, st
   }
 }
 
-/// Linearises one batch's lanes [lane, lane + vector). kJets: cameras use job.jets.
-template <bool kJets>
+/// Linearises one batch's lanes [lane, lane + vector). kLenses: as in project().
+template <bool kLenses>
 HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t lane) {
   const D d;
   const Batch& batch = job.batches[index];
@@ -122,7 +149,6 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
   for (V& p : P) p = zero;
   for (V& g : e) g = zero;
   V min_depth = set(kFar), cost = zero, squared = zero, weighted = zero, behind = zero;
-  std::size_t jet_index = 0;
   const bool robust = job.loss != BundleLoss::none;
 
   for (std::uint32_t at = batch.block_begin; at < batch.block_end; ++at) {
@@ -145,9 +171,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
       for (; mask != 0; mask &= mask - 1, ++slot) {
         const int number = std::countr_zero(mask);
         const KernelCamera& camera = job.cameras[number];
-        const double* jet = kJets ? job.jets + jet_index++ * kJetRows * kBatch : nullptr;
-        const Residual r =
-            kJets ? from_jets(jet, *slot, lane) : project(camera, *slot, lane, Xi, &behind);
+        const Residual r = project<kLenses>(camera, *slot, lane, Xi, &behind);
         const V r2 = hn::MulAdd(r.x, r.x, hn::Mul(r.y, r.y));
         const V s = hn::Mul(r.weight, r2);
         V w = r.weight;
@@ -163,7 +187,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         min_depth = hn::Min(min_depth, r.depth);
         const V wx = hn::Mul(w, r.x), wy = hn::Mul(w, r.y);
         // F = [a 0 −a xn; 0 b −b yn].
-        if (!kJets && camera.identity) {
+        if (!kLenses && camera.identity) {
           const V a = hn::Mul(set(camera.fx), r.iz), b = hn::Mul(set(camera.fy), r.iz);
           const V wa = hn::Mul(w, a), wb = hn::Mul(w, b), ax = hn::Mul(a, r.xn),
                   by = hn::Mul(b, r.yn);
@@ -179,24 +203,14 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         }
         V F[6];
         // G R_k.
-        if (kJets) {
-          const double* G = jet + lane;
-          for (int row = 0; row < 2; ++row) {
-            const V g0 = load(G + (3 * row) * kBatch), g1 = load(G + (3 * row + 1) * kBatch),
-                    g2 = load(G + (3 * row + 2) * kBatch);
-            for (int c = 0; c < 3; ++c)
-              F[3 * row + c] = hn::MulAdd(
-                  g0, set(camera.R[c]),
-                  hn::MulAdd(g1, set(camera.R[3 + c]), hn::Mul(g2, set(camera.R[6 + c]))));
-          }
-        } else {
-          const V a = hn::Mul(set(camera.fx), r.iz), b = hn::Mul(set(camera.fy), r.iz);
+        const V a = hn::Mul(set(camera.fx), r.iz), b = hn::Mul(set(camera.fy), r.iz);
 #pragma GCC unroll 3
-          for (int c = 0; c < 3; ++c) {
-            const V axis = set(camera.R[6 + c]);
-            F[c] = hn::Mul(a, hn::NegMulAdd(r.xn, axis, set(camera.R[c])));
-            F[3 + c] = hn::Mul(b, hn::NegMulAdd(r.yn, axis, set(camera.R[3 + c])));
-          }
+        for (int c = 0; c < 3; ++c) {
+          const V axis = set(camera.R[6 + c]);
+          const V x = hn::NegMulAdd(r.xn, axis, set(camera.R[c])),
+                  y = hn::NegMulAdd(r.yn, axis, set(camera.R[3 + c]));
+          F[c] = hn::Mul(a, kLenses ? hn::MulAdd(r.J[0], x, hn::Mul(r.J[1], y)) : x);
+          F[3 + c] = hn::Mul(b, kLenses ? hn::MulAdd(r.J[1], x, hn::Mul(r.J[2], y)) : y);
         }
         V wF[6];
 #pragma GCC unroll 6
@@ -209,8 +223,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         Q[5] = hn::MulAdd(wF[2], F[2], hn::MulAdd(wF[5], F[5], Q[5]));
 #pragma GCC unroll 3
         for (int c = 0; c < 3; ++c) q[c] = hn::MulAdd(F[c], wx, hn::MulAdd(F[3 + c], wy, q[c]));
-        if (kJets && job.shared.intrinsic_count[number] > 0)
-          add_intrinsics(job, number, jet, lane, block.pose, wx, wy, F, w, Xi, R, rows);
+        if (kLenses && job.shared.intrinsic_count[number] > 0)
+          add_intrinsics(job, number, r, lane, block.pose, wx, wy, F, w, Xi, R, rows);
       }
 
       // Class k > 0 is camera k if it is free.
@@ -365,8 +379,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
 void linearise_one(KernelJob& job, std::size_t first, std::size_t last) {
   for (std::size_t i = first; i < last; ++i)
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
-      job.jets != nullptr ? linearise_lanes<true>(job, i, lane)
-                          : linearise_lanes<false>(job, i, lane);
+      job.lenses ? linearise_lanes<true>(job, i, lane) : linearise_lanes<false>(job, i, lane);
 }
 
 }  // namespace HWY_NAMESPACE

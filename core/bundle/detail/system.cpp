@@ -1,7 +1,6 @@
 #include "core/bundle/detail/system.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "core/bundle/detail/setup.hpp"
@@ -57,11 +56,10 @@ void System::use(const SharedLayout& shared) noexcept {
   first_shared_ = static_cast<std::size_t>(w_.free_poses) * kBlock;
   rows_ = first_shared_ + static_cast<std::size_t>(shared.blocks) * kBlock;
   ld_ = (rows_ + kBatch - 1) / kBatch * kBatch;
-  use_jets_ = false;
+  job_.lenses = false;
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k)
-    use_jets_ = use_jets_ || problem_.cameras[k].intrinsics().has_distortion() ||
-                shared.intrinsic_count[k] > 0;
-  job_.jets = use_jets_ ? w_.jets.data() : nullptr;
+    job_.lenses = job_.lenses || problem_.cameras[k].intrinsics().has_distortion() ||
+                  shared.intrinsic_count[k] > 0;
   const bool calibration = options_.configuration == BundleConfiguration::stereo_calibration;
   job_.classes = calibration ? static_cast<int>(problem_.cameras.size()) : 1;
   for (int k = 0; k < kMaxCameras; ++k)
@@ -84,56 +82,16 @@ void System::prepare(const BundleState& state) noexcept {
     c.fy = intrinsics.fy;
     c.cx = intrinsics.cx;
     c.cy = intrinsics.cy;
+    std::copy(intrinsics.distortion.begin(), intrinsics.distortion.end(), c.distortion);
+    c.max_radius2 = state.cameras[k].max_radius2();
+    c.distorted = intrinsics.has_distortion();
+    c.equidistant = intrinsics.kind == CameraModelKind::pinhole_equidistant;
     c.identity = T.R == Mat3::Identity() && T.t == Vec3::Zero();
     if (job_.shared.exact[k]) c.basis = tangent_basis((T.R.transpose() * T.t).normalized());
   }
   job_.points = state.points.data();
   job_.cost = job_.squared_px = job_.weighted = 0;
   job_.behind = false;
-}
-
-void System::fill_jets(const BundleState& state, const Batch& batch) noexcept {
-  double* jet = w_.jets.data();
-  const auto batch_index = static_cast<std::size_t>(&batch - w_.batches.data());
-  for (std::uint32_t b = batch.block_begin; b < batch.block_end; ++b) {
-    const PoseBlock& block = w_.blocks[b];
-    std::size_t slot = block.slot;
-    for (unsigned mask = block.cameras; mask != 0;
-         mask &= mask - 1, ++slot, jet += kJetRows * kBatch) {
-      const auto k = static_cast<std::size_t>(std::countr_zero(mask));
-      const Camera& camera = state.cameras[k];
-      for (std::size_t lane = 0; lane < kBatch; ++lane) {
-        const auto put = [&](int row, double value) {
-          jet[static_cast<std::size_t>(row) * kBatch + lane] = value;
-        };
-        for (int row = 0; row < kJetRows; ++row) put(row, 0.0);
-        put(kJetDepth, kFar);
-        const Slot& s = w_.slots[slot];
-        if (!(s.inverse_sigma[lane] > 0)) continue;
-        const auto coordinate = [&](std::size_t c) {
-          return state.points[(batch_index * 3 + c) * kBatch + lane];
-        };
-        const Vec3 p = state.T_camera_left[k] * (state.poses[block.pose] *
-                                                 Vec3(coordinate(0), coordinate(1), coordinate(2)));
-        Vec2 pixel;
-        Mat23 G;
-        if (camera.project(p, &pixel, &G) != ProjectStatus::ok) {
-          job_.behind = true;
-          continue;
-        }
-        for (int i = 0; i < 6; ++i) put(i, G(i / 3, i % 3));
-        put(6, s.x[lane] - pixel.x());
-        put(7, s.y[lane] - pixel.y());
-        put(kJetDepth, p.z());
-        if (job_.shared.intrinsic_count[k] == 0) continue;
-        const auto J = camera.intrinsics_jacobian(p);
-        for (int i = 0; i < kIntrinsicsSize; ++i) {
-          put(kJetIntrinsics + 2 * i, J(0, i));
-          put(kJetIntrinsics + 2 * i + 1, J(1, i));
-        }
-      }
-    }
-  }
 }
 
 bool System::linearise(const BundleState& state, double damping) noexcept {
@@ -156,14 +114,7 @@ bool System::linearise(const BundleState& state, double damping) noexcept {
     std::size_t end = b + 1;
     while (end < w_.batch_count && w_.batches[end].group == w_.batches[b].group) ++end;
     job_.group_begin = w_.batches[b].block_begin;
-    if (use_jets_) {
-      for (std::size_t i = b; i < end; ++i) {
-        fill_jets(state, w_.batches[i]);
-        detail::linearise(job_, i, i + 1);
-      }
-    } else {
-      detail::linearise(job_, b, end);
-    }
+    detail::linearise(job_, b, end);
     if (rows_ > 0) subtract_points(job_, b, end, w_.A.data(), ld_);
     b = end;
   }
@@ -176,14 +127,7 @@ bool System::linearise(const BundleState& state, double damping) noexcept {
 bool System::evaluate(const BundleState& state, bool squared) noexcept {
   prepare(state);
   job_.squared = squared ? w_.squared.data() : nullptr;
-  if (use_jets_) {
-    for (std::size_t i = 0; i < w_.batch_count; ++i) {
-      fill_jets(state, w_.batches[i]);
-      detail::evaluate(job_, i, i + 1);
-    }
-  } else {
-    detail::evaluate(job_, 0, w_.batch_count);
-  }
+  detail::evaluate(job_, 0, w_.batch_count);
   cost_ = job_.cost + prior_cost(state);
   return !job_.behind && std::isfinite(cost_) && std::isfinite(job_.squared_px);
 }

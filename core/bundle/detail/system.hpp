@@ -39,7 +39,6 @@ class System {
 
  private:
   void prepare(const BundleState& state) noexcept;
-  void fill_jets(const BundleState& state, const Batch& batch) noexcept;
   void assemble(const BundleState& state) noexcept;
   void assemble_pose(std::size_t pose) noexcept;
   void assemble_intrinsics() noexcept;
@@ -53,7 +52,6 @@ class System {
   const BundleOptions& options_;
   KernelJob job_;
   SharedPrior shared_prior_{};
-  bool use_jets_ = false;
   std::size_t rows_ = 0, ld_ = 0, first_shared_ = 0;
   double cost_ = 0, update_ = 0, norm_ = 0;
 };

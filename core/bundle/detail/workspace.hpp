@@ -26,10 +26,6 @@ inline constexpr int kMaxShared = kBlock * (kMaxCameras - 1) + kIntrinsicsSize *
 inline constexpr int kMaxSharedBlocks = (kMaxShared + kBlock - 1) / kBlock;
 /// Maximum number of image cells per side in a covariance by cells.
 inline constexpr int kMaxCells = 8;
-inline constexpr int kJetDepth = 8;
-inline constexpr int kJetIntrinsics = 9;
-/// Rows of a jet: G (6), ε (2), depth, ∂x/∂intrinsics (9 × 2).
-inline constexpr int kJetRows = kJetIntrinsics + 2 * kIntrinsicsSize;
 
 /// Observations of eight points in one image; inverse_sigma is 0 where there is none.
 struct alignas(kCacheLine) Slot {
@@ -63,6 +59,10 @@ struct KernelCamera {
   /// T_camera_left, row-major.
   double R[9], t[3];
   double fx, fy, cx, cy;
+  /// Distortion and its range as in Camera.
+  double distortion[5];
+  double max_radius2;
+  bool distorted, equidistant;
   /// Directions in which τ is free with an exact length.
   Eigen::Matrix<double, 3, 2, Eigen::RowMajor> basis;
   bool identity;
@@ -98,8 +98,6 @@ struct KernelJob {
   const double* points = nullptr;
   /// [batch][kBatch], 1 or 0.
   const double* point_free = nullptr;
-  /// [slot of the batch][kJetRows][kBatch], only for cameras with distortion or free intrinsics.
-  const double* jets = nullptr;
   /// [batch][3][kBatch], output of back_substitute().
   double* candidate = nullptr;
 
@@ -128,6 +126,8 @@ struct KernelJob {
   /// Number of cameras whose normal equations are summed separately.
   int classes = 1;
   std::uint8_t class_cameras[kMaxCameras] = {};
+  /// True if a camera has distortion or free intrinsics.
+  bool lenses = false;
 
   SharedLayout shared;
   int free_poses = 0;
@@ -178,7 +178,7 @@ struct BundleWorkspace {
   std::span<Slot> slots;
   std::span<KernelPose> poses;
   std::span<double> point_free, y, y_group, y_shared, factors, sums, intrinsic_sums, intrinsic_own,
-      reduced, jets;
+      reduced;
   std::span<double> A, rhs, delta;
   std::span<float> squared;
   BundleState states[2];
