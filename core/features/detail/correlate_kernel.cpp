@@ -21,6 +21,7 @@ HWY_INLINE void SumsAt(D8 d8, const std::uint8_t* block, Load load, std::int32_t
   const auto one = hn::Set(d16, 1);
   auto p = hn::Zero(d32), s = hn::Zero(d32), q = hn::Zero(d32);
   auto p1 = hn::Zero(d32), s1 = hn::Zero(d32), q1 = hn::Zero(d32);
+#pragma GCC unroll 8
   for (int at = 0; at < kBlock * kBlock; at += lanes) {
     const auto t = hn::PromoteTo(d16, hn::LoadU(d8, block + at));
     const auto i = hn::PromoteTo(d16, load(at));
