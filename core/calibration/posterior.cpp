@@ -33,14 +33,14 @@ void let_drift(double hours, const CalibrationOptions& options, RigCalibration* 
   }
 }
 
-void clear_transforms(RigCalibration* rig) noexcept {
+void assume_transforms(double sigma, RigCalibration* rig) noexcept {
   for (int k = 1; k < rig->cameras; ++k) {
     const double length = rig->T_camera_left[static_cast<std::size_t>(k)].t.norm();
     for (int i = 0; i < 6; ++i) {
       const int row = extrinsic_row(k) + i;
       for (int other = 0; other < kRigSize; ++other) rig->covariance.set(row, other, 0);
-      const double sigma = i < 3 ? kUnknownTransform : kUnknownTransform * length;
-      rig->covariance.set(row, row, sigma * sigma);
+      const double own = i < 3 ? sigma : sigma * length;
+      rig->covariance.set(row, row, own * own);
     }
   }
 }

@@ -7,12 +7,17 @@ namespace vergence::calibration {
 /// Sigma of an unknown transform, rotation in rad and translation in baselines: wider than the
 /// error of any rig whose images still match.
 inline constexpr double kUnknownTransform = 0.2;
+/// Sigma of the transforms of a calibration that states none, in the same units: twice the yaw of
+/// 26 mrad that a recorded rig has in its principal points instead.
+inline constexpr double kMakersTransform = 0.05;
+/// Usual RigCalibration::inflation: 5 to 45 on recorded drives.
+inline constexpr double kUsualInflation = 20;
 
 /// Widens the joint covariance of a calibration by the random walk of `hours`. Pure.
 void let_drift(double hours, const CalibrationOptions& options, RigCalibration* rig) noexcept;
 
-/// Marks the transforms as unknown and keeps the intrinsics, because cameras may have been moved.
-/// Pure.
-void clear_transforms(RigCalibration* rig) noexcept;
+/// Replaces what is known of the transforms by `sigma`, rotation in rad and translation in
+/// baselines, and keeps the intrinsics. Pure.
+void assume_transforms(double sigma, RigCalibration* rig) noexcept;
 
 }  // namespace vergence::calibration

@@ -25,7 +25,7 @@ double misfit_px(const CalibrationDecision& d) noexcept {
 
 /// Clears the extrinsics of the prior when another rig is adopted; the intrinsics stay.
 void clear_rig(std::optional<RigCalibration>* refined) noexcept {
-  if (*refined) calibration::clear_transforms(&**refined);
+  if (*refined) calibration::assume_transforms(calibration::kUnknownTransform, &**refined);
 }
 
 }  // namespace
@@ -44,6 +44,11 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   if (!calibrated()) return;
   monitor_.watch(rig_, false);
   monitor_.set_jump_reference(rig_);
+  if (rig_.covariance.empty()) {
+    refined_ = rig_;
+    refined_->inflation = calibration::kUsualInflation;
+    calibration::assume_transforms(calibration::kMakersTransform, &*refined_);
+  }
   frames_.begin_segment();
   frames_.require(frames_.min_to_solve());
 }
@@ -123,9 +128,12 @@ void OnlineCalibrator::start_solve() noexcept {
     prior = *refined_;
     request.prior = &prior;
     const calibration::TrackLog& log = frames_.log();
-    const double hours = (log.frame(log.size() - 1).stamp - prior.found).to_seconds() / 3600.0;
+    // The age of a supplied calibration is unknown, and its sigmas include it.
+    const Stamp newest = log.frame(log.size() - 1).stamp,
+                found = prior.found == Stamp{} ? newest : prior.found;
+    const double hours = (newest - found).to_seconds() / 3600.0;
     if (estimating())
-      calibration::clear_transforms(&prior);
+      calibration::assume_transforms(calibration::kUnknownTransform, &prior);
     else
       calibration::let_drift(hours, options_.calibration, &prior);
   }

@@ -120,7 +120,7 @@ class OnlineCalibrator {
   RigCalibration rig_, nominal_;
   CalibrationState state_;
   calibration::CalibrationOrigin source_ = calibration::CalibrationOrigin::elsewhere;
-  // Posterior of the closed segments.
+  // Posterior of the closed segments; before, the prior of the supplied calibration.
   std::optional<RigCalibration> refined_;
   CalibrationFrames frames_;
   BackgroundSolve solve_;
