@@ -135,7 +135,7 @@ json LiveState::frame_json(HostStamp now) const {
       {"state", to_string(p.state)},
       {"status", to_string(p.status)},
       {"reason", reason},
-      {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(reason)},
+      {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(p.reason)},
       {"inliers", p.inliers},
       {"stereo_inliers", p.stereo_inliers},
       {"reprojection_px", rounded(p.reprojection_px, 3)},

@@ -25,7 +25,7 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
   ReportOutcome outcome;
   outcome.page = session_folder / "report.html";
   outcome.assessment = report::assess(session, analysis);
-  outcome.missing = session.not_had();
+  outcome.missing = session.missing;
   replace_durably(outcome.page, report::page_html(session, analysis, outcome.assessment));
   return outcome;
 }
