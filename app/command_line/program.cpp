@@ -57,24 +57,6 @@ CLI::App& named_command(CLI::App& root) {
   return *command;
 }
 
-/// Error message for an argument that `command` does not define, with the nearest one that it does.
-struct UnknownArgument {
-  std::string name, why;
-  bool option = false;
-};
-
-UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
-  UnknownArgument argument;
-  argument.name = given.substr(0, given.find('='));
-  argument.option = argument.name.size() > 1 && argument.name.front() == '-';
-  if (!argument.option) argument.why = did_you_mean(argument.name, command_names(command));
-  if (argument.why.empty())
-    argument.why =
-        new_name(Renamed::Kind::option,
-                 full_name(command) + " " + (argument.option ? argument.name : "CONFIG"));
-  return argument;
-}
-
 /// Message for a value that CLI11 cannot convert, as its own names neither the option's unit nor
 /// what is expected.
 std::string conversion_message(const CLI::ParseError& error, const CLI::App& command) {
@@ -103,22 +85,10 @@ std::string error_message(const CLI::ParseError& error, CLI::App& root) {
                 ? conversion_message(error, command)
                 : error.what()) +
            hint;
-  // An option of an earlier version explains the other words.
-  std::vector<UnknownArgument> unknown;
-  unknown.reserve(extras.size());
-  for (const std::string& extra : extras) unknown.push_back(unknown_argument(extra, command));
-  const auto explained = [&](bool option) {
-    return std::ranges::find_if(unknown, [&](const UnknownArgument& argument) {
-      return argument.option == option && !argument.why.empty();
-    });
-  };
-  auto first = explained(true);
-  if (first == unknown.end()) first = explained(false);
-  if (first == unknown.end()) first = unknown.begin();
-  if (first->option && first->why.empty())
-    first->why = did_you_mean(first->name, option_names(command));
-  return who + (first->option ? "unknown option " : "unexpected argument ") + "\"" + first->name +
-         "\"" + first->why + hint;
+  const std::string argument = extras.front().substr(0, extras.front().find('='));
+  const bool option = argument.size() > 1 && argument.front() == '-';
+  return who + (option ? "unknown option " : "unexpected argument ") + "\"" + argument + "\"" +
+         did_you_mean(argument, option ? option_names(command) : command_names(command)) + hint;
 }
 
 /// A first word that is no command is answered here: CLI11 would only call it unexpected.

@@ -260,13 +260,8 @@ struct Configuration {
 /// 16 hexadecimal digits (FNV-1a, 64 bit) of canonical_text(), equal for equal configurations.
 [[nodiscard]] std::string configuration_hash(const Configuration& configuration);
 
-/// Sets one option. Returns an empty string on success or if the driver has no options, else a
-/// message fragment about the problem.
-[[nodiscard]] std::string set_camera_option(const std::string& name, const std::string& value,
-                                            CameraSettings* camera);
-
-/// Sets all options from `NAME=VALUE …`; the others get their defaults. Returns as
-/// set_camera_option() does.
-[[nodiscard]] std::string set_camera_options(const std::string& text, CameraSettings* camera);
+/// Sets all options from `NAME=VALUE …`; the others get the driver's defaults. Throws InputError
+/// with a message about the option; without a driver there are none.
+void set_camera_options(const std::string& text, CameraSettings* camera);
 
 }  // namespace vergence::app

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <type_traits>
@@ -17,39 +18,30 @@ namespace vergence::app {
 namespace groups {
 namespace {
 
-/// Rows whose values are fields of one part of the configuration. `part` gives that part, of a
-/// Configuration const or not.
-template <class Settings>
+/// Rows whose values are fields of one part of the configuration. `part` is the member that is that
+/// part, or a function that gives it, of a Configuration const or not.
+template <class Part>
 class Rows {
+  using Settings = std::remove_reference_t<std::invoke_result_t<Part, Configuration&>>;
+
  public:
-  template <class Part>
   Rows(std::string prefix, std::string meaning, Part part)
-      : prefix_(std::move(prefix)),
-        part_([part](Configuration& c) -> Settings& { return part(c); }),
-        const_part_([part](const Configuration& c) -> const Settings& { return part(c); }) {
+      : prefix_(std::move(prefix)), part_(part) {
     group_.name = prefix_.substr(0, prefix_.find('.'));
     group_.meaning = std::move(meaning);
   }
-
-  /// `part` is the member of the configuration that has the fields.
-  Rows(std::string prefix, std::string meaning, Settings Configuration::*part)
-      : Rows(
-            std::move(prefix), std::move(meaning), [part](auto& c) -> auto& { return c.*part; }) {}
 
   /// Any integral field.
   template <class Integer>
   Rows& integer(const char* name, Integer Settings::*field, std::int64_t least, std::int64_t most,
                 const char* unit, const char* meaning) {
-    return add<std::int64_t>(
-        name, KeyType::integer, static_cast<double>(least), static_cast<double>(most), unit,
-        meaning, [field](auto& s) -> auto& { return s.*field; });
+    return add<std::int64_t>(name, KeyType::integer, static_cast<double>(least),
+                             static_cast<double>(most), unit, meaning, field);
   }
 
   Rows& number(const char* name, double Settings::*field, double least, double most,
                const char* unit, const char* meaning) {
-    return add<double>(
-        name, KeyType::number, least, most, unit,
-        meaning, [field](auto& s) -> auto& { return s.*field; });
+    return add<double>(name, KeyType::number, least, most, unit, meaning, field);
   }
 
   /// A list: one key for each number, `name.0` and so on. The first one has the meaning.
@@ -66,9 +58,16 @@ class Rows {
 
   Rows& text(const char* name, std::string Settings::*field, std::size_t longest,
              const char* meaning) {
-    return add<std::string>(
-        name, KeyType::text, 0, static_cast<double>(longest), "",
-        meaning, [field](auto& s) -> auto& { return s.*field; });
+    return add<std::string>(name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
+                            field);
+  }
+
+  /// A text that is one of a few words, or empty where that is the default.
+  Rows& word(const char* name, std::string Settings::*field, std::vector<std::string> words,
+             const char* meaning) {
+    text(name, field, 0, meaning);
+    group_.keys.back().words = std::move(words);
+    return *this;
   }
 
   /// A number that is chosen by its word: the first stands for 0.
@@ -99,24 +98,12 @@ class Rows {
     return *this;
   }
 
-  /// A text that is one of a few words, or empty where that is the default.
-  Rows& word(const char* name, std::string Settings::*field, std::vector<std::string> words,
-             const char* meaning) {
-    text(name, field, 0, meaning);
-    group_.keys.back().words = std::move(words);
-    return *this;
-  }
-
   /// The options of a camera's driver, as one text.
-  Rows& options(const char* name, CameraOptions Settings::*field, std::size_t longest,
-                const char* meaning) {
-    add(
+  Rows& options(const char* name, std::size_t longest, const char* meaning) {
+    return add(
         name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
-        [](Settings& s, const KeyValue& v) {
-          (void)set_camera_options(std::get<std::string>(v), &s);
-        },
-        [field](const Settings& s) -> KeyValue { return options_text(s.*field); });
-    return *this;
+        [](Settings& s, const KeyValue& v) { set_camera_options(std::get<std::string>(v), &s); },
+        [](const Settings& s) -> KeyValue { return options_text(s.options); });
   }
 
   /// The rows of another part, behind these.
@@ -129,40 +116,39 @@ class Rows {
   operator Group() { return std::move(group_); }
 
  private:
-  /// `access` gives the field, of Settings const or not.
-  template <class Value, class Access>
+  /// `field` is a member of Settings, or a function that gives it.
+  template <class Value, class Field>
   Rows& add(const std::string& name, KeyType type, double least, double most, const char* unit,
-            const char* meaning, const Access& access) {
-    add(
+            const char* meaning, Field field) {
+    return add(
         name, type, least, most, unit, meaning,
-        [access](Settings& s, const KeyValue& v) {
-          auto& field = access(s);
-          field = static_cast<std::remove_reference_t<decltype(field)>>(std::get<Value>(v));
+        [field](Settings& s, const KeyValue& v) {
+          auto& target = std::invoke(field, s);
+          target = static_cast<std::remove_reference_t<decltype(target)>>(std::get<Value>(v));
         },
-        [access](const Settings& s) -> KeyValue { return static_cast<Value>(access(s)); });
+        [field](const Settings& s) -> KeyValue {
+          return static_cast<Value>(std::invoke(field, s));
+        });
+  }
+
+  template <class Set, class Get>
+  Rows& add(const std::string& name, KeyType type, double least, double most, const char* unit,
+            const char* meaning, Set set, Get get) {
+    group_.keys.push_back(
+        {prefix_.empty() ? name : prefix_ + "." + name,
+         type,
+         unit,
+         least,
+         most,
+         meaning,
+         [part = part_, set](Configuration& c, const KeyValue& v) { set(std::invoke(part, c), v); },
+         [part = part_, get](const Configuration& c) { return get(std::invoke(part, c)); },
+         {}});
     return *this;
   }
 
-  void add(const std::string& name, KeyType type, double least, double most, const char* unit,
-           const char* meaning, std::function<void(Settings&, const KeyValue&)> set,
-           std::function<KeyValue(const Settings&)> get) {
-    group_.keys.push_back({prefix_.empty() ? name : prefix_ + "." + name,
-                           type,
-                           unit,
-                           least,
-                           most,
-                           meaning,
-                           [part = part_, set = std::move(set)](
-                               Configuration& c, const KeyValue& v) { set(part(c), v); },
-                           [part = const_part_, get = std::move(get)](const Configuration& c) {
-                             return get(part(c));
-                           },
-                           {}});
-  }
-
   std::string prefix_;
-  std::function<Settings&(Configuration&)> part_;
-  std::function<const Settings&(const Configuration&)> const_part_;
+  Part part_;
   Group group_;
 };
 
@@ -170,7 +156,7 @@ class Rows {
 constexpr auto whole = [](auto& c) -> auto& { return c; };
 
 Group general() {
-  return Rows<Configuration>("", "Keys that belong to no group.", whole)
+  return Rows("", "Keys that belong to no group.", whole)
       .integer(
           "threads", &Configuration::threads, 1, 2, "",
           "Threads of the estimator: 2 processes both images in parallel; the poses are the same.");
@@ -283,7 +269,7 @@ Group cameras() {
   Group all;
   for (std::size_t k = 0; k < kMaxCameras; ++k) {
     Group one =
-        Rows<C>(
+        Rows(
             "cameras." + std::to_string(k), "The cameras, a list; the first is the left one.",
             [k](auto& c) -> auto& { return c.cameras[k]; })
             .word("driver", &C::driver, {"mock", "gige", "iidc-usb", "iidc-1394", "v4l2"},
@@ -314,7 +300,7 @@ Group cameras() {
                  {"free", CameraTrigger::free}},
                 "Trigger source: `hardware`, a pulse at its input; `software`, a command at "
                 "`trigger.rate`; `free`, its own clock. Equal for all cameras.")
-            .options("options", &C::options, 400,
+            .options("options", 400,
                      "Options of this driver (drivers/*/README.md): `NAME=VALUE …`, or a group: "
                      "`{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
@@ -479,10 +465,10 @@ Group comparison() {
 Group odometry() {
   using O = OdometryOptions;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  Rows<O> rows("odometry",
-               "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one "
-               "at a time.",
-               &Configuration::odometry);
+  Rows rows("odometry",
+            "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one "
+            "at a time.",
+            &Configuration::odometry);
   rows.integer("features", &O::features, 50, 1000, "points",
                "Points tracked in each image, spread over a grid: more cost time and constrain the "
                "pose better where texture is poor.")
@@ -522,7 +508,7 @@ Group odometry() {
                "Maximum MLESAC hypotheses per frame.")
       .integer("seed", &O::seed, 0, kLargestSeed, "",
                "Seed of that sampling: the same seed gives the same poses.");
-  return rows.also(Rows<Configuration>("odometry", "", whole)
+  return rows.also(Rows("odometry", "", whole)
                        .choice("preset", &Configuration::preset, {"default", "small"},
                                "`small`, for small single-board computers: `odometry.features` "
                                "250, `odometry.window_keyframes` 8, `calibration.max_frames` 100 "
@@ -586,7 +572,7 @@ Group calibration_options() {
       .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
               "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is "
               "`poor`. A solution with a larger one at `reference_depth_m` is not adopted.")
-      .also(Rows<Configuration>("calibration", "", whole)
+      .also(Rows("calibration", "", whole)
                 .choice("online", &Configuration::online, {"off", "on"},
                         "`off`: the rig is not monitored, and the initial calibration is used "
                         "throughout."));
@@ -623,7 +609,7 @@ Group monitor() {
 Group intrinsics_error() {
   using E = IntrinsicsErrorSettings;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  return Rows<E>(
+  return Rows(
              "mock.intrinsics_error", "", [](auto& c) -> auto& { return c.mock.intrinsics_error; })
       .number(
           "principal_point_px", &E::principal_point_px, 0, 50, "px",
@@ -635,7 +621,7 @@ Group intrinsics_error() {
 
 Group calibration_error() {
   using E = CalibrationErrorSettings;
-  return Rows<E>(
+  return Rows(
              "mock.calibration_error", "",
              [](auto& c) -> auto& { return c.mock.calibration_error; })
       .number("pitch_deg", &E::pitch_deg, -45, 45, "°",
