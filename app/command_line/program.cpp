@@ -7,7 +7,6 @@
 #include <exception>
 #include <iostream>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/runtime/nearest.hpp"
@@ -57,21 +56,6 @@ CLI::App& named_command(CLI::App& root) {
   return *command;
 }
 
-/// Message for a value that CLI11 cannot convert, as its own names neither the option's unit nor
-/// what is expected.
-std::string conversion_message(const CLI::ParseError& error, const CLI::App& command) {
-  std::string message = error.what();
-  for (const CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_name(false, false);
-    if (message.find(": " + name + " = ") == std::string::npos) continue;
-    const std::string type = option->get_type_name();
-    const std::string given = option->results().empty() ? "" : option->results().back();
-    return name + ": \"" + given + "\" is not a " + (type == "N" ? "whole number" : "number") +
-           (type.empty() || type == "N" ? "" : " (" + type + ")") + " or is out of range";
-  }
-  return message;
-}
-
 /// CLI11's errors about a command line, as one message.
 std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   CLI::App& command = named_command(root);
@@ -79,12 +63,7 @@ std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   const std::string hint = " (see 'vergence" + (words.empty() ? "" : " " + words) + " --help')";
   // Unknown arguments are reported first: this is often why something else seems to be missing.
   const auto extras = command.remaining();
-  if (extras.empty())
-    return who +
-           (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr
-                ? conversion_message(error, command)
-                : error.what()) +
-           hint;
+  if (extras.empty()) return who + error.what() + hint;
   const std::string argument = extras.front().substr(0, extras.front().find('='));
   const bool option = argument.size() > 1 && argument.front() == '-';
   return who + (option ? "unknown option " : "unexpected argument ") + "\"" + argument + "\"" +
@@ -96,31 +75,13 @@ void check_command(CLI::App& root, int argc, const char* const* argv) {
   if (argc < 2) throw InputError("no command is given; 'vergence --help' lists the commands");
   const std::string argument = argv[1];
   if (!argument.empty() && argument.front() == '-') return;
-  auto words = command_names(root);
-  words.insert(words.end(), {"help", "version"});
+  const std::vector<std::string> words = command_names(root);
   if (std::ranges::find(words, argument) != words.end()) return;
   throw InputError("unknown command \"" + argument + "\"" + did_you_mean(argument, words) +
                    " ('vergence --help' lists the commands)");
 }
 
-/// `help`, `help COMMAND`, `help COMMAND SUBCOMMAND` and `version` as the options that they stand
-/// for.
-std::vector<const char*> with_help_options(int argc, const char* const* argv) {
-  std::vector<const char*> words(argv, argv + argc);
-  if (argc < 2) return words;
-  const std::string_view first = argv[1];
-  if (first == "version") words[1] = "--version";
-  if (first != "help") return words;
-  words.erase(words.begin() + 1);
-  words.resize(std::min<std::size_t>(words.size(), 3));
-  words.push_back("--help");
-  return words;
-}
-
-ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add_commands) {
-  const std::vector<const char*> words = with_help_options(given, given_argv);
-  const int argc = static_cast<int>(words.size());
-  const char* const* argv = words.data();
+ExitCode parse_and_run(int argc, const char* const* argv, AddCommands add_commands) {
   CLI::App root("Stereo visual odometry with online calibration", "vergence");
   ExitCode exit_code = ExitCode::done;
   root.set_version_flag("--version",
@@ -130,7 +91,7 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
       "Start: vergence replay FOLDER --out DIR. 'vergence COMMAND --help' has options, an example "
       "and\n"
       "exit codes.");
-  add_commands(root, {given_argv, static_cast<std::size_t>(given)}, &exit_code);
+  add_commands(root, {argv, static_cast<std::size_t>(argc)}, &exit_code);
   check_command(root, argc, argv);
   try {
     root.parse(argc, argv);

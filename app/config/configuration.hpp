@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "app/runtime/realtime.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/options.hpp"
 #include "core/odometry/options.hpp"
@@ -69,7 +70,7 @@ struct CameraSettings {
 struct ExposureSettings {
   /// 0: fixed, as configured in cameras[]; 1: automatic.
   int mode = 0;
-  double target = 90, saturated_percent = 5;
+  double target = 90;
   double min_us = 20, max_us = 8000, max_gain_db = 18;
   int settle_frames = 5;
 };
@@ -123,8 +124,6 @@ struct ComparisonSettings {
   double heading_sigma_deg = 0;
   double max_gap_ms = 100;
   double max_wait_ms = 500;
-  double jump_m = 20;
-  double scale_tolerance = 0.02;
 };
 
 /// Selection of the four cameras of a KITTI raw sequence.
@@ -183,25 +182,6 @@ struct PublishSettings {
   std::string token_file{};
 };
 
-/// `sessions:` the folders that drives leave side by side.
-struct SessionsSettings {
-  /// Quota of the parent directory; 0: none.
-  int quota_mb = 0;
-};
-
-/// `realtime:` scheduling of the drive's threads (docs/deployment.md).
-struct RealtimeSettings {
-  /// SCHED_FIFO priority of the most urgent threads; 0: none.
-  int priority = 0;
-  /// Processors of all threads but the solver's, such as `0-1,3`; empty: any.
-  std::string affinity{};
-  std::string solver_affinity{};
-  /// 1: call mlockall().
-  int lock_memory = 0;
-  /// Time budget per frame of a live drive; 0: its frame interval.
-  double frame_budget_ms = 0;
-};
-
 inline constexpr std::size_t kMaxFaults = 16;
 
 /// All user settings with their defaults. Each member is bound to a row of the schema
@@ -218,7 +198,6 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
-  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   /// `KIND@SECONDS NAME=NUMBER …`; empty: none.
   std::array<std::string, kMaxFaults> faults{};

@@ -144,8 +144,6 @@ ComparisonOptions comparison_options(const Configuration& c) {
     o.max_gap = std::max(o.max_gap, Duration::seconds(1.5 / c.ins.rate));
     o.max_wait = std::max(o.max_wait, Duration::seconds(0.5 + 1.5 / c.ins.rate));
   }
-  o.jump_m = c.comparison.jump_m;
-  o.scale_tolerance = c.comparison.scale_tolerance;
   return o;
 }
 
@@ -154,7 +152,6 @@ bool exposes_by_itself(const Configuration& c) { return c.exposure.mode != 0; }
 exposure::ExposureOptions exposure_options(const Configuration& c) {
   exposure::ExposureOptions o;
   o.target = c.exposure.target;
-  o.may_saturate = 0.01 * c.exposure.saturated_percent;
   o.least = microseconds(c.exposure.min_us);
   o.most = microseconds(c.exposure.max_us);
   o.max_gain_db = c.exposure.max_gain_db;
