@@ -11,7 +11,6 @@
 
 #include <fmt/format.h>
 
-#include "app/config/calibration_checks.hpp"
 #include "app/report/svg.hpp"
 
 namespace vergence::app::report {
@@ -22,45 +21,28 @@ namespace {
 constexpr std::array kAdvice{
     "",
     "A camera delivered no image: check its cable, its power and the trigger line.",
-    "Images carried no structure: clean the lenses, take covers off, set exposure and gain "
-    "for the light.",
+    "Images without structure: clean the lenses, take covers off, set exposure and gain.",
     "A camera sent an image twice: check its link, its buffers and its trigger rate.",
     "Too little texture: raise the exposure; check for fog, rain or dirt on the lenses.",
-    "Left and right do not fit this calibration: check for directories of different "
-    "sequences, an inverted T_camera_left (X_camera = R X_left + t), distortion set for "
-    "rectified images, wrong intrinsics, or cameras that do not expose together; "
-    "--from-scratch estimates the transform.",
-    "Left and right are swapped, or T_camera_left is inverted: swap cables, directories or "
-    "the order of the cameras; X_camera = R X_left + t.",
-    "Poses rested on few points: check the images at those times for dirt, blur or a "
-    "covered lens.",
-    "One camera did not support the pose: check its images for dirt, blur or a wrong "
-    "exposure.",
-    "Tracking failed: check the images at those times; a shorter exposure or a higher "
-    "frame rate helps in fast turns.",
+    "Left and right do not fit this calibration: check that they are of one sequence, exposed "
+    "together and not rectified twice, and T_camera_left (X_camera = R X_left + t).",
+    "Left and right are swapped, or T_camera_left is inverted: X_camera = R X_left + t.",
+    "Poses rested on few points: check the images for dirt, blur or a covered lens.",
+    "One camera did not support the pose: check its images for dirt, blur or wrong exposure.",
+    "Tracking failed: a shorter exposure or a higher frame rate helps in fast turns.",
     "Frames are missing: check cables, trigger and the disk's speed; see the events for when.",
-    "After a gap the motion across it was extrapolated: do not use distances that span it.",
-    "The points constrained the pose poorly: expected in tunnels, open fields and next to "
-    "walls; elsewhere check that the cameras are in sync.",
-    "Much of the image moved independently, for example a bus: compare those sections with "
-    "the map before use.",
-    "The calibration in use was not verified yet, or no longer: turns and near objects at "
-    "the roadside verify it.",
-    "The rig did not fit its calibration. If it did before, look for a camera that was "
-    "knocked or is loose on its mount; if it never did, check the supplied calibration: "
-    "T_camera_left or its rotation may be inverted, or the intrinsics belong to unrectified "
-    "images.",
+    "After a gap the motion across it was extrapolated: use no distance that spans it.",
+    "The points constrained the pose poorly, as in tunnels, open fields and next to walls.",
+    "Much of the image moved independently: compare those sections with the map before use.",
+    "The calibration in use is not verified: turns and near objects at the roadside verify it.",
+    "The rig did not fit its calibration: look for a camera that was knocked or is loose; if it "
+    "never fitted, check the supplied calibration.",
     "No calibration was available yet: do not use these poses for measurements.",
-    "A camera's images were taken at another instant: check trigger lines and exposure, and "
-    "restart the cameras together.",
-    "The calibration cannot be estimated at standstill: drive some metres past objects at "
-    "the roadside.",
-    "The calibration cannot be estimated from distant objects only: drive past houses, cars "
-    "or trees.",
-    "Too few matches between the cameras to estimate the calibration: check lenses and "
-    "exposure.",
-    "Pulses, counters and stamps contradicted each other: check trigger lines, exposure and "
-    "the trigger board; see the events.",
+    "A camera's images are of another instant: check trigger lines and exposure.",
+    "The calibration cannot be estimated at standstill: drive past objects at the roadside.",
+    "The calibration needs near objects: drive past houses, cars or trees.",
+    "Too few matches between the cameras to calibrate: check lenses and exposure.",
+    "Pulses, counters and stamps contradicted each other: check trigger lines and board.",
 };
 static_assert(kAdvice.size() == std::tuple_size_v<Analysis::ByReason>);
 
@@ -375,9 +357,7 @@ class Assessor {
                                    [](const CalibrationRow& c) { return !c.kept; });
     if (!any_accepted()) {
       if (a_.ok > 0 || a_.read == 0) find(Grade::care, "no calibration was found");
-      advise(
-          "No calibration was found: drive past objects near and far; calibrations.csv has the "
-          "reason of each attempt.");
+      advise("No calibration was found: drive past objects near and far; see calibrations.csv.");
     } else if (last != s_.calibrations.rend() && !last->accepted && !fits_as_well(*last)) {
       find(Grade::care, "the last calibration was rejected",
            last->reason.empty() ? "" : "The last calibration was rejected: " + last->reason + ".");
@@ -434,12 +414,6 @@ class Assessor {
                   "drive further, or set it lower.");
     if (a_.source == ErrorSource::none) {
       find(Grade::care, "drift unknown: no reference");
-      // Two cameras alone cannot tell a wrong unit: everything is too long or too short alike.
-      if (const std::string warning = s_.calibration ? baseline_warning(s_.calibration->rig) : "";
-          !warning.empty())
-        find(Grade::care, warning,
-             "Measure the baseline of the rig: all lengths are wrong by the same ratio as the "
-             "baseline.");
       return advise(
           "To measure drift, record with an INS, or compare with ground truth: vergence evaluate "
           "SESSION REFERENCE.");

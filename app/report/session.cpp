@@ -291,12 +291,6 @@ Session read_session(const fs::path& folder) {
   read_rows(folder / "calibrations.csv", "changes of the calibration are unknown", &s.calibrations,
             &s, &columns,
             [&](std::string_view /*line*/) { return parse_calibration_row(columns); });
-  // A run that never found a calibration has none to write.
-  const bool never_found =
-      s.summary.is_object() && std::ranges::none_of(s.calibrations, &CalibrationRow::accepted);
-  if (!never_found || fs::exists(folder / "calibration.yaml", error))
-    read_part(folder / "calibration.yaml", "the calibration in use at the end is unknown", &s,
-              [&] { s.calibration = read_calibration(folder / "calibration.yaml"); });
   read_rows(folder / "events.jsonl", "the events of the run are unknown", &s.events, &s, nullptr,
             parse_event);
   return s;

@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/config/calibration_file.hpp"
+#include "core/types/calibration.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/stamped_pose.hpp"
 
@@ -78,7 +78,6 @@ struct Session {
   std::vector<Event> events{};
   /// Null if missing or invalid.
   nlohmann::json summary{};
-  std::optional<CalibrationFile> calibration{};
   /// A message for each file that is missing, truncated or damaged.
   std::vector<std::string> missing{};
 };

@@ -46,8 +46,8 @@ TEST(Page, acceptsEveryTruncatedSession) {
   const test::TemporaryFolder whole;
   writer_of(300).write(whole.path());
   std::vector<std::string> pages;
-  for (const char* missing : {"summary.json", "poses.csv", "reference.tum", "calibrations.csv",
-                              "calibration.yaml", "events.jsonl"})
+  for (const char* missing :
+       {"summary.json", "poses.csv", "reference.tum", "calibrations.csv", "events.jsonl"})
     // Share of the file that is kept; a negative share removes the file.
     for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {
       const test::TemporaryFolder folder;

@@ -50,7 +50,6 @@ TEST(ReadSession, wholeSessionHasNothingMissing) {
   EXPECT_EQ(s.calibrations[4].reference_depth_m, 20);
   EXPECT_NEAR(s.calibrations[4].depth_sigma_percent, 0.1, 1e-9);
   EXPECT_EQ(s.reference.size(), 392U);
-  EXPECT_TRUE(s.calibration.has_value());
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);
 }
 
