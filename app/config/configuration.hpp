@@ -70,7 +70,7 @@ struct CameraSettings {
 struct ExposureSettings {
   /// 0: fixed, as configured in cameras[]; 1: automatic.
   int mode = 0;
-  double target = 90;
+  double target = 90, saturated_percent = 5;
   double min_us = 20, max_us = 8000, max_gain_db = 18;
   int settle_frames = 5;
 };
@@ -182,6 +182,12 @@ struct PublishSettings {
   std::string token_file{};
 };
 
+/// `sessions:` the folders that drives leave side by side.
+struct SessionsSettings {
+  /// Quota of the parent directory; 0: none.
+  int quota_mb = 0;
+};
+
 inline constexpr std::size_t kMaxFaults = 16;
 
 /// All user settings with their defaults. Each member is bound to a row of the schema
@@ -198,6 +204,7 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
+  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   /// `KIND@SECONDS NAME=NUMBER …`; empty: none.
   std::array<std::string, kMaxFaults> faults{};

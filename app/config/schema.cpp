@@ -197,6 +197,14 @@ Group publish() {
             "File with the page's token; empty: a new token each session.");
 }
 
+Group sessions() {
+  using S = SessionsSettings;
+  return Rows("sessions", "Session directories next to the one of `--out`.",
+              &Configuration::sessions)
+      .integer("quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
+               "Maximum total size: a run first removes the oldest beyond it. 0: never.");
+}
+
 Group realtime() {
   using R = RealtimeSettings;
   return Rows("realtime",
@@ -313,6 +321,8 @@ Group exposure() {
       .choice("mode", &E::mode, {"fixed", "auto"},
               "`auto`: one exposure for all cameras, by the brightness of camera 0.")
       .number("target", &E::target, 20, 200, "grey levels", "Target mean of the unmasked pixels.")
+      .number("saturated_percent", &E::saturated_percent, 0, 50, "%",
+              "Maximum share of saturated pixels.")
       .number("min_us", &E::min_us, 5, 100000, "µs", "Minimum exposure.")
       .number("max_us", &E::max_us, 10, 200000, "µs",
               "Maximum exposure; beyond it the gain is raised.")
@@ -412,6 +422,8 @@ Group odometry() {
               "Half width of the search band along the epipolar line.")
       .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
               "Standard deviation of a tracked corner per coordinate.")
+      .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
+              "Added in quadrature, times the sideways motion divided by the depth.")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
                "Keyframes in the sliding window.")
       .number("extrinsic_rotation_sigma_rad", &O::extrinsic_rotation_sigma_rad, 0, 0.05, "rad",
@@ -448,6 +460,8 @@ Group calibration_options() {
               "Maximum angle of the translation to the nominal one.")
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
               "Maximum rotation from the nominal one.")
+      .integer("min_near_points", &C::min_near_points, 0, 1000, "points",
+               "Minimum near points of the collected frames; below: `needs_near_structure`.")
       .number("extrinsic_random_walk_mrad_per_sqrt_h", &C::extrinsic_random_walk_mrad_per_sqrt_h, 0,
               100, "mrad/√h", "Random walk of undisturbed extrinsics.")
       .number("max_depth_error_percent", &C::max_depth_error_percent, 0.1, 50, "%",
@@ -568,7 +582,7 @@ const std::vector<Group>& schema() {
       groups::sync(),     groups::odometry(),   groups::calibration_options(),
       groups::monitor(),  groups::comparison(), groups::kitti_raw(),
       groups::mock(),     groups::record(),     groups::publish(),
-      groups::realtime(), groups::faults()};
+      groups::sessions(), groups::realtime(),   groups::faults()};
   return all;
 }
 

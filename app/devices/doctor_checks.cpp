@@ -76,7 +76,8 @@ std::vector<std::string> camera_nodes(const CheckContext& p) {
       if (name.starts_with("video") && p.machine.exists("/dev/" + name))
         nodes.push_back("/dev/" + name);
   if (asked("iidc-usb"))
-    nodes.insert(nodes.end(), p.inventory.point_grey.begin(), p.inventory.point_grey.end());
+    for (const UsbDevice& d : p.inventory.usb)
+      if (d.vendor == kPointGreyVendor) nodes.push_back(d.node());
   if (asked("iidc-1394"))
     for (const iidc::FirewireNode& n : p.inventory.firewire) nodes.push_back(n.device);
   return nodes;
@@ -102,6 +103,8 @@ std::vector<const FoundPort*> find_ports(const CheckContext& p, bool trigger) {
 constexpr double kBufferedImages = 8, kMinImages = 2;
 constexpr std::int64_t kMinBuffer = std::int64_t{4} << 20;
 constexpr std::int64_t kRecommendedBuffer = 10'485'760;
+// Packet sizes in bytes.
+constexpr int kJumbo = 9000, kStandard = 1500;
 
 std::optional<std::uint32_t> ipv4(const std::string& text) {
   in_addr a{};
@@ -159,6 +162,7 @@ class Checks {
     check_latency();
     check_network();
     check_limits();
+    check_clock();
     check_disk();
   }
   [[nodiscard]] std::vector<Finding>& findings() noexcept { return findings_; }
@@ -312,12 +316,29 @@ class Checks {
       add("camera_network", FindingState::ok, fmt::format("{}", fmt::join(reached, ", ")));
   }
 
+  void check_mtu(const std::string& name) {
+    const auto read = p_.machine.number("/sys/class/net/" + name + "/mtu").value_or(kStandard);
+    const auto mtu = std::clamp<std::int64_t>(read, 68, 65536);
+    const std::string message = fmt::format("{} has an MTU of {}", name, mtu);
+    if (mtu >= kJumbo) return add("mtu", FindingState::ok, message);
+    add("mtu", FindingState::advice,
+        fmt::format("{}; with {} (on the interface and every switch) a camera needs a quarter of "
+                    "the CPU time",
+                    message, kJumbo),
+        {fmt::format("sudo ip link set dev {} mtu {}", name, kJumbo),
+         fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", name, kJumbo)});
+  }
+
   /// Checks the network for GigE Vision cameras.
   void check_network() {
     const std::vector<Reached> cameras = gige_cameras(p_);
     if (cameras.empty()) return;
     check_receive_buffer();
     check_reach(cameras);
+    std::set<std::string> links;
+    for (const Reached& r : cameras)
+      if (r.through != nullptr) links.insert(r.through->name);
+    for (const std::string& name : links) check_mtu(name);
   }
 
   /// Checks a limit of this process, where threads or memory ask for it. `name` is that in
@@ -346,6 +367,16 @@ class Checks {
     check_limit("memory_lock", "realtime.lock_memory", "Max locked memory", CAP_IPC_LOCK,
                 p_.needs().realtime.lock_memory != 0 ? kLockedMemory : 0, FindingState::advice,
                 "memlock unlimited");
+  }
+
+  void check_clock() {
+    if (p_.machine.clock_synchronised.value_or(false))
+      return add("clock", FindingState::ok, "the system clock is synchronised");
+    // Without a clock with a battery a start begins with an old date; timesyncd remembers the last.
+    add("clock", FindingState::advice,
+        "the system clock is not synchronised: session dates may be wrong; intervals are correct",
+        {p_.machine.exists("/dev/rtc0") ? "sudo apt-get install chrony"
+                                        : "sudo apt-get install systemd-timesyncd"});
   }
 
   void check_disk() {

@@ -7,6 +7,7 @@
 #include <pwd.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <sys/timex.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -103,6 +104,13 @@ std::optional<DiskRoom> disk_room(const fs::path& folder) {
   return room;
 }
 
+std::optional<bool> kernel_clock_synchronised() {
+  timex t{};
+  const int state = ::adjtimex(&t);
+  if (state < 0) return std::nullopt;
+  return state != TIME_ERROR && (t.status & STA_UNSYNC) == 0;
+}
+
 }  // namespace
 
 Machine Machine::here() {
@@ -113,6 +121,7 @@ Machine Machine::here() {
   m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };
   m.group_of = group_of_node;
   m.room_at = disk_room;
+  m.clock_synchronised = kernel_clock_synchronised();
   return m;
 }
 
@@ -248,16 +257,40 @@ std::vector<FoundPort> list_ports(const Machine& machine) {
 
 }  // namespace
 
-std::vector<std::string> list_point_grey_nodes(const Machine& m) {
-  constexpr std::int64_t kPointGrey = 0x1E10;
-  std::vector<std::string> nodes;
-  for (const std::string& name : m.names("/sys/bus/usb/devices")) {
-    const std::string folder = "/sys/bus/usb/devices/" + name;
-    const auto bus = m.number(folder + "/busnum"), device = m.number(folder + "/devnum");
-    if (m.number(folder + "/idVendor", 16) == kPointGrey && bus && device)
-      nodes.push_back(fmt::format("/dev/bus/usb/{:03}/{:03}", *bus, *device));
+std::string UsbDevice::node() const { return fmt::format("/dev/bus/usb/{:03}/{:03}", bus, number); }
+
+std::vector<UsbDevice> list_usb_devices(const Machine& m) {
+  const std::string devices = "/sys/bus/usb/devices/";
+  const auto small_number = [&m](const std::string& path) {
+    const std::int64_t n = m.number(path).value_or(0);
+    return n > 0 && n < 1000 ? static_cast<int>(n) : 0;
+  };
+  std::vector<UsbDevice> all;
+  for (const std::string& name : m.names(devices)) {
+    // usb1 is a root hub, 1-2:1.0 an interface of 1-2.
+    if (name.find(':') != std::string::npos || name.find('-') == std::string::npos) continue;
+    const std::string folder = devices + name;
+    const auto vendor = m.number(folder + "/idVendor", 16),
+               product = m.number(folder + "/idProduct", 16);
+    if (!vendor || !product || *vendor < 0 || *vendor > 0xFFFF || *product < 0 || *product > 0xFFFF)
+      continue;
+    UsbDevice d;
+    d.port = name;
+    d.vendor = static_cast<std::uint16_t>(*vendor);
+    d.product = static_cast<std::uint16_t>(*product);
+    d.serial = m.line(folder + "/serial").value_or("");
+    const std::string maker = m.line(folder + "/manufacturer").value_or(""),
+                      title = m.line(folder + "/product").value_or("");
+    d.title = title.starts_with(maker) ? title : title.empty() ? maker : maker + " " + title;
+    d.bus = small_number(folder + "/busnum");
+    d.number = small_number(folder + "/devnum");
+    for (const std::string& entry : m.names(folder))
+      if (entry.starts_with(name + ":"))
+        for (std::string& node : m.names(fmt::format("{}/{}/video4linux", folder, entry)))
+          d.video.push_back(std::move(node));
+    all.push_back(std::move(d));
   }
-  return nodes;
+  return all;
 }
 
 const char* to_string(SerialKind kind) noexcept {
@@ -296,7 +329,7 @@ Inventory make_inventory(const Machine& machine, const InventoryOptions& options
     if (options.drivers.empty() ||
         std::ranges::find(options.drivers, row.name) != options.drivers.end())
       searches.emplace_back(&row, begin_search(row));
-  inventory.point_grey = list_point_grey_nodes(machine);
+  inventory.usb = list_usb_devices(machine);
   inventory.firewire = iidc::list_firewire_cameras(machine.root / "sys");
   inventory.ports = list_ports(machine);
 

@@ -51,6 +51,8 @@ struct Machine {
   std::function<std::string(const std::string& node)> group_of;
   /// Free space for this user; of a directory that does not exist yet, that of its future parent.
   std::function<std::optional<DiskRoom>(const std::filesystem::path& folder)> room_at;
+  /// State that the kernel reports.
+  std::optional<bool> clock_synchronised;
 
   /// Machine of this process.
   [[nodiscard]] static Machine here();
@@ -78,8 +80,27 @@ struct Machine {
   [[nodiscard]] std::filesystem::path at(const std::string& path) const;
 };
 
-/// Nodes of Point Grey's cameras on USB, such as /dev/bus/usb/001/004.
-[[nodiscard]] std::vector<std::string> list_point_grey_nodes(const Machine& machine);
+/// USB vendor id of the IIDC cameras.
+constexpr std::uint16_t kPointGreyVendor = 0x1E10;
+
+/// USB device as listed by the kernel; it is not opened.
+struct UsbDevice {
+  /// Bus and ports along the path, such as `1-2.3`; constant while the cable stays.
+  std::string port;
+  std::uint16_t vendor = 0, product = 0;
+  /// The title is manufacturer and product; either may be empty.
+  std::string serial, title;
+  /// 0 if unknown.
+  int bus = 0, number = 0;
+  /// Nodes of its interfaces: video0, …
+  std::vector<std::string> video;
+
+  /// Path such as /dev/bus/usb/001/004.
+  [[nodiscard]] std::string node() const;
+};
+
+/// All devices except root hubs, ordered by port.
+[[nodiscard]] std::vector<UsbDevice> list_usb_devices(const Machine& machine);
 
 /// Likely device at a serial port, by the USB ids of what carries it. The port is not
 /// opened, because that resets many boards. The values are keys of `devices --json`.
@@ -134,8 +155,7 @@ struct DriverFindings {
 struct Inventory {
   std::vector<DriverFindings> drivers;
   std::vector<FoundPort> ports;
-  /// Nodes of list_point_grey_nodes().
-  std::vector<std::string> point_grey;
+  std::vector<UsbDevice> usb;
   /// FireWire cameras.
   std::vector<iidc::FirewireNode> firewire;
 };

@@ -8,9 +8,9 @@
 /// Output of `vergence devices` and `vergence doctor`; docs/deployment.md has the keys of the JSON.
 namespace vergence::app {
 
-/// File for /etc/udev/rules.d: of IIDC cameras access by the group video and no autosuspend; of
-/// each serial port found access by the group dialout, a stable name under /dev/vergence, no
-/// ModemManager and the latency timer recommended in docs/ins.md.
+/// File for /etc/udev/rules.d for the plugged-in devices: access by the groups dialout and video,
+/// stable names under /dev/vergence, no ModemManager, the latency timer recommended in docs/ins.md,
+/// no autosuspend of cameras.
 ///
 /// Texts of devices are untrusted: of a serial number only letters, digits and `._-` are written;
 /// other characters match any one and are not part of a name.

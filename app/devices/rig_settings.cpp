@@ -152,6 +152,7 @@ bool exposes_by_itself(const Configuration& c) { return c.exposure.mode != 0; }
 exposure::ExposureOptions exposure_options(const Configuration& c) {
   exposure::ExposureOptions o;
   o.target = c.exposure.target;
+  o.may_saturate = 0.01 * c.exposure.saturated_percent;
   o.least = microseconds(c.exposure.min_us);
   o.most = microseconds(c.exposure.max_us);
   o.max_gain_db = c.exposure.max_gain_db;

@@ -26,6 +26,7 @@
 #include "app/session/drive_recorder.hpp"
 #include "app/session/drive_threads.hpp"
 #include "app/session/estimation_loop.hpp"
+#include "app/session/session_quota.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
@@ -87,6 +88,9 @@ class SessionRunner {
 
  private:
   void open() {
+    // On a full disk there is room for the folder only when the quota has made some.
+    if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
+      removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
     folder_made_ = make_session_folder(request_.out);
     try {
       open_files();
@@ -144,6 +148,10 @@ class SessionRunner {
     return start;
   }
   void print_remarks(Progress* progress) {
+    for (const std::string& message : removed_) {
+      progress->print("vergence: " + message);
+      loop_.event_log().log(facts_.first, "session_removed", message, false);
+    }
     for (const SourceRemark& remark : facts_.remarks) {
       if (remark.print) progress->print("vergence: " + remark.message);
       if (remark.kind != nullptr)
@@ -375,6 +383,8 @@ class SessionRunner {
   bool done_ = false;
   // True if this session created its directory.
   bool folder_made_ = false;
+  // One message per session that was deleted to respect the quota.
+  std::vector<std::string> removed_;
   // Used by the caller's thread only.
   bool halted_ = false;
   // Used by the caller's thread only.

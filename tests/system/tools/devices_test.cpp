@@ -96,6 +96,7 @@ TEST(Doctor, connectedCameraAndItsLinkAreEvaluated) {
   const json all = json::parse(o.out);
   EXPECT_EQ(of(all, "cameras").size(), 2U) << all.dump(1);
   EXPECT_TRUE(contains(of(all, "cameras").dump(), "cameras.0 (left) is gige TOOL-61"));
+  EXPECT_TRUE(contains(of(all, "mtu").dump(), "lo has an MTU of"));
   EXPECT_TRUE(contains(of(all, "camera_network").dump(), options.address + " through lo"));
 }
 

@@ -26,6 +26,7 @@ void put_gige(FakeMachine& f) {
   f.camera("gige", "15021234", "192.168.10.11");
   f.need("gige", "15021234");
   f.machine.addresses.push_back({"eth1", kHost, kMask24});
+  f.file("/sys/class/net/eth1/mtu", "9000\n");
   f.file("/proc/sys/net/core/rmem_max", "10485760\n");
 }
 void put_video_node(FakeMachine& f) {
@@ -67,6 +68,9 @@ const std::vector<Case>& cases() {
          put_gige(f), f.drive.cameras[0].width = 4000, f.drive.cameras[0].height = 3000;
        },
        "receive_buffer", "problem", "net.core.rmem_max=96000000"},
+      {"jumbo packets", put_gige, "mtu", "ok"},
+      {"small packets", [](auto& f) { put_gige(f), f.file("/sys/class/net/eth1/mtu", "1500\n"); },
+       "mtu", "advice", "sudo ip link set dev eth1 mtu 9000"},
       {"camera in another network",
        [](auto& f) { put_gige(f), f.camera("gige", "2", "169.254.7.1"); }, "camera_network",
        "problem ok", "sudo ip addr add 169.254.7.2/16"},
@@ -132,6 +136,9 @@ const std::vector<Case>& cases() {
          f.file("/proc/self/limits", kLimits), f.given = true, f.drive.realtime.lock_memory = 1;
        },
        "memory_lock", "advice"},
+      {"clock in step", [](auto&) {}, "clock", "ok"},
+      {"clock not in step", [](auto& f) { f.machine.clock_synchronised = false; }, "clock",
+       "advice", "systemd-timesyncd"},
       {"room", [](auto&) {}, "disk", "ok"},
       {"1 GiB is left", [](auto& f) { f.room->bytes = std::uint64_t{1} << 30; }, "disk", "advice"},
       {"disk is full", [](auto& f) { f.room->bytes = 1000; }, "disk", "problem"},

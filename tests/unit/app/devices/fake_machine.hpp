@@ -18,6 +18,7 @@ struct FakeMachine {
     };
     machine.group_of = [this](const std::string&) { return group; };
     machine.room_at = [this](const std::filesystem::path&) { return room; };
+    machine.clock_synchronised = true;
   }
   FakeMachine(const FakeMachine&) = delete;
   FakeMachine& operator=(const FakeMachine&) = delete;

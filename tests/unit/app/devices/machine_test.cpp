@@ -66,21 +66,35 @@ TEST(Machine, roomBehindClosedFolderIsNotWritable) {
   EXPECT_EQ(WEXITSTATUS(status), 0) << "1: it may write; 2: unknown; 3: no other user here";
 }
 
-TEST(UsbDevices, onlyPointGreysNodesAreListed) {
+TEST(UsbDevices, devicesAreListedAndNonsenseIsSkipped) {
   const FakeMachine f;
-  const auto usb = [&f](const std::string& port, const std::string& vendor,
-                        const std::string& number) {
+  const auto usb = [&f](const std::string& port, const std::string& vendor) {
     const std::string at = "/sys/bus/usb/devices/" + port + "/";
     f.file(at + "idVendor", vendor + "\n");
-    f.file(at + "busnum", "1\n");
-    f.file(at + "devnum", number + "\n");
+    f.file(at + "idProduct", "2005\n");
+    return at;
   };
-  usb("1-2", "1e10", "2");
-  usb("1-3", "046d", "3");
-  usb("1-4", "zzzz", "4");
-  usb("1-5", "1e10", "x");
-  usb("1-6", "11e10", "6");
-  EXPECT_EQ(list_point_grey_nodes(f.machine), std::vector<std::string>{"/dev/bus/usb/001/002"});
+  const std::string camera = usb("1-2", "1e10");
+  f.file(camera + "serial", "12345\n");
+  f.file(camera + "busnum", "1\n");
+  f.file(camera + "devnum", "2\n");
+  f.file(camera + "manufacturer", "Point Grey\n");
+  f.file(camera + "product", "Chameleon\n");
+  f.file(camera + "1-2:1.0/video4linux/video0/index", "0\n");
+  f.file(camera + "1-2:1.2/video4linux/video2/index", "0\n");
+  f.file(usb("1-3", "046d") + "devnum", "-7\n");
+  f.file("/sys/bus/usb/devices/1-3:1.0/video4linux", "not a folder");
+  (void)usb("usb1", "1d6b");
+  (void)usb("1-4", "zzzz");
+  (void)usb("1-6", "11e10");
+  f.file("/sys/bus/usb/devices/1-5/idVendor", "1e10\n");
+  const auto all = list_usb_devices(f.machine);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].title, "Point Grey Chameleon");
+  EXPECT_EQ(all[0].serial, "12345");
+  EXPECT_EQ(all[0].node(), "/dev/bus/usb/001/002");
+  EXPECT_EQ(all[0].video, (std::vector<std::string>{"video0", "video2"}));
+  EXPECT_EQ(all[1].number, 0);
 }
 
 TEST(SerialPorts, portIsNamedByNodeLinkOrSerial) {

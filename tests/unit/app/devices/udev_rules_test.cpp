@@ -24,16 +24,34 @@ testing::AssertionResult holds_as_rules(const std::string& rules) {
   return testing::AssertionFailure() << test::read_file(folder / "out") << rules;
 }
 
-TEST(UdevRules, everyPortIsNamedByItsSerial) {
+UsbDevice usb(std::uint16_t vendor, const std::string& serial, std::vector<std::string> video) {
+  return {.port = "1-2",
+          .vendor = vendor,
+          .product = 0x2005,
+          .serial = serial,
+          .title = serial,
+          .video = std::move(video)};
+}
+
+TEST(UdevRules, everyDeviceIsNamedByItsSerial) {
   Inventory i;
   i.ports = {port(0x2639, 0x0300, "X07"), port(0x0403, 0x6001, "A1B2"), port(0x2341, 0x0043, "75")};
+  i.usb = {usb(0x1E10, "15021234", {}), usb(0x046D, "CAM", {"video0", "video1"}),
+           usb(0x1234, "mouse", {})};
+  iidc::FirewireNode node;
+  node.device = "/dev/fw1";
+  node.rom.guid = 0x00B09D0100A1B2C3;
+  std::strcpy(node.rom.model.data(), "Flea2");
+  i.firewire = {node};
   const std::string rules = udev_rules(i);
   EXPECT_TRUE(holds_as_rules(rules));
   for (const char* part :
        {"vergence/ins-X07", "vergence/serial-A1B2", "vergence/trigger-75",
-        "ATTR{idVendor}==\"1e10\"", "ATTRS{serial}==\"A1B2\", ATTR{latency_timer}=\"16\"",
+        "vergence/camera-15021234", "vergence/camera-CAM", "vergence/camera-00b09d0100a1b2c3",
+        "ATTR{guid}==\"0x00b09d0100a1b2c3\"", "ATTRS{serial}==\"A1B2\", ATTR{latency_timer}=\"16\"",
         "ID_MM_DEVICE_IGNORE", "ATTR{power/control}=\"on\""})
     EXPECT_TRUE(contains(rules, part)) << part;
+  EXPECT_FALSE(contains(rules, "mouse"));
 }
 
 TEST(UdevRules, portsOfRigAreNamedByConfiguredDevice) {
@@ -42,6 +60,7 @@ TEST(UdevRules, portsOfRigAreNamedByConfiguredDevice) {
   i.ports = {port(0x0403, 0x6001, "A1"), port(0x0403, 0x6001, "B2"), port(0x0483, 0x5740, "C3")};
   i.ports[1].info.port = "/dev/ttyUSB1";
   i.ports[2].info.port = "/dev/ttyACM0";
+  i.usb = {usb(0x1E10, "1", {})};
   Configuration needs;
   needs.ins.driver = "xsens";
   needs.ins.port = "/dev/ttyUSB1";
@@ -49,7 +68,7 @@ TEST(UdevRules, portsOfRigAreNamedByConfiguredDevice) {
   needs.trigger.port = "C3";
   const std::string rules = udev_rules(ports_of_rig(i, needs, f.machine));
   EXPECT_TRUE(holds_as_rules(rules));
-  for (const char* name : {"vergence/ins-B2", "vergence/trigger-C3"})
+  for (const char* name : {"vergence/ins-B2", "vergence/trigger-C3", "vergence/camera-1"})
     EXPECT_TRUE(contains(rules, name)) << name << "\n" << rules;
   EXPECT_FALSE(contains(rules, "A1")) << rules;
 }
@@ -59,12 +78,13 @@ TEST(UdevRules, textOfDeviceCannotAddRules) {
   Inventory i;
   i.ports = {port(0x0403, 0x6001, evil)};
   i.ports[0].info.description = evil;
+  i.usb = {usb(0x1E10, evil, {}), usb(0x046D, evil, {"video0"})};
   const std::string rules = udev_rules(i);
   EXPECT_TRUE(holds_as_rules(rules));
   std::istringstream lines(rules);
   for (std::string line; std::getline(lines, line);) {
     if (line.starts_with("#")) continue;
-    for (const char* part : {"RUN+", "RUN=", "$", "* ", "/etc"})
+    for (const char* part : {"RUN+", "RUN=", "$", "*", "/etc"})
       EXPECT_FALSE(contains(line, part)) << line;
   }
 }
