@@ -175,13 +175,9 @@ std::string as_switch(const std::string& value, const std::vector<std::string>& 
     return std::ranges::find(words, word) != words.end();
   };
   if (!is_choice("on") || !is_choice("off")) return value;
-  std::string lower = value;
-  std::ranges::transform(lower, lower.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  if (lower == "true" || lower == "yes" || lower == "on") return "on";
-  if (lower == "false" || lower == "no" || lower == "off") return "off";
-  return value;
+  bool on = false;
+  if (!YAML::convert<bool>::decode(YAML::Node(value), on)) return value;
+  return on ? "on" : "off";
 }
 
 void apply(const Entry& entry, Configuration* configuration) {
@@ -344,14 +340,11 @@ std::vector<std::pair<std::string, std::string>> changed_settings(const Configur
 }
 
 std::string canonical_text(const Configuration& configuration) {
-  std::vector<std::string> lines;
+  std::set<std::string> lines;
   for (const Group& group : schema())
     for (const Key& key : group.keys)
-      lines.push_back(key.name + "=" + to_text(key.get(configuration)) + "\n");
-  std::ranges::sort(lines);
-  std::string text;
-  for (const std::string& line : lines) text += line;
-  return text;
+      lines.insert(key.name + "=" + to_text(key.get(configuration)) + "\n");
+  return fmt::format("{}", fmt::join(lines, ""));
 }
 
 std::string configuration_hash(const Configuration& configuration) {

@@ -614,21 +614,20 @@ std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
 std::string find_contradiction(const Configuration& c) {
   for (std::size_t k = 0; k < c.cameras.size(); ++k)
     if (std::string unread = find_unread_lens(c.cameras[k], k); !unread.empty()) return unread;
-  if (c.odometry.ok_inliers < c.odometry.min_inliers)
-    return fmt::format(
-        "odometry.ok_inliers ({}) is below odometry.min_inliers ({}), so a pose would be lost "
-        "before it is degraded; raise odometry.ok_inliers",
-        c.odometry.ok_inliers, c.odometry.min_inliers);
-  if (c.calibration.max_frames < c.calibration.min_frames)
-    return fmt::format(
-        "calibration.max_frames ({}) is below calibration.min_frames ({}), so no calibration would "
-        "be attempted; raise calibration.max_frames",
-        c.calibration.max_frames, c.calibration.min_frames);
-  if (c.calibration.usable_depth_percent < c.calibration.good_depth_percent)
-    return fmt::format(
-        "calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({}); raise "
-        "the first or lower the second",
-        c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
+  struct Order {
+    const char *larger, *smaller;
+    double high, low;
+  };
+  for (const Order& o :
+       {Order{"odometry.ok_inliers", "odometry.min_inliers", double(c.odometry.ok_inliers),
+              double(c.odometry.min_inliers)},
+        Order{"calibration.max_frames", "calibration.min_frames", double(c.calibration.max_frames),
+              double(c.calibration.min_frames)},
+        Order{"calibration.usable_depth_percent", "calibration.good_depth_percent",
+              c.calibration.usable_depth_percent, c.calibration.good_depth_percent}})
+    if (o.high < o.low)
+      return fmt::format("{} ({}) is below {} ({}); raise the first or lower the second", o.larger,
+                         o.high, o.smaller, o.low);
   for (const auto& [key, list] :
        {std::pair<const char*, const std::string&>{"affinity", c.realtime.affinity},
         {"solver_affinity", c.realtime.solver_affinity}})

@@ -14,29 +14,13 @@ namespace vergence::app {
 
 namespace {
 
-bool plain(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-';
-}
-
-/// At most 64 letters; those that mean something in a rule or a path become `other`.
+/// At most 64 characters; those that mean something in a rule or a path become `other`: `?` matches
+/// any one on the right side of `==`.
 std::string plain_text(const std::string& text, char other) {
   std::string out = text.substr(0, 64);
   std::ranges::replace_if(
-      out, [](char c) { return !plain(c); }, other);
-  return out;
-}
-
-/// The right side of `==`, which is a pattern.
-std::string pattern(const std::string& text) { return plain_text(text, '?'); }
-
-/// A name under /dev/vergence.
-std::string part_of_name(const std::string& text) { return plain_text(text, '_'); }
-
-/// For a comment: one line.
-std::string comment(const std::string& text) {
-  std::string out = text.substr(0, 80);
-  std::ranges::replace_if(
-      out, [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+      out, [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '_' && c != '-'; },
+      other);
   return out;
 }
 
@@ -46,27 +30,26 @@ std::string which(const char* attribute, std::uint16_t vendor, std::uint16_t pro
                   const std::string& serial) {
   std::string s = fmt::format("{0}{{idVendor}}==\"{1:04x}\", {0}{{idProduct}}==\"{2:04x}\"",
                               attribute, vendor, product);
-  if (!serial.empty()) s += fmt::format(", {}{{serial}}==\"{}\"", attribute, pattern(serial));
+  if (!serial.empty())
+    s += fmt::format(", {}{{serial}}==\"{}\"", attribute, plain_text(serial, '?'));
   return s;
-}
-
-const char* name_of(SerialKind kind) {
-  if (kind == SerialKind::ins) return "ins";
-  return kind == SerialKind::board ? "trigger" : "serial";
 }
 
 std::string port_rules(const FoundPort& port) {
   const SerialPortInfo& i = port.info;
   const std::string who = which("ATTRS", i.usb_vendor, i.usb_product, i.usb_serial);
-  std::string out = fmt::format("\n# {}: {}\n", i.port, comment(i.description));
+  std::string out = fmt::format("\n# {}: {}\n", i.port, plain_text(i.description, ' '));
   out += fmt::format(
       "ENV{{DEVTYPE}}==\"usb_device\", {}, ENV{{ID_MM_DEVICE_IGNORE}}=\"1\", "
       "ATTR{{power/control}}=\"on\"\n",
       which("ATTR", i.usb_vendor, i.usb_product, i.usb_serial));
   out += fmt::format("SUBSYSTEM==\"tty\", {}, GROUP=\"dialout\", MODE=\"0660\", ", who);
   if (!i.usb_serial.empty())
-    out += fmt::format("SYMLINK+=\"vergence/{}-{}\", ", name_of(port.kind),
-                       part_of_name(i.usb_serial));
+    out += fmt::format("SYMLINK+=\"vergence/{}-{}\", ",
+                       port.kind == SerialKind::ins     ? "ins"
+                       : port.kind == SerialKind::board ? "trigger"
+                                                        : "serial",
+                       plain_text(i.usb_serial, '_'));
   out += "ENV{ID_MM_PORT_IGNORE}=\"1\"\n";
   if (is_ftdi(i.usb_vendor, i.usb_product))
     out += fmt::format(
@@ -77,22 +60,19 @@ std::string port_rules(const FoundPort& port) {
 }
 
 std::string usb_camera_rules(const UsbDevice& d) {
-  const bool iidc = d.vendor == kPointGreyVendor;
-  std::string out = fmt::format("\n# camera on USB {}: {}\n", d.port, comment(d.title));
-  out += fmt::format(
-      "ENV{{DEVTYPE}}==\"usb_device\", {}, GROUP=\"video\", MODE=\"0660\", "
-      "ATTR{{power/control}}=\"on\"",
-      which("ATTR", d.vendor, d.product, d.serial));
-  if (iidc && !d.serial.empty())
-    out += fmt::format(", SYMLINK+=\"vergence/camera-{}\"", part_of_name(d.serial));
-  out += "\n";
-  if (!d.video.empty())
-    out += fmt::format("SUBSYSTEM==\"video4linux\", {}, GROUP=\"video\", MODE=\"0660\"\n",
-                       which("ATTRS", d.vendor, d.product, d.serial));
-  if (!d.video.empty() && !d.serial.empty())
-    out += fmt::format(
-        "SUBSYSTEM==\"video4linux\", ATTR{{index}}==\"0\", {}, SYMLINK+=\"vergence/camera-{}\"\n",
-        which("ATTRS", d.vendor, d.product, d.serial), part_of_name(d.serial));
+  const std::string above = which("ATTRS", d.vendor, d.product, d.serial),
+                    link = d.serial.empty() ? ""
+                                            : fmt::format(", SYMLINK+=\"vergence/camera-{}\"",
+                                                          plain_text(d.serial, '_'));
+  std::string out = fmt::format(
+      "\n# camera on USB {}: {}\nENV{{DEVTYPE}}==\"usb_device\", {}, GROUP=\"video\", "
+      "MODE=\"0660\", ATTR{{power/control}}=\"on\"{}\n",
+      d.port, plain_text(d.title, ' '), which("ATTR", d.vendor, d.product, d.serial),
+      d.vendor == kPointGreyVendor ? link : "");
+  if (d.video.empty()) return out;
+  out += fmt::format("SUBSYSTEM==\"video4linux\", {}, GROUP=\"video\", MODE=\"0660\"\n", above);
+  if (!link.empty())
+    out += fmt::format("SUBSYSTEM==\"video4linux\", ATTR{{index}}==\"0\", {}{}\n", above, link);
   return out;
 }
 
@@ -100,7 +80,7 @@ std::string firewire_rules(const iidc::FirewireNode& node) {
   return fmt::format(
       "\n# camera on IEEE 1394, {}: {}\nSUBSYSTEM==\"firewire\", ATTR{{guid}}==\"0x{:016x}\", "
       "GROUP=\"video\", MODE=\"0660\", SYMLINK+=\"vergence/camera-{:016x}\"\n",
-      node.device, comment(node.rom.model.data()), node.rom.guid, node.rom.guid);
+      node.device, plain_text(node.rom.model.data(), ' '), node.rom.guid, node.rom.guid);
 }
 
 using Json = nlohmann::ordered_json;

@@ -59,18 +59,12 @@ class Columns {
   std::vector<std::string_view> fields_;
 };
 
+/// Null if there is nothing at that path, whose parts are separated by dots.
 const nlohmann::json* find_path(const nlohmann::json& json, std::string_view path) {
-  const nlohmann::json* at = &json;
-  while (!path.empty()) {
-    const std::size_t dot = path.find('.');
-    const std::string key(path.substr(0, dot));
-    path.remove_prefix(dot == std::string_view::npos ? path.size() : dot + 1);
-    if (!at->is_object()) return nullptr;
-    const auto found = at->find(key);
-    if (found == at->end()) return nullptr;
-    at = &*found;
-  }
-  return at;
+  std::string pointer = "/" + std::string(path);
+  std::ranges::replace(pointer, '.', '/');
+  const nlohmann::json::json_pointer at(pointer);
+  return json.contains(at) ? &json.at(at) : nullptr;
 }
 
 /// Calls `read`; a missing file, or what is wrong with it, becomes a message of `missing`.

@@ -273,8 +273,7 @@ class SessionRunner {
       faults->emplace_back(e.what());
     }
     faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-    for (const std::string& message : recorder_->pop_errors())
-      progress->print("vergence: " + message);
+    print_recording_errors(progress);
     for (const std::string& message : *faults) progress->print("vergence: " + message);
   }
   void print_metrics(const SessionTotals& totals, const SummaryInput& input,
