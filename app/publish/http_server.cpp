@@ -147,6 +147,7 @@ struct HttpServer::Callbacks {
   static MHD_Result request(void* server, MHD_Connection* c, const char* url, const char* method,
                             const char* /*version*/, const char* /*body*/, std::size_t* /*size*/,
                             void** /*state*/) noexcept {
+    static_cast<HttpServer*>(server)->asking_.remove(c);
     HttpRequest r;
     r.method = method;
     r.path = url;
@@ -168,6 +169,23 @@ struct HttpServer::Callbacks {
       return MHD_NO;
     }
   }
+
+  static void connection(void* server, MHD_Connection* c, void** /*state*/,
+                         MHD_ConnectionNotificationCode what) noexcept {
+    auto& asking = static_cast<HttpServer*>(server)->asking_;
+    asking.remove(c);
+    if (what != MHD_CONNECTION_NOTIFY_STARTED) return;
+    try {
+      asking.push_back(c);
+    } catch (const std::exception&) {
+    }
+    if (asking.size() <= kAsking) return;
+    // The library closes the connection after its shutdown.
+    const MHD_ConnectionInfo* socket =
+        ::MHD_get_connection_info(asking.front(), MHD_CONNECTION_INFO_CONNECTION_FD);
+    if (socket != nullptr) (void)::shutdown(socket->connect_fd, SHUT_RDWR);
+    asking.pop_front();
+  }
 };
 
 HttpServer::HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page,
@@ -175,10 +193,10 @@ HttpServer::HttpServer(const HostPort& address, HttpPolicy policy, std::string_v
     : policy_(std::move(policy)), page_(page), handler_(std::move(handler)) {
   FileDescriptor listener = listen_at(address);
   daemon_.reset(::MHD_start_daemon(
-      MHD_USE_EPOLL, 0, nullptr, nullptr, &Callbacks::request, this, MHD_OPTION_LISTEN_SOCKET,
-      listener.get(), MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-      kRequestBytes, MHD_OPTION_CONNECTION_TIMEOUT, kPatience, MHD_OPTION_STRICT_FOR_CLIENT, 1,
-      MHD_OPTION_END));
+      MHD_USE_EPOLL, 0, nullptr, nullptr, &Callbacks::request, this, MHD_OPTION_NOTIFY_CONNECTION,
+      &Callbacks::connection, this, MHD_OPTION_LISTEN_SOCKET, listener.get(),
+      MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_MEMORY_LIMIT, kRequestBytes,
+      MHD_OPTION_CONNECTION_TIMEOUT, kPatience, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END));
   if (daemon_ == nullptr)
     throw InputError(
         "publish.http: the system has no memory or file descriptors left for the live page; raise "

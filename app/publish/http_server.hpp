@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -66,6 +67,8 @@ struct HttpDecision {
 class HttpServer {
  public:
   static constexpr unsigned kConnections = 64;
+  /// Maximum number of connections without a request; the oldest is closed.
+  static constexpr std::size_t kAsking = 24;
   /// Browsers send some 600 bytes.
   static constexpr std::size_t kRequestBytes = std::size_t{8} << 10U;
 
@@ -94,6 +97,8 @@ class HttpServer {
   const HttpPolicy policy_;
   const std::string_view page_;
   const Handler handler_;
+  // Connections without a request yet, oldest first.
+  std::list<MHD_Connection*> asking_;
   // Last member, because it uses the others.
   std::unique_ptr<MHD_Daemon, StopDaemon> daemon_;
 };

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "app/session/recorded_source.hpp"
 #include "app/session/session_source.hpp"
@@ -71,14 +72,44 @@ void calibrate_unknown(ReplayRequest request, const SignalGuard& signals, Stereo
   *begin = std::move(other);
 }
 
+/// Initial calibration of a recorded session, if requested to differ from the recorded one.
+std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
+                                                   const RecordedSession& session) {
+  if (!request.calibration && !request.from_scratch && !request.baseline) return std::nullopt;
+  const CalibrationUse use{request.from_scratch, request.baseline.value_or(0)};
+  StartingCalibration begin = recorded_beginning(session.description(), request.data.string());
+  if (request.calibration) {
+    const Intrinsics& lens = begin.file.rig.intrinsics[0];
+    const int recorded = begin.file.rig.cameras;
+    begin.file = read_any_calibration(*request.calibration, ImageSize{lens.width, lens.height},
+                                      &begin.remarks, use);
+    if (begin.file.rig.cameras != recorded)
+      throw InputError(fmt::format(
+          "{}: has {} cameras, but {} was recorded with {}; use the calibration of that rig",
+          *request.calibration, begin.file.rig.cameras, request.data.string(), recorded));
+    begin.source = std::filesystem::path(*request.calibration).filename().string();
+    for (const std::string& message : begin.remarks)
+      if (!request.session.quiet) fmt::print(stderr, "vergence: {}\n", message);
+  } else {
+    apply_use(use, &begin.file.rig);
+  }
+  begin.trust = request.from_scratch ? CalibrationTrust::none : CalibrationTrust::given;
+  begin.cause = "given";
+  if (request.from_scratch) begin.source = "none";
+  begin.nominal =
+      nominal_geometry(begin.file.rig, begin.file.rig, request.configuration.calibration);
+  return begin;
+}
+
 ExitCode replay_recording(const ReplayRequest& request) {
   RecordedSession session = RecordedSession::open(request.data);
   if (request.start >= session.frames().size())
     throw InputError(
         fmt::format("--start {} is beyond the end: {} has {} frames; choose a smaller index",
                     request.start, request.data.string(), session.frames().size()));
-  const auto source =
-      with_plain_errors([&] { return session_source(request, std::move(session)); });
+  auto other = other_beginning(request, session);
+  const auto source = with_plain_errors(
+      [&] { return session_source(request, std::move(session), std::move(other)); });
   const SignalGuard signals;
   return run_session(*source, request.configuration, request.session, signals);
 }
@@ -114,9 +145,8 @@ std::vector<std::string> recorded_settings(const std::filesystem::path& session)
 
 ExitCode run_replay(const ReplayRequest& request) {
   // With another calibration a recorded session is a sequence of images like any other.
-  const bool as_recorded = !request.calibration && !request.baseline && !request.from_scratch &&
-                           !request.calibrate_first && !request.known;
-  if (request.format == SequenceFormat::session && as_recorded) return replay_recording(request);
+  if (request.format == SequenceFormat::session && !request.calibrate_first && !request.known)
+    return replay_recording(request);
   StereoSequence sequence = open_drive(request);
   if (request.start >= sequence.pairs.size())
     throw InputError(

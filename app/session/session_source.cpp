@@ -21,23 +21,15 @@ const char* to_cause(const std::string& word) {
   return "given";
 }
 
-StartingCalibration initial_calibration(const SessionDescription& d, const std::string& name) {
-  StartingCalibration begin;
-  begin.file = parse_calibration(d.calibration, name + " (calibration)");
-  begin.nominal = parse_calibration(d.nominal, name + " (nominal)").rig;
-  begin.trust = d.trust;
-  begin.cause = to_cause(d.cause);
-  begin.source = d.source;
-  return begin;
-}
-
-/// Facts of a replay of frames `first` to before `end`.
+/// Facts of a replay of frames `first` to before `end`. `other`: as SessionSource's.
 SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSession& session,
-                               std::size_t first, std::size_t end) {
+                               std::optional<StartingCalibration> other, std::size_t first,
+                               std::size_t end) {
   const SessionDescription& d = session.description();
+  const bool as_then = !other;
   SourceFacts facts;
-  facts.begin = initial_calibration(d, request.data.string());
-  facts.adoption = d.adoption;
+  facts.begin = other ? std::move(*other) : recorded_beginning(d, request.data.string());
+  facts.adoption = as_then ? d.adoption : Adoption::after_fixed_frames;
   facts.frames = end - first;
   facts.first = session.frames()[first].given.stamp;
   if (d.ins && !session.readings().empty())
@@ -45,10 +37,21 @@ SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSessi
                           d.mount_source, session.readings().capacity() * sizeof(InsRecord)};
   for (const std::string& message : session.remarks())
     facts.remarks.push_back({message, "data", !request.session.quiet});
-  if (!session.complete())
+  if (as_then && !session.complete())
     facts.remarks.push_back({"the recording is incomplete: the poses differ from those of the run",
                              "data", !request.session.quiet});
+  for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
+    const Intrinsics& lens = facts.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
+    facts.image_bytes +=
+        static_cast<std::size_t>(lens.width) * static_cast<std::size_t>(lens.height);
+  }
   return facts;
+}
+
+/// Time-dependent decisions of a recorded frame, which the estimator repeats.
+void decide_as_then(const FrameRecord& given, SourceFrame* frame) noexcept {
+  frame->solver_idle = given.solver_done;
+  frame->rig.effort = given.sample.effort;
 }
 
 /// A calibration was requested before that frame.
@@ -67,19 +70,19 @@ SourceEvent recalibration_as_then(Stamp stamp) noexcept {
 ///            the calibration's.
 class SessionSource final : public FrameSource {
  public:
-  SessionSource(const ReplayRequest& request, RecordedSession session)
+  SessionSource(const ReplayRequest& request, RecordedSession session,
+                std::optional<StartingCalibration> other)
       : request_(request),
         session_(std::move(session)),
+        other_(other.has_value()),
         end_(std::min(session_.frames().size(),
                       request.start + request.frames.value_or(session_.frames().size()))),
         next_frame_(request.start) {
-    facts_ = facts_of_recording(request, session_, next_frame_, end_);
+    facts_ = facts_of_recording(request, session_, std::move(other), next_frame_, end_);
     const RigCalibration& rig = facts_.begin.file.rig;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
       pixels_[k].resize(static_cast<std::size_t>(rig.intrinsics[k].width) *
                         static_cast<std::size_t>(rig.intrinsics[k].height));
-      facts_.image_bytes += pixels_[k].size();
-    }
     for (std::size_t i = next_frame_; i < end_; ++i) {
       const RecordedFrame& frame = session_.frames()[i];
       for (std::size_t k = 0; k < kMaxCameras; ++k) {
@@ -137,7 +140,7 @@ class SessionSource final : public FrameSource {
     input->devices.emplace_back("images_missing", images_missing_);
   }
   void print_metrics(const SummaryInput& /*input*/, Progress* progress) const override {
-    if (session_.complete() && images_missing_ == 0 && request_.start == 0)
+    if (!other_ && session_.complete() && images_missing_ == 0 && request_.start == 0)
       progress->print(
           "the estimator received the same input as in the recorded run; compare with " +
           (request_.data / "trajectory.tum").string());
@@ -155,9 +158,7 @@ class SessionSource final : public FrameSource {
     frame.rig.pairing = static_cast<Pairing>(
         std::min(given.pairing, static_cast<std::uint8_t>(Pairing::contradicted)));
     frame.rig.cameras = facts_.begin.file.rig.cameras;
-    // Time-dependent decisions, which the estimator repeats.
-    frame.solver_idle = given.solver_done;
-    frame.rig.effort = given.sample.effort;
+    if (!other_) decide_as_then(given, &frame);
     auto read = [&] {
       for (std::size_t k = 0; k < static_cast<std::size_t>(frame.rig.cameras); ++k) {
         if ((given.images_present >> k & 1U) == 0) continue;
@@ -178,6 +179,8 @@ class SessionSource final : public FrameSource {
   const ReplayRequest& request_;
   // Has no frames after finish().
   RecordedSession session_;
+  // True if the replay begins at another frame than the recorded run.
+  const bool other_;
   // Index after the last frame of this replay.
   const std::size_t end_;
   SourceFacts facts_;
@@ -196,8 +199,19 @@ class SessionSource final : public FrameSource {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> session_source(const ReplayRequest& request, RecordedSession session) {
-  return std::make_unique<SessionSource>(request, std::move(session));
+StartingCalibration recorded_beginning(const SessionDescription& d, const std::string& name) {
+  StartingCalibration begin;
+  begin.file = parse_calibration(d.calibration, name + " (calibration)");
+  begin.nominal = parse_calibration(d.nominal, name + " (nominal)").rig;
+  begin.trust = d.trust;
+  begin.cause = to_cause(d.cause);
+  begin.source = d.source;
+  return begin;
+}
+
+std::unique_ptr<FrameSource> session_source(const ReplayRequest& request, RecordedSession session,
+                                            std::optional<StartingCalibration> other) {
+  return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
 }
 
 }  // namespace vergence::app

@@ -85,7 +85,7 @@ std::optional<SourceEvent> TimingMonitor::of_reading(const InsRecord& reading) n
   const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
                        reading.sample.fix != fix_ ||
                        std::abs(count - int{quality_.satellites}) >= kMany;
-  if (!changed) return std::nullopt;
+  if (!changed) return of_utc(reading);
   any_quality_ = true;
   quality_ = q;
   fix_ = reading.sample.fix;
@@ -96,6 +96,20 @@ std::optional<SourceEvent> TimingMonitor::of_reading(const InsRecord& reading) n
                                  !given           ? ""
                                  : q.filter_valid ? ", filter valid"
                                                   : ", filter not valid")};
+}
+
+std::optional<SourceEvent> TimingMonitor::of_utc(const InsRecord& reading) noexcept {
+  // Minimum clock step in s that is reported.
+  constexpr double kStep = 0.1;
+  if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return std::nullopt;
+  const double ahead =
+      static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
+  if (reported_ahead_s_ && std::abs(ahead - *reported_ahead_s_) < kStep) return std::nullopt;
+  reported_ahead_s_ = ahead;
+  return SourceEvent{EventRecord(
+      reading.sample.stamp, "utc_offset",
+      "the session's stamps are {:.4f} s {} the INS's UTC; they follow the host clock at the start",
+      std::abs(ahead), ahead < 0 ? "behind" : "ahead of")};
 }
 
 void TimingMonitor::record_pose(const AcquiredFrame& frame, float estimate_ms,

@@ -22,7 +22,8 @@ class TimingMonitor {
   [[nodiscard]] static SourceEvent of_device(const DeviceEvent& event) noexcept;
   /// Event of a set that was handed out, if a run of ambiguous ones begins.
   [[nodiscard]] std::optional<SourceEvent> of_set(const AcquiredFrame& frame) noexcept;
-  /// Event of an INS sample, if the state of the receiver or the filter has changed.
+  /// Event of an INS sample, if the state of the receiver or the filter has changed, or the offset
+  /// of the session's stamps from UTC.
   [[nodiscard]] std::optional<SourceEvent> of_reading(const InsRecord& reading) noexcept;
 
   /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,
@@ -34,6 +35,8 @@ class TimingMonitor {
                                             std::size_t cameras, bool has_ins) const;
 
  private:
+  [[nodiscard]] std::optional<SourceEvent> of_utc(const InsRecord& reading) noexcept;
+
   SyncMode mode_;
   bool virtual_;
   // True if the last set was ambiguous.
@@ -43,6 +46,8 @@ class TimingMonitor {
   InsQuality quality_{};
   FixStatus fix_ = FixStatus::none;
   bool any_quality_ = false;
+  // Last reported lead of the session's stamps over the INS's UTC, in s.
+  std::optional<double> reported_ahead_s_{};
 };
 
 }  // namespace vergence::app

@@ -164,7 +164,7 @@ TEST_F(Http, stalledViewerHoldsOneResponse) {
   EXPECT_EQ(states_, 1);
 }
 
-TEST_F(Http, garbageIsDropped) {
+TEST_F(Http, garbageAndIdleConnectionsAreDropped) {
   std::mt19937 random(7);
   for (int i = 0; i < 50; ++i) {
     std::string noise(random() % 9000, '\0');
@@ -175,6 +175,18 @@ TEST_F(Http, garbageIsDropped) {
     EXPECT_EQ(answer.find(" 200 "), std::string::npos);
   }
   EXPECT_TRUE(acted_.empty());
+  std::vector<FileDescriptor> idle;
+  for (int i = 0; i < 500; ++i) idle.push_back(connect());
+  serve();
+  const FileDescriptor other = connect();
+  const std::string text = "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  (void)::send(other.get(), text.data(), text.size(), MSG_NOSIGNAL);
+  std::string answer;
+  for (int i = 0; i < 1000 && !answer.ends_with(kPage); ++i) {
+    server_->step(std::chrono::milliseconds(1));
+    answer += received(other);
+  }
+  EXPECT_TRUE(answer.ends_with(kPage));
 }
 
 /// An address of the configuration and what is read of it; port 0: refused.
