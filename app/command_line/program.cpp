@@ -64,10 +64,28 @@ std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   // Unknown arguments are reported first: this is often why something else seems to be missing.
   const auto extras = command.remaining();
   if (extras.empty()) return who + error.what() + hint;
-  const std::string argument = extras.front().substr(0, extras.front().find('='));
-  const bool option = argument.size() > 1 && argument.front() == '-';
-  return who + (option ? "unknown option " : "unexpected argument ") + "\"" + argument + "\"" +
-         did_you_mean(argument, option ? option_names(command) : command_names(command)) + hint;
+  const auto is_option = [](const std::string& word) {
+    return word.size() > 1 && word.front() == '-';
+  };
+  const auto message = [&](const std::string& word, const std::string& why) {
+    const std::string name = word.substr(0, word.find('='));
+    return who + (is_option(word) ? "unknown option " : "unexpected argument ") + "\"" + name +
+           "\"" + why + hint;
+  };
+  // An option of an earlier version explains the other words.
+  for (const bool options : {true, false})
+    for (const std::string& word : extras) {
+      if (is_option(word) != options) continue;
+      std::string why = options ? "" : did_you_mean(word, command_names(command));
+      if (why.empty())
+        why = new_name(Renamed::Kind::option,
+                       words + " " + (options ? word.substr(0, word.find('=')) : "CONFIG"));
+      if (!why.empty()) return message(word, why);
+    }
+  const std::string& first = extras.front();
+  return message(first, is_option(first)
+                            ? did_you_mean(first.substr(0, first.find('=')), option_names(command))
+                            : "");
 }
 
 /// A first word that is no command is answered here: CLI11 would only call it unexpected.

@@ -75,8 +75,8 @@ std::string other_images(const RigCalibration& found, const RigCalibration& expe
   for (std::size_t k = 0; k < static_cast<std::size_t>(found.cameras); ++k) {
     const Intrinsics &x = found.intrinsics[k], &y = expected.intrinsics[k];
     if (x.width != y.width || x.height != y.height)
-      return fmt::format("its camera {} has {} x {} pixels, the configuration's {} x {}", k,
-                         x.width, x.height, y.width, y.height);
+      return fmt::format("its camera {0} has {1} x {2} pixels, but cameras.{0}.size is {3} x {4}",
+                         k, x.width, x.height, y.width, y.height);
   }
   return "";
 }

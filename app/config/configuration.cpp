@@ -141,8 +141,12 @@ std::string suggestion(const std::string& name) {
     if (find_key(entry.name.substr(0, dot)) != nullptr)
       throw InputError(entry.origin + ": " + entry.name.substr(0, dot) +
                        " takes one value, not a group or a list");
+  // The items of a list have the same keys: the table has item 0's.
+  std::string in_table = entry.name;
+  if (in_table.starts_with("cameras.") && in_table.size() > 8) in_table[8] = '0';
+  const std::string why = new_name(Renamed::Kind::key, in_table);
   throw InputError(entry.origin + ": unknown key \"" + entry.name.substr(0, 120) + "\"" +
-                   suggestion(entry.name));
+                   (why.empty() ? suggestion(entry.name) : why));
 }
 
 /// The rest of a message "it must be …".
@@ -198,10 +202,12 @@ void apply(const Entry& entry, Configuration* configuration) {
     return key->set(*configuration, parse_number<double>(entry, *key, "a number"));
   const std::string value = as_switch(entry.value, key->words);
   const bool unset = value.empty() && to_text(key->get(Configuration{})).empty();
-  if (!key->words.empty() && !unset && std::ranges::find(key->words, value) == key->words.end())
+  if (!key->words.empty() && !unset && std::ranges::find(key->words, value) == key->words.end()) {
+    const std::string why = new_name(Renamed::Kind::value, key->name + " " + value);
     throw InputError(fmt::format("{}: {} is \"{}\"; it must be one of {}{}", entry.origin,
                                  key->name, value.substr(0, 60), range_text(*key),
-                                 did_you_mean(value, key->words)));
+                                 why.empty() ? did_you_mean(value, key->words) : why));
+  }
   if (key->words.empty() && static_cast<double>(value.size()) > key->most)
     throw InputError(fmt::format("{}: {} is longer than the limit of {} bytes; shorten it",
                                  entry.origin, key->name, key->most));

@@ -24,8 +24,9 @@ constexpr std::array kAdvice{
     "Images without structure: clean the lenses, take covers off, set exposure and gain.",
     "A camera sent an image twice: check its link, its buffers and its trigger rate.",
     "Too little texture: raise the exposure; check for fog, rain or dirt on the lenses.",
-    "Left and right do not fit this calibration: check that they are of one sequence, exposed "
-    "together and not rectified twice, and T_camera_left (X_camera = R X_left + t).",
+    "Left and right do not fit this calibration: check for directories of different sequences, an "
+    "inverted T_camera_left (X_camera = R X_left + t), distortion set for rectified images, wrong "
+    "intrinsics, or cameras that do not expose together.",
     "Left and right are swapped, or T_camera_left is inverted: X_camera = R X_left + t.",
     "Poses rested on few points: check the images for dirt, blur or a covered lens.",
     "One camera did not support the pose: check its images for dirt, blur or wrong exposure.",
@@ -35,8 +36,9 @@ constexpr std::array kAdvice{
     "The points constrained the pose poorly, as in tunnels, open fields and next to walls.",
     "Much of the image moved independently: compare those sections with the map before use.",
     "The calibration in use is not verified: turns and near objects at the roadside verify it.",
-    "The rig did not fit its calibration: look for a camera that was knocked or is loose; if it "
-    "never fitted, check the supplied calibration.",
+    "The rig did not fit its calibration: look for a camera that was knocked or is loose. If it "
+    "never fitted, check the supplied calibration: T_camera_left or its rotation may be inverted, "
+    "or the intrinsics belong to unrectified images.",
     "No calibration was available yet: do not use these poses for measurements.",
     "A camera's images are of another instant: check trigger lines and exposure.",
     "The calibration cannot be estimated at standstill: drive past objects at the roadside.",

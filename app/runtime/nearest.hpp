@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,5 +37,19 @@ namespace vergence::app {
 /// Text `; did you mean "X"?` for a message, or "" if no word is close.
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        const std::vector<std::string>& known);
+
+/// A name of an earlier version that a user may still write.
+struct Renamed {
+  enum class Kind { key, value, option } kind;
+  // Former name, such as `record.roll_mb`, `sync.mode bus` or `run --page`.
+  std::string_view name;
+  // Current name.
+  std::string_view now;
+};
+
+[[nodiscard]] std::span<const Renamed> renamed();
+
+/// `; it is now …` for an error message about an unknown name; empty where it was not renamed.
+[[nodiscard]] std::string new_name(Renamed::Kind kind, std::string_view name);
 
 }  // namespace vergence::app

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/nearest.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -22,6 +23,24 @@ testing::AssertionResult refused_in_one_message(const Outcome& outcome) {
     return testing::AssertionSuccess();
   return testing::AssertionFailure() << "exit code " << outcome.code << ", stdout \"" << outcome.out
                                      << "\", stderr \"" << outcome.err << '"';
+}
+
+TEST(Program, renamedWordsAreRefusedWithTheirNewName) {
+  using Kind = Renamed::Kind;
+  const test::TemporaryFolder folder;
+  folder.write("rig.yaml", "threads: 1\n");
+  const std::string out = " --out '" + (folder / "out").string() + "'",
+                    run = "run '" + (folder / "rig.yaml").string() + "'" + out + " --set ";
+  for (const Renamed& row : renamed()) {
+    const std::string name(row.name);
+    const std::string words = row.kind == Kind::key ? run + name + "=1"
+                              : row.kind == Kind::value
+                                  ? run + std::string(name).replace(name.find(' '), 1, "=")
+                                  : name + " x" + out;
+    const Outcome outcome = run_vergence(words);
+    EXPECT_TRUE(refused_in_one_message(outcome)) << name;
+    EXPECT_TRUE(contains(outcome.err, std::string(row.now))) << name << ": " << outcome.err;
+  }
 }
 
 TEST(Program, unknownCommandNamesNearest) {

@@ -49,7 +49,8 @@ TEST(Configuration, suggestsOnlyKeysThatAreNear) {
         std::pair{"cameras.driver=mock", "cameras is a list"},
         std::pair{"cameras.7.name=a", "at most 4 items, numbered from 0"},
         std::pair{"rig.name:a=1", "a colon needs a space"},
-        std::pair{"calibration.online=of", "one of off, on; did you mean \"off\"?"}})
+        std::pair{"calibration.online=of", "one of off, on; did you mean \"off\"?"},
+        std::pair{"sync.mode=bus", "it is now ieee1394_cycle_time"}})
     EXPECT_TRUE(contains(refusal("", {setting}), part)) << refusal("", {setting});
 }
 
