@@ -71,7 +71,7 @@ void declare_board(CLI::App& command, CalibrateOptions& o) {
   command.add_flag("--k3", o.sixth_order, "radtan: also estimate k3")->group("Calibration");
   add_option(command, "--baseline", o.baseline, "Measured baseline in metres, for comparison", "M",
              "Calibration")
-      ->check(CLI::Range(0.001, 100.0));
+      ->check(in_range(0.001, 100, "metres"));
   declare_out(command, o);
   command.add_flag("--json", o.json, "Print JSON instead of tables")->group("Output");
   o.common.declare_quiet(command);

@@ -21,6 +21,17 @@ CLI::Validator one_of(std::vector<std::string> values) {
           "{" + list + "}"};
 }
 
+CLI::Validator in_range(double least, double most, const char* unit) {
+  return {[=](const std::string& given) {
+            double value = 0;
+            // Written so that a NaN is refused.
+            return CLI::detail::lexical_cast(given, value) && value >= least && value <= most
+                       ? std::string()
+                       : fmt::format("\"{}\" must be {:g} to {:g} {}", given, least, most, unit);
+          },
+          ""};
+}
+
 void CommonOptions::declare_set(CLI::App& command) {
   // Each --set takes one argument, so that the next word is not read as another KEY=VALUE.
   add_option(command, "--set", set, "Set a configuration key (docs/configuration.md); repeatable",
@@ -37,7 +48,7 @@ void CommonOptions::declare(CLI::App& command) {
   declare_set(command);
   add_option(command, "--threads", threads,
              "Threads of the estimator, 1 or 2; the poses are the same", "N", "Performance")
-      ->check(CLI::Range(1, 2).description(""));
+      ->check(in_range(1, 2, "threads"));
   add_option(command, "--seed", seed,
              "Seed of the random sampling; the same seed gives the same poses", "N", "Performance");
   declare_quiet(command);

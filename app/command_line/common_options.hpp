@@ -40,6 +40,9 @@ CLI::Option* add_option(CLI::App& command, const char* name, Value& value, const
 /// Accepts one of the values, and names them in the help and in the message for another one.
 [[nodiscard]] CLI::Validator one_of(std::vector<std::string> values);
 
+/// Accepts a number from `least` to `most`, both included.
+[[nodiscard]] CLI::Validator in_range(double least, double most, const char* unit);
+
 /// Last lines of the help of commands that write a session.
 extern const char* const kSessionExitCodes;
 

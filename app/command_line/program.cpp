@@ -7,7 +7,6 @@
 #include <exception>
 #include <iostream>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/runtime/nearest.hpp"
@@ -57,39 +56,6 @@ CLI::App& named_command(CLI::App& root) {
   return *command;
 }
 
-/// Error message for an argument that `command` does not define, with the nearest one that it does.
-struct UnknownArgument {
-  std::string name, why;
-  bool option = false;
-};
-
-UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
-  UnknownArgument argument;
-  argument.name = given.substr(0, given.find('='));
-  argument.option = argument.name.size() > 1 && argument.name.front() == '-';
-  if (!argument.option) argument.why = did_you_mean(argument.name, command_names(command));
-  if (argument.why.empty())
-    argument.why =
-        new_name(Renamed::Kind::option,
-                 full_name(command) + " " + (argument.option ? argument.name : "CONFIG"));
-  return argument;
-}
-
-/// Message for a value that CLI11 cannot convert, as its own names neither the option's unit nor
-/// what is expected.
-std::string conversion_message(const CLI::ParseError& error, const CLI::App& command) {
-  std::string message = error.what();
-  for (const CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_name(false, false);
-    if (message.find(": " + name + " = ") == std::string::npos) continue;
-    const std::string type = option->get_type_name();
-    const std::string given = option->results().empty() ? "" : option->results().back();
-    return name + ": \"" + given + "\" is not a " + (type == "N" ? "whole number" : "number") +
-           (type.empty() || type == "N" ? "" : " (" + type + ")") + " or is out of range";
-  }
-  return message;
-}
-
 /// CLI11's errors about a command line, as one message.
 std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   CLI::App& command = named_command(root);
@@ -97,28 +63,29 @@ std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   const std::string hint = " (see 'vergence" + (words.empty() ? "" : " " + words) + " --help')";
   // Unknown arguments are reported first: this is often why something else seems to be missing.
   const auto extras = command.remaining();
-  if (extras.empty())
-    return who +
-           (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr
-                ? conversion_message(error, command)
-                : error.what()) +
-           hint;
-  // An option of an earlier version explains the other words.
-  std::vector<UnknownArgument> unknown;
-  unknown.reserve(extras.size());
-  for (const std::string& extra : extras) unknown.push_back(unknown_argument(extra, command));
-  const auto explained = [&](bool option) {
-    return std::ranges::find_if(unknown, [&](const UnknownArgument& argument) {
-      return argument.option == option && !argument.why.empty();
-    });
+  if (extras.empty()) return who + error.what() + hint;
+  const auto is_option = [](const std::string& word) {
+    return word.size() > 1 && word.front() == '-';
   };
-  auto first = explained(true);
-  if (first == unknown.end()) first = explained(false);
-  if (first == unknown.end()) first = unknown.begin();
-  if (first->option && first->why.empty())
-    first->why = did_you_mean(first->name, option_names(command));
-  return who + (first->option ? "unknown option " : "unexpected argument ") + "\"" + first->name +
-         "\"" + first->why + hint;
+  const auto message = [&](const std::string& word, const std::string& why) {
+    const std::string name = word.substr(0, word.find('='));
+    return who + (is_option(word) ? "unknown option " : "unexpected argument ") + "\"" + name +
+           "\"" + why + hint;
+  };
+  // An option of an earlier version explains the other words.
+  for (const bool options : {true, false})
+    for (const std::string& word : extras) {
+      if (is_option(word) != options) continue;
+      std::string why = options ? "" : did_you_mean(word, command_names(command));
+      if (why.empty())
+        why = new_name(Renamed::Kind::option,
+                       words + " " + (options ? word.substr(0, word.find('=')) : "CONFIG"));
+      if (!why.empty()) return message(word, why);
+    }
+  const std::string& first = extras.front();
+  return message(first, is_option(first)
+                            ? did_you_mean(first.substr(0, first.find('=')), option_names(command))
+                            : "");
 }
 
 /// A first word that is no command is answered here: CLI11 would only call it unexpected.
@@ -126,31 +93,13 @@ void check_command(CLI::App& root, int argc, const char* const* argv) {
   if (argc < 2) throw InputError("no command is given; 'vergence --help' lists the commands");
   const std::string argument = argv[1];
   if (!argument.empty() && argument.front() == '-') return;
-  auto words = command_names(root);
-  words.insert(words.end(), {"help", "version"});
+  const std::vector<std::string> words = command_names(root);
   if (std::ranges::find(words, argument) != words.end()) return;
   throw InputError("unknown command \"" + argument + "\"" + did_you_mean(argument, words) +
                    " ('vergence --help' lists the commands)");
 }
 
-/// `help`, `help COMMAND`, `help COMMAND SUBCOMMAND` and `version` as the options that they stand
-/// for.
-std::vector<const char*> with_help_options(int argc, const char* const* argv) {
-  std::vector<const char*> words(argv, argv + argc);
-  if (argc < 2) return words;
-  const std::string_view first = argv[1];
-  if (first == "version") words[1] = "--version";
-  if (first != "help") return words;
-  words.erase(words.begin() + 1);
-  words.resize(std::min<std::size_t>(words.size(), 3));
-  words.push_back("--help");
-  return words;
-}
-
-ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add_commands) {
-  const std::vector<const char*> words = with_help_options(given, given_argv);
-  const int argc = static_cast<int>(words.size());
-  const char* const* argv = words.data();
+ExitCode parse_and_run(int argc, const char* const* argv, AddCommands add_commands) {
   CLI::App root("Stereo visual odometry with online calibration", "vergence");
   ExitCode exit_code = ExitCode::done;
   root.set_version_flag("--version",
@@ -160,7 +109,7 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
       "Start: vergence replay FOLDER --out DIR. 'vergence COMMAND --help' has options, an example "
       "and\n"
       "exit codes.");
-  add_commands(root, {given_argv, static_cast<std::size_t>(given)}, &exit_code);
+  add_commands(root, {argv, static_cast<std::size_t>(argc)}, &exit_code);
   check_command(root, argc, argv);
   try {
     root.parse(argc, argv);

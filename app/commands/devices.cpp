@@ -55,7 +55,7 @@ void list(const DevicesArguments& a, bool rules_asked) {
   else if (rules_asked && to_stdout)
     std::cout << rules;
   else
-    std::cout << devices_text(inventory, Terminal::of_stdout());
+    std::cout << devices_text(inventory);
 }
 
 }  // namespace

@@ -30,8 +30,7 @@ ExitCode examine_machine(const DoctorArguments& a) {
   const Inventory inventory = make_inventory(machine, options);
   const std::vector<Finding> findings =
       run_checks({machine, inventory, drive ? &*drive : nullptr, a.out});
-  std::cout << (a.json ? doctor_json(findings)
-                       : doctor_text(findings, drive.has_value(), Terminal::of_stdout()));
+  std::cout << (a.json ? doctor_json(findings) : doctor_text(findings, drive.has_value()));
   const bool any = std::ranges::any_of(
       findings, [](const Finding& f) { return f.state == FindingState::problem; });
   return any ? ExitCode::not_usable : ExitCode::done;

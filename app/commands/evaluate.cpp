@@ -13,6 +13,9 @@
 namespace vergence::app {
 namespace {
 
+// Maximum duration in s: eleven days, longer than any recording.
+constexpr double kLongest = 1e6;
+
 /// The words as given; checked when the command runs.
 struct EvaluateArguments {
   EvaluationRequest request;
@@ -40,14 +43,6 @@ std::vector<double> parse_lengths(const std::string& text) {
       throw InputError("--lengths: `" + std::string(fields[i]) +
                        "` is not a length in metres; give them like 100,200,300");
   return lengths;
-}
-
-Duration parse_duration(const char* option, double seconds) {
-  // Maximum in s: eleven days, longer than any recording.
-  constexpr double kLongest = 1e6;
-  if (!(seconds >= 0) || seconds > kLongest)
-    throw InputError(std::string(option) + " must be 0 to 1e6 seconds");
-  return Duration::seconds(seconds);
 }
 
 /// KITTI's lengths, and shorter ones for drives that are too short for these.
@@ -83,10 +78,9 @@ std::optional<QuaternionOrder> parse_order(std::string_view word) {
 EvaluationOptions make_options(const EvaluateArguments& a) {
   EvaluationOptions options;
   options.association = a.associate == "nearest" ? Association::nearest : Association::interpolate;
-  options.max_gap = parse_duration("--max-gap", a.max_gap);
-  options.max_difference = parse_duration("--max-difference", a.max_difference);
+  options.max_gap = Duration::seconds(a.max_gap);
+  options.max_difference = Duration::seconds(a.max_difference);
   options.axes = a.axes == "flu" ? BodyAxes::forward_left_up : BodyAxes::camera;
-  if (a.step && *a.step < 1) throw InputError("--step must be a whole number of poses, 1 or more");
   if (a.lengths)
     options.segments = {{parse_lengths(*a.lengths), a.step.value_or(10), false}};
   else
@@ -120,7 +114,8 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "--lengths", a->lengths,
              "Segment lengths in metres [100 to 800; shorter ones for short paths]", "M,…");
   add_option(*command, "--step", a->step,
-             "Start a segment at every Nth pose [10; 1 for short segments]", "N");
+             "Start a segment at every Nth pose [10; 1 for short segments]", "N")
+      ->check(in_range(1, 1e9, "poses"));
   command
       ->add_option("--associate", a->associate,
                    "Reference at an estimate's stamp: interpolated, or the nearest pose")
@@ -128,9 +123,11 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
       ->capture_default_str();
   add_option(*command, "--max-gap", a->max_gap,
              "With interpolate: longest gap of the reference that is bridged", "SECONDS")
+      ->check(in_range(0, kLongest, "seconds"))
       ->capture_default_str();
   add_option(*command, "--max-difference", a->max_difference,
              "With nearest: largest difference of the stamps", "SECONDS")
+      ->check(in_range(0, kLongest, "seconds"))
       ->capture_default_str();
   command
       ->add_option("--axes", a->axes,

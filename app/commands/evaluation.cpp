@@ -15,7 +15,6 @@
 #include "app/session/ins_file.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/robust.hpp"
-#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
@@ -191,80 +190,23 @@ ExitCode report_no_mount(const EvaluationRequest& a, const Reference& from,
   return ExitCode::not_usable;
 }
 
-constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
-
-/// Returns true if positions agree and rotations do not.
-bool rotations_differ(const TrajectoryEvaluation& e) {
+/// What to check where positions agree and rotations do not; empty: both agree.
+std::string rotation_remark(const Files& files, const TrajectoryEvaluation& e) {
+  constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
   // Relative to the path length.
   constexpr double kPositionsAgree = 0.05;
-  return e.status == EvaluationStatus::ok && !e.se3.roll_unobservable &&
-         e.ate_se3.rmse < kPositionsAgree * e.path_reference &&
-         e.rotation_se3.median > kRotationsDiffer;
-}
-
-/// The turn from one body to the other where it is the same all the way; nothing: it is not.
-std::optional<double> constant_turn(const Trajectory& estimate, const Trajectory& reference,
-                                    const EvaluationOptions& options,
-                                    const TrajectoryEvaluation& e) {
-  const MatchedTrajectories matched = associate(estimate, reference, options);
-  const auto turn = [&](std::size_t i) -> Mat3 {
-    return matched.reference[i].T_world_body.R.transpose() * e.se3.R_reference_estimate *
-           matched.estimate[i].T_world_body.R;
-  };
-  if (matched.estimate.empty()) return std::nullopt;
-  const Mat3 first = turn(matched.estimate.size() / 2);
-  std::size_t near = 0;
-  for (std::size_t i = 0; i < matched.estimate.size(); ++i)
-    near += rotation_angle(first.transpose() * turn(i)) < kRotationsDiffer / 2 ? 1 : 0;
-  if (10 * near < 9 * matched.estimate.size()) return std::nullopt;
-  return rotation_angle(first);
-}
-
-/// Explains rotations that disagree while positions agree.
-std::string rotation_remark(const EvaluationRequest& a, const Files& files,
-                            const Trajectory& reference, const EvaluationOptions& options,
-                            const TrajectoryEvaluation& e) {
-  const std::string what = fmt::format("positions agree, but rotations differ by {:.0f}° (median)",
-                                       e.rotation_se3.median * kDegreesPerRadian);
-  const auto helps = [&](const Trajectory& of_estimate, const Trajectory& of_reference) {
-    const TrajectoryEvaluation other = evaluate(of_estimate, of_reference, options);
-    return other.status == EvaluationStatus::ok && other.rotation_se3.median < kRotationsDiffer;
-  };
-  const auto option = [](const TrajectoryFile& file) {
+  if (e.se3.roll_unobservable || e.ate_se3.rmse >= kPositionsAgree * e.path_reference ||
+      e.rotation_se3.median <= kRotationsDiffer)
+    return "";
+  const auto other = [](const TrajectoryFile& file) {
     return file.order == QuaternionOrder::xyzw ? "wxyz" : "xyzw";
   };
-  const auto order = [&](const fs::path& path, const char* comma, const TrajectoryFile& file) {
-    return fmt::format("{}: {} probably has w {} in its quaternions; use --quaternion {}{}", what,
-                       path.string(), file.order == QuaternionOrder::xyzw ? "first" : "last", comma,
-                       option(file));
-  };
-  const Trajectory& estimate = files.estimate.poses;
-  const auto of_estimate = [&] {
-    return helps(in_other_order(estimate, files.estimate.order), reference);
-  };
-  const auto of_reference = [&] {
-    return !files.reference.poses.empty() && !a.estimate_ins_extrinsics &&
-           helps(estimate, in_other_order(files.reference.poses, files.reference.order));
-  };
-  // Where both would help, the order that is unusual is the doubtful one.
-  const bool reference_first = files.reference.order == QuaternionOrder::wxyz &&
-                               !files.reference.order_reported &&
-                               files.estimate.order == QuaternionOrder::xyzw;
-  if (reference_first && of_reference()) return order(a.reference, ",", files.reference);
-  if (of_estimate()) return order(a.estimate, "", files.estimate);
-  if (of_reference()) return order(a.reference, ",", files.reference);
-  if (const auto turn = constant_turn(estimate, reference, options, e))
-    return fmt::format(
-        "{}: the axes of the two bodies differ by a constant rotation of {:.0f}° (a camera and an "
-        "IMU or a vehicle?); --estimate-ins-extrinsics estimates it",
-        what, *turn * kDegreesPerRadian);
-  Trajectory inverse = estimate;
-  for (StampedPose& pose : inverse) pose.T_world_body.R.transposeInPlace();
-  if (helps(inverse, reference))
-    return what +
-           ": the estimate's rotations are probably from world to body; write the inverse, from "
-           "body to world";
-  return what + ": check the axes and the quaternion order of both files (--quaternion wxyz)";
+  return fmt::format(
+      "positions agree, but rotations differ by {:.0f}° (median); check the order of the "
+      "quaternions (--quaternion {}, for the reference --quaternion ,{}), that rotations are from "
+      "body to world, and the axes of both bodies (--estimate-ins-extrinsics estimates a constant "
+      "rotation)",
+      e.rotation_se3.median * kDegreesPerRadian, other(files.estimate), other(files.reference));
 }
 
 void print(const EvaluationRequest& a, const EvaluationOptions& options, const Brought& reference,
@@ -300,8 +242,8 @@ ExitCode run_evaluation(const EvaluationRequest& a) {
   if (evaluation.status == EvaluationStatus::ok) {
     if (const std::string holes = gap_remark(evaluation, options, interval); !holes.empty())
       warn(holes);
-    if (rotations_differ(evaluation))
-      warn(rotation_remark(a, files, reference.poses, options, evaluation));
+    if (const std::string remark = rotation_remark(files, evaluation); !remark.empty())
+      warn(remark);
     return ExitCode::done;
   }
   warn(a.estimate.string() + " against " + from.path.string() + ": " +

@@ -80,13 +80,17 @@ void table_row(std::string* out, const char* name, const std::array<double, 4>& 
                  symbol);
 }
 
-void statistics_row(std::string* out, const char* name, const ErrorStatistics& s, double unit,
-                    const char* symbol) {
-  table_row(out, name, {s.rmse, s.mean, s.median, s.max}, unit, symbol);
+void table_head(std::string* out, const char* what, const std::array<const char*, 4>& columns) {
+  fmt::format_to(std::back_inserter(*out), "{:<36}{:>11} {:>11} {:>11} {:>11}\n",
+                 fmt::format("  {}", what), columns[0], columns[1], columns[2], columns[3]);
 }
 
-void heading_row(std::string* out, const char* name, const HeadingErrors& h) {
-  table_row(out, name, {h.rms, h.mean, h.max_abs, h.last}, kDegreesPerRadian, "deg");
+std::array<double, 4> values_of(const ErrorStatistics& s) {
+  return {s.rmse, s.mean, s.median, s.max};
+}
+
+std::array<double, 4> values_of(const HeadingErrors& h) {
+  return {h.rms, h.mean, h.max_abs, h.last};
 }
 
 void segment_rows(std::string* out, const SegmentErrors& segments) {
@@ -106,33 +110,22 @@ void segment_rows(std::string* out, const SegmentErrors& segments) {
   row("all", segments.count, segments.translation, segments.rotation);
 }
 
-/// Nothing: no three finite numbers.
-std::optional<Vec3> read_vector(const Json& mount, const char* key) {
-  const auto found = mount.find(key);
-  if (found == mount.end() || !found->is_array() || found->size() != 3) return std::nullopt;
-  Vec3 v;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (!(*found)[k].is_number()) return std::nullopt;
-    v[static_cast<int>(k)] = (*found)[k].get<double>();
-  }
-  return v.allFinite() ? std::optional(v) : std::nullopt;
-}
-
 /// The mount of a session's summary. Nothing: there is none, as of a drive without an INS or one
 /// that was cut off.
 std::optional<InsMount> mount_in(const std::filesystem::path& summary) {
   constexpr std::size_t kLargest = std::size_t{1} << 26U;
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(summary, ignored)) return std::nullopt;
-  const Json all = Json::parse(read_text(summary, kLargest), nullptr, false);
-  const Json mount = all.is_object() ? all.value("/enu/mount"_json_pointer, Json()) : Json();
-  if (!mount.is_object()) return std::nullopt;
-  const auto arm = read_vector(mount, "lever_arm_m"), turn = read_vector(mount, "boresight_deg");
-  if (!arm || !turn) return std::nullopt;
-  std::string source = summary.string();
-  if (const auto said = mount.find("source"); said != mount.end() && said->is_string())
-    source += ": " + said->get<std::string>();
-  return InsMount{mount_of(*arm, *turn * kRadiansPerDegree), source, false};
+  try {
+    const Json mount = Json::parse(read_text(summary, kLargest)).at("/enu/mount"_json_pointer);
+    const auto arm = mount.at("lever_arm_m").get<std::array<double, 3>>(),
+               turn = mount.at("boresight_deg").get<std::array<double, 3>>();
+    return InsMount{mount_of(Vec3(arm.data()), Vec3(turn.data()) * kRadiansPerDegree),
+                    fmt::format("{}: {}", summary.string(), mount.value("source", "unknown")),
+                    false};
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
 }
 
 Json value_json(const MountValue& v, double unit) {
@@ -202,18 +195,18 @@ std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptio
       at, "scale: {:.6f} (Sim(3): reference = scale * R * estimate + t; reported, not applied)\n\n",
       e.sim3.scale);
 
-  fmt::format_to(at, "  {:<34}{:>11} {:>11} {:>11} {:>11}\n", "position error", "rmse", "mean",
-                 "median", "max");
-  statistics_row(&out, "SE(3)-aligned", e.ate_se3, 1.0, "m");
-  statistics_row(&out, "Sim(3)-aligned", e.ate_sim3, 1.0, "m");
-  statistics_row(&out, "not aligned", e.ate_unaligned, 1.0, "m");
-  fmt::format_to(at, "\n  {:<34}{:>11} {:>11} {:>11} {:>11}\n", "heading error", "rms", "mean",
-                 "max", "last");
-  heading_row(&out, "start-aligned", e.heading_start_aligned);
-  heading_row(&out, "SE(3)-aligned", e.heading_se3);
-  fmt::format_to(at, "\n  {:<34}{:>11} {:>11} {:>11} {:>11}\n", "rotation error", "rmse", "mean",
-                 "median", "max");
-  statistics_row(&out, "SE(3)-aligned", e.rotation_se3, kDegreesPerRadian, "deg");
+  constexpr std::array kStatistics{"rmse", "mean", "median", "max"};
+  table_head(&out, "position error", kStatistics);
+  table_row(&out, "SE(3)-aligned", values_of(e.ate_se3), 1.0, "m");
+  table_row(&out, "Sim(3)-aligned", values_of(e.ate_sim3), 1.0, "m");
+  table_row(&out, "not aligned", values_of(e.ate_unaligned), 1.0, "m");
+  out += '\n';
+  table_head(&out, "heading error", {"rms", "mean", "max", "last"});
+  table_row(&out, "start-aligned", values_of(e.heading_start_aligned), kDegreesPerRadian, "deg");
+  table_row(&out, "SE(3)-aligned", values_of(e.heading_se3), kDegreesPerRadian, "deg");
+  out += '\n';
+  table_head(&out, "rotation error", kStatistics);
+  table_row(&out, "SE(3)-aligned", values_of(e.rotation_se3), kDegreesPerRadian, "deg");
   if (e.se3.roll_unobservable)
     out +=
         "  The path is nearly straight: positions do not determine the rotation about it. Use the "

@@ -9,18 +9,17 @@
 #include "app/publish/publish.hpp"
 #include "app/session/replay_session.hpp"
 
-#include <fmt/format.h>
-
 namespace vergence::app {
 namespace {
+
+// Of --start and --frames.
+constexpr double kMostFrames = 1e9;
 
 /// The words as given; checked when the command runs.
 struct ReplayArguments {
   CommonOptions common;
   std::string format = "auto", model = "radtan";
   std::optional<double> focal;
-  std::int64_t start = 0;
-  std::optional<std::int64_t> frames;
   bool page = false;
   ReplayRequest request;
 };
@@ -34,9 +33,6 @@ std::optional<AssumedIntrinsics> known_numbers(const ReplayArguments& a) {
     throw InputError(
         "--focal needs --baseline, the distance of the two cameras in metres; images cannot show "
         "it");
-  if (!(*a.focal >= 10 && *a.focal <= 1e5))
-    throw InputError(
-        fmt::format("replay: --focal {:g}: must be 10 to 100000, in pixels", *a.focal));
   return AssumedIntrinsics{*a.focal, *a.request.baseline,
                            a.model == "equidistant" ? CameraModelKind::pinhole_equidistant
                                                     : CameraModelKind::pinhole_radtan};
@@ -45,16 +41,6 @@ std::optional<AssumedIntrinsics> known_numbers(const ReplayArguments& a) {
 /// The rest of the request, checked when the command runs.
 ReplayRequest& complete(ReplayArguments* a) {
   ReplayRequest& r = a->request;
-  if (r.baseline && !(*r.baseline >= 0.005 && *r.baseline <= 20))
-    throw InputError(fmt::format(
-        "replay: --baseline {:g}: must be 0.005 to 20, the distance of the cameras in metres",
-        *r.baseline));
-  if (a->start < 0)
-    throw InputError(fmt::format("replay: --start {}: must be 0 or more", a->start));
-  if (a->frames && *a->frames < 1)
-    throw InputError(fmt::format("replay: --frames {}: must be at least 1", *a->frames));
-  r.start = static_cast<std::size_t>(a->start);
-  if (a->frames) r.frames = static_cast<std::size_t>(*a->frames);
   r.format = sequence_format(a->format, r.data);
   check_topics(r.format, r.topics);
   r.known = known_numbers(*a);
@@ -90,15 +76,18 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
              "Bag topic of the INS (NavSatFix), if ambiguous", "TOPIC", "Input");
   add_option(*command, "--imu-topic", a->request.topics.imu,
              "Bag topic of sensor_msgs/Imu giving the INS attitude", "TOPIC", "Input");
-  add_option(*command, "--start", a->start, "Index of the first frame", "N", "Input");
-  add_option(*command, "--frames", a->frames, "Maximum number of frames", "N", "Input");
+  add_option(*command, "--start", a->request.start, "Index of the first frame", "N", "Input")
+      ->check(in_range(0, kMostFrames, "frames"));
+  add_option(*command, "--frames", a->request.frames, "Maximum number of frames", "N", "Input")
+      ->check(in_range(1, kMostFrames, "frames"));
   add_option(*command, "--calibration", a->request.calibration,
              "Initial calibration (vergence, Kalibr, ROS, OpenCV …)", "FILE", "Calibration");
   add_option(*command, "--baseline", a->request.baseline,
-             "Baseline length in metres; overrides the calibration", "M", "Calibration");
+             "Baseline length in metres; overrides the calibration", "M", "Calibration")
+      ->check(in_range(0.005, 20, "metres"));
   add_option(*command, "--focal", a->focal,
-             "Initial focal length of both cameras in pixels, with --baseline", "PX",
-             "Calibration");
+             "Initial focal length of both cameras in pixels, with --baseline", "PX", "Calibration")
+      ->check(in_range(10, 1e5, "pixels"));
   add_option(*command, "--model", a->model,
              "Lens model for --focal: radtan, or equidistant (fisheye)", "NAME", "Calibration")
       ->check(one_of({"radtan", "equidistant"}))

@@ -21,8 +21,6 @@ struct RunArguments {
 /// The rest of the request, checked when the command runs.
 RunRequest& complete(RunArguments* a) {
   RunRequest& r = a->request;
-  if (r.duration_s && !(*r.duration_s > 0 && *r.duration_s <= 86400))
-    throw InputError("--duration must be above 0 and at most 86400 seconds");
   r.configuration = a->common.configuration(
       a->configuration, a->record ? std::vector<std::string>{"record=[" + *a->record + "]"}
                                   : std::vector<std::string>{});
@@ -51,7 +49,8 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
              "\"KIND@SECONDS …\"", "Simulation")
       ->allow_extra_args(false);
   add_option(*command, "--duration", a->request.duration_s, "Stop after this many seconds",
-             "SECONDS", "Input");
+             "SECONDS", "Input")
+      ->check(in_range(1e-3, 86400, "seconds"));
   command
       ->add_flag("--from-scratch", a->request.calibration.from_scratch,
                  "Ignore known extrinsics; estimate them online")

@@ -15,12 +15,8 @@ struct SnapArguments {
 
 /// The rest of the request, checked when the command runs.
 const SnapRequest& complete(SnapArguments* a) {
-  SnapRequest& r = a->request;
-  if (r.count < 1 || r.count > 9999) throw InputError("--count must be 1 to 9999 image sets");
-  if (!(r.wait_s > 0 && r.wait_s <= 3600))
-    throw InputError("--wait must be above 0 and at most 3600 seconds");
-  r.configuration = load_configuration(a->configuration, a->set);
-  return r;
+  a->request.configuration = load_configuration(a->configuration, a->set);
+  return a->request;
 }
 
 }  // namespace
@@ -35,9 +31,11 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "--out", a->request.out,
              "Directory for images and snap.json; must not exist, or be empty", "DIR")
       ->required();
-  add_option(*command, "--count", a->request.count, "Number of image sets [1]", "N");
+  add_option(*command, "--count", a->request.count, "Number of image sets [1]", "N")
+      ->check(in_range(1, 9999, "image sets"));
   add_option(*command, "--wait", a->request.wait_s, "Maximum wait for each image set [5]",
-             "SECONDS");
+             "SECONDS")
+      ->check(in_range(1e-3, 3600, "seconds"));
   add_option(*command, "--set", a->set, "Set a configuration key; repeatable", "KEY=VALUE")
       ->allow_extra_args(false);
   command->footer(

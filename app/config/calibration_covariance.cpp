@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
-#include <span>
 #include <vector>
 
 #include <fmt/format.h>
@@ -30,23 +28,6 @@ struct NamedRow {
   int row = 0;
 };
 
-/// Names that tell the cameras apart and cannot be mistaken for an index.
-bool has_row_names(const CalibrationFile& c) {
-  const auto plain = [](unsigned char letter) {
-    return std::isalnum(letter) != 0 || letter == '_' || letter == '-';
-  };
-  const auto names = std::span(c.names).first(static_cast<std::size_t>(c.rig.cameras));
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    const std::string& name = names[k];
-    if (name.empty() || std::isalpha(static_cast<unsigned char>(name.front())) == 0 ||
-        !std::ranges::all_of(name, plain) ||
-        std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(k), name) !=
-            names.begin() + static_cast<std::ptrdiff_t>(k))
-      return false;
-  }
-  return true;
-}
-
 template <std::size_t N>
 void append_rows(const std::string& camera, const std::array<const char*, N>& names, int first,
                  std::vector<NamedRow>* rows) {
@@ -55,18 +36,18 @@ void append_rows(const std::string& camera, const std::array<const char*, N>& na
 }
 
 /// Every parameter of the rig, in the order of the rows.
-std::vector<NamedRow> make_rows(const CalibrationFile& c, bool by_name) {
-  const auto camera = [&](int k) {
-    return by_name ? c.names[static_cast<std::size_t>(k)] : std::to_string(k);
-  };
+std::vector<NamedRow> make_rows(const CalibrationFile& c) {
+  const std::vector<std::string> cameras =
+      distinct_names({c.names.begin(), c.names.begin() + c.rig.cameras});
   std::vector<NamedRow> rows;
-  for (int k = 1; k < c.rig.cameras; ++k)
-    append_rows(camera(k), kPlaceNames, extrinsic_row(k), &rows);
-  for (int k = 0; k < c.rig.cameras; ++k) {
-    if (c.rig.intrinsics[static_cast<std::size_t>(k)].kind == CameraModelKind::pinhole_radtan)
-      append_rows(camera(k), kRadtanNames, intrinsic_row(k), &rows);
+  for (std::size_t k = 1; k < cameras.size(); ++k)
+    append_rows(cameras[k], kPlaceNames, extrinsic_row(static_cast<int>(k)), &rows);
+  for (std::size_t k = 0; k < cameras.size(); ++k) {
+    const int first = intrinsic_row(static_cast<int>(k));
+    if (c.rig.intrinsics[k].kind == CameraModelKind::pinhole_radtan)
+      append_rows(cameras[k], kRadtanNames, first, &rows);
     else
-      append_rows(camera(k), kEquidistantNames, intrinsic_row(k), &rows);
+      append_rows(cameras[k], kEquidistantNames, first, &rows);
   }
   return rows;
 }
@@ -75,11 +56,7 @@ std::vector<NamedRow> make_rows(const CalibrationFile& c, bool by_name) {
 std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
                                 const CalibrationFile& calibration) {
   const std::string field = "covariance.parameters";
-  std::vector<NamedRow> known = make_rows(calibration, false);
-  if (has_row_names(calibration)) {
-    const std::vector<NamedRow> named = make_rows(calibration, true);
-    known.insert(known.begin(), named.begin(), named.end());
-  }
+  const std::vector<NamedRow> known = make_rows(calibration);
   std::vector<std::string> names;
   names.reserve(known.size());
   for (const NamedRow& row : known) names.push_back(row.name);
@@ -113,13 +90,13 @@ std::vector<int> known_rows(const RigCovariance& covariance) {
 
 std::string format_covariance(const CalibrationFile& calibration) {
   const RigCovariance& C = calibration.rig.covariance;
-  std::vector<NamedRow> rows = make_rows(calibration, has_row_names(calibration));
+  std::vector<NamedRow> rows = make_rows(calibration);
   std::erase_if(rows, [&C](const NamedRow& r) { return !C.known(r.row); });
   if (rows.empty()) return {};
   std::vector<std::string> names;
   std::string upper;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    names.push_back(rows[i].name);
+    names.push_back(yaml_scalar(rows[i].name));
     // A line a row: a person finds the variance of a parameter at the start of its own.
     upper += i == 0 ? "\n    " : ",\n    ";
     for (std::size_t j = i; j < rows.size(); ++j)

@@ -7,8 +7,8 @@
 
 /// Group `covariance` of calibration.yaml: the joint covariance of a rig's parameters. `parameters`
 /// names the rows by camera and parameter (`right.rx`, `left.k1`), `upper` has the upper triangle
-/// row by row. Cameras are named, or numbered if their names are not unique. Rotations in rad and
-/// translations in m are left perturbations; intrinsics are in px or without unit.
+/// row by row. Names that two cameras share are numbered. Rotations in rad and translations in m
+/// are left perturbations; intrinsics are in px or without unit.
 namespace vergence::app {
 
 /// Empty if no covariance is known.

@@ -129,34 +129,6 @@ Mat6 read_wide_covariance(const Section& camera) {
   return covariance;
 }
 
-/// Transforms as other programs write them: refused with what would be the same here.
-void refuse_other_transforms(const YamlFile& file, const YAML::Node& node,
-                             const std::string& camera) {
-  struct Other {
-    const char *key, *message;
-  };
-  constexpr const char* kInverse =
-      "is the inverse of T_camera_left; invert it to [R^T, -R^T t], so that X_camera = R X_left + "
-      "t";
-  constexpr std::array kOthers{
-      Other{"T_left_camera", kInverse},
-      Other{"T_left_right", kInverse},
-      Other{"T_right_left", "is not a key here; write T_camera_left, with X_camera = R X_left + t"},
-      Other{"T_cn_cnm1",
-            "is a key of Kalibr; pass the camchain itself with --calibration, or convert it with "
-            "vergence calibrate convert IN OUT"},
-      Other{"T_BS",
-            "is a key of EuRoC's sensor.yaml; write T_camera_left = T_BS(camera)^-1 T_BS(left) "
-            "instead"},
-      Other{"extrinsics",
-            "is not a key here; write T_camera_left: twelve numbers, rows of [R t], with X_camera "
-            "= R X_left + t"}};
-  if (!node.IsMap()) return;
-  for (const Other& other : kOthers)
-    if (const YAML::Node given = node[other.key])
-      file.fail(given, camera + "." + other.key + " " + other.message);
-}
-
 void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
                  const CalibrationUse& use, CalibrationFile* calibration) {
   std::vector<std::string> known{"name",
@@ -169,7 +141,13 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
                                  "distortion_sigma"};
   if (k > 0)
     known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_total", "covariance_total"});
-  refuse_other_transforms(file, node, fmt::format("cameras.{}", k));
+  // Other programs write the inverse, for which the nearest key would be suggested.
+  for (const char* inverse : {"T_left_camera", "T_left_right"})
+    if (node.IsMap() && node[inverse])
+      file.fail(node[inverse],
+                fmt::format("cameras.{}.{} is the inverse of T_camera_left; invert it to [R^T, "
+                            "-R^T t], so that X_camera = R X_left + t",
+                            k, inverse));
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
   calibration->names[k] = camera.text("name", calibration->names[k]);
@@ -266,22 +244,6 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   return calibration;
 }
 
-/// A text as a YAML scalar: plain where no reader could take it for anything else, else in double
-/// quotes.
-std::string scalar(const std::string& text) {
-  const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
-  static const std::vector<std::string> kChoices{"true", "false", "yes", "no", "on",
-                                                 "off",  "null",  "y",   "n"};
-  std::string lower;
-  for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  const bool letter_first =
-      !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
-  if (letter_first && std::ranges::all_of(text, plain) &&
-      std::ranges::find(kChoices, lower) == kChoices.end())
-    return text;
-  return double_quoted(text);
-}
-
 std::string list(std::span<const double> values) {
   return fmt::format("[{}]", fmt::join(values, ", "));
 }
@@ -295,9 +257,9 @@ std::string format_camera(const CalibrationFile& calibration, std::size_t k) {
   const bool radtan = i.kind == CameraModelKind::pinhole_radtan;
   const std::size_t coefficients =
       radtan && (i.distortion[4] != 0 || i.distortion_sigma[4] != 0) ? 5 : 4;
-  std::string text = fmt::format("  - name: {}\n", scalar(calibration.names[k]));
+  std::string text = fmt::format("  - name: {}\n", yaml_scalar(calibration.names[k]));
   if (!calibration.serials[k].empty())
-    text += fmt::format("    serial: {}\n", scalar(calibration.serials[k]));
+    text += fmt::format("    serial: {}\n", yaml_scalar(calibration.serials[k]));
   text += fmt::format("    size: [{}, {}]\n    model: {}\n", i.width, i.height,
                       radtan ? kRadtan : kEquidistant);
   text += "    intrinsics: " + list(std::array{i.fx, i.fy, i.cx, i.cy}) + "\n";
@@ -373,7 +335,7 @@ std::string format_calibration(const CalibrationFile& calibration) {
   const RigCalibration& rig = calibration.rig;
   const double baseline = rig.baseline > 0 ? rig.baseline : rig.T_camera_left[1].t.norm();
   std::string text = fmt::format("version: {}\nrig: {{name: {}, baseline: {}", kVersion,
-                                 scalar(calibration.rig_name), baseline);
+                                 yaml_scalar(calibration.rig_name), baseline);
   if (rig.baseline_sigma != 0) text += fmt::format(", baseline_sigma: {}", rig.baseline_sigma);
   text += "}\ncameras:\n";
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
@@ -383,7 +345,8 @@ std::string format_calibration(const CalibrationFile& calibration) {
   text += format_covariance(calibration);
   text += fmt::format(
       "found: {{stamp: {}, source: {}, frames: {}, reprojection_px: {}, scale_sigma: {}",
-      rig.found.ns(), scalar(calibration.source), rig.frames, rig.reprojection_px, rig.scale_sigma);
+      rig.found.ns(), yaml_scalar(calibration.source), rig.frames, rig.reprojection_px,
+      rig.scale_sigma);
   if (rig.inflation != 0) text += fmt::format(", inflation: {}", rig.inflation);
   return text + "}\n";
 }

@@ -59,22 +59,27 @@ std::string other_configuration(const CalibrationFile& found, const CalibrationF
 
 /// Why a calibration is not of this rig; empty: it is.
 std::string mismatch(const CalibrationFile& found, const CalibrationFile& expected) {
-  const RigCalibration &a = found.rig, &b = expected.rig;
-  if (a.cameras != b.cameras)
-    return fmt::format("it has {} cameras, the configuration {}", a.cameras, b.cameras);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(a.cameras); ++k) {
+  if (std::string other = other_images(found.rig, expected.rig); !other.empty()) return other;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(found.rig.cameras); ++k)
     if (found.serials[k] != expected.serials[k])
       return fmt::format("its camera {} has the serial \"{}\", the connected one \"{}\"", k,
                          found.serials[k], expected.serials[k]);
-    const Intrinsics &x = a.intrinsics[k], &y = b.intrinsics[k];
-    if (x.width != y.width || x.height != y.height)
-      return fmt::format("its camera {} has {} x {} pixels, the configuration's {} x {}", k,
-                         x.width, x.height, y.width, y.height);
-  }
   return other_configuration(found, expected);
 }
 
 }  // namespace
+
+std::string other_images(const RigCalibration& found, const RigCalibration& expected) {
+  if (found.cameras != expected.cameras)
+    return fmt::format("it has {} cameras, the configuration {}", found.cameras, expected.cameras);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(found.cameras); ++k) {
+    const Intrinsics &x = found.intrinsics[k], &y = expected.intrinsics[k];
+    if (x.width != y.width || x.height != y.height)
+      return fmt::format("its camera {0} has {1} x {2} pixels, but cameras.{0}.size is {3} x {4}",
+                         k, x.width, x.height, y.width, y.height);
+  }
+  return "";
+}
 
 std::map<std::string, std::string> configured_rig(const Configuration& configuration) {
   std::map<std::string, std::string> values;

@@ -34,6 +34,9 @@ struct CalibrationState {
       message{};
 };
 
+/// Why a calibration is of another number of cameras or other image sizes; empty: it is not.
+[[nodiscard]] std::string other_images(const RigCalibration& found, const RigCalibration& expected);
+
 /// Reads the file if there is one. It is used only for the rig it was found on: equal number and
 /// sizes of cameras, equal serial numbers in the same order, equal configured_rig(), and a baseline
 /// that differs by less than kOtherLength. Does not throw.

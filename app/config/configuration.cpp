@@ -111,55 +111,31 @@ const Key* find_key(const std::string& name) {
 
 std::string last_part(const std::string& name) { return name.substr(name.rfind('.') + 1); }
 
-/// The nearest known key by its whole name; else the one whose last part is nearest (the group was
-/// forgotten).
+/// Keys of any group with the same last part, because the group was forgotten or confused; else the
+/// nearest key.
 std::string suggestion(const std::string& name) {
-  // Keys that are often looked for in the wrong group, with those that set the same thing.
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kElsewhere{
-      {{"rate", "trigger.rate"},
-       {"fps", "trigger.rate"},
-       {"frame_rate", "trigger.rate"},
-       {"baseline", "rig.nominal.baseline_m"},
-       {"baseline_m", "rig.nominal.baseline_m"},
-       {"format", "cameras.N.pixel_format"},
-       {"exposure", "cameras.N.exposure_us"}}};
   if (name.find(':') != std::string::npos)
     return "; a colon needs a space after it, as in `name: van`";
-  if (name.starts_with("cameras.") && name.size() > 8) {
-    if (name[8] < '0' || name[8] > '9')
-      return "; cameras is a list with one item for each camera, as in `- {driver: v4l2}`";
-    if (name.find_first_of("0123", 8) != 8 || (name.size() > 9 && name[9] != '.'))
-      return fmt::format("; a rig has at most {} cameras, numbered from 0", kMaxCameras);
-    for (const auto& [key, instead] : kElsewhere)
-      if (last_part(name) == key) return fmt::format("; did you mean \"{}\"?", instead);
-  }
-  std::vector<std::string> names, last_parts;
+  if (name.starts_with("cameras.") &&
+      (name.find_first_of("0123", 8) != 8 || name.find('.', 8) != 9))
+    return fmt::format(
+        "; cameras is a list of at most {} items, numbered from 0, as in `- {{driver: v4l2}}`",
+        kMaxCameras);
+  std::vector<std::string> names, same;
   for (const Group& group : schema())
     for (const Key& key : group.keys) {
       names.push_back(key.name);
-      last_parts.push_back(last_part(key.name));
+      if (last_part(key.name) == last_part(name)) same.push_back('"' + key.name + '"');
     }
-  const auto near = nearest(name, names);
-  // A key of another group with exactly this name is more likely meant than one spelled similarly.
-  const std::string part = last_part(name);
-  const auto same = std::ranges::find(last_parts, part);
-  if (same != last_parts.end() && !(near && edit_distance(name, *near) <= 1) &&
-      part.find_first_not_of("0123456789") != std::string::npos) {
-    std::string found;
-    for (const std::string& known : names)
-      if (last_part(known) == part) found += (found.empty() ? "\"" : " or \"") + known + "\"";
-    return "; did you mean " + found + "?";
-  }
-  if (near) return "; did you mean \"" + *near + "\"?";
-  if (const auto near_part = nearest(part, last_parts)) {
-    const auto index = std::ranges::find(last_parts, *near_part) - last_parts.begin();
-    return "; did you mean \"" + names[static_cast<std::size_t>(index)] + "\"?";
-  }
-  return "; docs/configuration.md lists all keys";
+  // The numbers of lists are last parts of many keys.
+  constexpr std::size_t kMaxSame = 4;
+  if (!same.empty() && same.size() <= kMaxSame)
+    return fmt::format("; did you mean {}?", fmt::join(same, " or "));
+  const std::string near = did_you_mean(name, names);
+  return near.empty() ? "; docs/configuration.md lists all keys" : near;
 }
 
 [[noreturn]] void refuse_unknown(const Entry& entry) {
-  const std::string shown = entry.name.substr(0, 120);
   for (auto dot = entry.name.find('.'); dot != std::string::npos;
        dot = entry.name.find('.', dot + 1))
     if (find_key(entry.name.substr(0, dot)) != nullptr)
@@ -169,15 +145,8 @@ std::string suggestion(const std::string& name) {
   std::string in_table = entry.name;
   if (in_table.starts_with("cameras.") && in_table.size() > 8) in_table[8] = '0';
   const std::string why = new_name(Renamed::Kind::key, in_table);
-  throw InputError(entry.origin + ": unknown key \"" + shown + "\"" +
+  throw InputError(entry.origin + ": unknown key \"" + entry.name.substr(0, 120) + "\"" +
                    (why.empty() ? suggestion(entry.name) : why));
-}
-
-/// Suggests a keyword instead of one that the key does not have; empty if nothing is close.
-std::string value_suggestion(const std::string& value, const Key& key) {
-  const std::string why = new_name(Renamed::Kind::value, key.name + " " + value);
-  return why.empty() ? did_you_mean(value, key.words)
-                     : fmt::format("; \"{}\"{}", value, why.substr(4));
 }
 
 /// The rest of a message "it must be …".
@@ -210,13 +179,9 @@ std::string as_switch(const std::string& value, const std::vector<std::string>& 
     return std::ranges::find(words, word) != words.end();
   };
   if (!is_choice("on") || !is_choice("off")) return value;
-  std::string lower = value;
-  std::ranges::transform(lower, lower.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  if (lower == "true" || lower == "yes" || lower == "on") return "on";
-  if (lower == "false" || lower == "no" || lower == "off") return "off";
-  return value;
+  bool on = false;
+  if (!YAML::convert<bool>::decode(YAML::Node(value), on)) return value;
+  return on ? "on" : "off";
 }
 
 void apply(const Entry& entry, Configuration* configuration) {
@@ -231,123 +196,94 @@ void apply(const Entry& entry, Configuration* configuration) {
   if (key == nullptr) refuse_unknown(entry);
   if (!entry.scalar)
     throw InputError(entry.origin + ": " + entry.name + " takes one value, not a group or a list");
-  switch (key->type) {
-    case KeyType::integer:
-      key->set(*configuration, parse_number<std::int64_t>(entry, *key, "an integer"));
-      break;
-    case KeyType::number:
-      key->set(*configuration, parse_number<double>(entry, *key, "a number"));
-      break;
-    case KeyType::text:
-      if (!key->words.empty()) {
-        const std::string value = as_switch(entry.value, key->words);
-        const bool unset = value.empty() && to_text(key->get(Configuration{})).empty();
-        if (!unset && std::ranges::find(key->words, value) == key->words.end())
-          throw InputError(fmt::format("{}: {} is \"{}\"; it must be one of {}{}", entry.origin,
-                                       key->name, entry.value.substr(0, 60), range_text(*key),
-                                       value_suggestion(entry.value, *key)));
-        key->set(*configuration, value);
-        break;
-      }
-      if (static_cast<double>(entry.value.size()) > key->most)
-        throw InputError(fmt::format("{}: {} is longer than the limit of {} bytes; shorten it",
-                                     entry.origin, key->name, key->most));
-      key->set(*configuration, entry.value);
-      break;
+  if (key->type == KeyType::integer)
+    return key->set(*configuration, parse_number<std::int64_t>(entry, *key, "an integer"));
+  if (key->type == KeyType::number)
+    return key->set(*configuration, parse_number<double>(entry, *key, "a number"));
+  const std::string value = as_switch(entry.value, key->words);
+  const bool unset = value.empty() && to_text(key->get(Configuration{})).empty();
+  if (!key->words.empty() && !unset && std::ranges::find(key->words, value) == key->words.end()) {
+    const std::string why = new_name(Renamed::Kind::value, key->name + " " + value);
+    throw InputError(fmt::format("{}: {} is \"{}\"; it must be one of {}{}", entry.origin,
+                                 key->name, value.substr(0, 60), range_text(*key),
+                                 why.empty() ? did_you_mean(value, key->words) : why));
+  }
+  if (key->words.empty() && static_cast<double>(value.size()) > key->most)
+    throw InputError(fmt::format("{}: {} is longer than the limit of {} bytes; shorten it",
+                                 entry.origin, key->name, key->most));
+  try {
+    key->set(*configuration, value);
+  } catch (const InputError& e) {
+    throw InputError(entry.origin + ": " + key->name + ": " + e.what());
   }
 }
 
-/// The faults that stand as groups, `faults.N.NAME`, become texts of one line: `KIND@SECONDS
-/// NAME=NUMBER …`.
-std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
+/// The key that takes a text or a group of values, `faults.N` or `cameras.N.options`, of an entry
+/// with that name or below it; empty for another one.
+std::string text_key(const std::string& name) {
+  const auto prefix = [&](std::size_t size) {
+    return name.size() == size || name[size] == '.' ? name.substr(0, size) : std::string();
+  };
+  constexpr std::string_view kOptions = ".options";
+  if (name.starts_with("faults.")) return prefix(std::min(name.find('.', 7), name.size()));
+  if (name.starts_with("cameras.") && name.find(kOptions) == 9) return prefix(9 + kOptions.size());
+  return {};
+}
+
+/// Groups that stand for a text of one line: of a camera's options `NAME=VALUE …`, of a fault
+/// `KIND@SECONDS NAME=VALUE …`. They come after all other keys, because a camera's driver defines
+/// its options.
+std::vector<Entry> with_groups_as_text(const std::vector<Entry>& entries) {
+  struct Text {
+    std::string value, kind, at, origin;
+  };
   std::vector<Entry> out;
-  // The keys are `faults.N`, then the name; the last value of a name is used.
-  std::map<std::string, std::map<std::string, Entry>> faults;
+  std::map<std::string, Text> texts;
   for (const Entry& entry : entries) {
-    const auto dot = entry.name.find('.', 7);
-    if (!entry.name.starts_with("faults.") || dot == std::string::npos) {
+    const std::string key = text_key(entry.name);
+    if (key.empty()) {
       out.push_back(entry);
-    } else {
-      if (!entry.scalar || entry.value.find_first_of(" =@") != std::string::npos)
-        throw InputError(entry.origin + ": " + entry.name.substr(0, 120) +
-                         " takes one number or keyword");
-      faults[entry.name.substr(0, dot)].insert_or_assign(entry.name.substr(dot + 1), entry);
+      continue;
     }
+    Text& text = texts[key];
+    text.origin = entry.origin;
+    if (entry.name == key) {
+      text.value = entry.value;
+      continue;
+    }
+    const std::string name = entry.name.substr(key.size() + 1);
+    if (!entry.scalar || entry.value.empty() ||
+        entry.value.find_first_of(" =@") != std::string::npos)
+      throw InputError(entry.origin + ": " + key + ": " + name.substr(0, 120) +
+                       " takes one number or keyword");
+    if (key.starts_with("faults.") && (name == "kind" || name == "at"))
+      (name == "kind" ? text.kind : text.at) = entry.value;
+    else
+      text.value += (text.value.empty() ? "" : " ") + name + "=" + entry.value;
   }
-  for (const auto& [name, parts] : faults) {
-    const std::string& origin = parts.begin()->second.origin;
-    if (!parts.contains("kind") || !parts.contains("at"))
+  for (const auto& [key, text] : texts) {
+    const bool group = key.starts_with("faults.") && text.value.find('@') == std::string::npos;
+    if (group && (text.kind.empty() || text.at.empty()))
       throw InputError(
-          origin + ": " + name +
+          text.origin + ": " + key +
           " needs `kind` and `at`, as in {at: 42, kind: knock, camera: 1, pitch_deg: 0.2}");
-    std::string text = parts.at("kind").value + "@" + parts.at("at").value;
-    for (const auto& [key, entry] : parts)
-      if (key != "kind" && key != "at") text += " " + key + "=" + entry.value;
-    out.push_back({name, text, true, origin});
+    const std::string head = group ? text.kind + "@" + text.at : "";
+    out.push_back({key,
+                   fmt::format("{}{}{}", head, group && !text.value.empty() ? " " : "", text.value),
+                   true, text.origin});
   }
   return out;
 }
 
-/// The camera that an entry `cameras.N.options` or `cameras.N.options.NAME` is for; nullopt: it is
-/// for another key. *name: NAME, empty for all of them.
-std::optional<std::size_t> camera_of_options(const Entry& entry, std::string* name) {
-  constexpr std::string_view kList = "cameras.", kGroup = ".options";
-  const auto at = entry.name.find(kGroup);
-  if (!entry.name.starts_with(kList) || at != kList.size() + 1) return std::nullopt;
-  const auto after = at + kGroup.size();
-  const std::size_t camera = static_cast<std::size_t>(entry.name[kList.size()] - '0');
-  if (camera >= kMaxCameras) return std::nullopt;
-  if (entry.name.size() == after) {
-    name->clear();
-    return camera;
-  }
-  if (entry.name[after] != '.') return std::nullopt;
-  *name = entry.name.substr(after + 1);
-  return camera;
-}
-
-/// After every other key: which options there are is the driver's matter.
-void apply_camera_options(const std::vector<Entry>& entries, Configuration* configuration) {
-  for (const Entry& entry : entries) {
-    std::string name;
-    const auto camera = camera_of_options(entry, &name);
-    if (!camera) continue;
-    CameraSettings& settings = configuration->cameras[*camera];
-    std::string why;
-    if (name.empty() && !entry.scalar)
-      settings.options = {};
-    else if (name.empty())
-      why = set_camera_options(entry.value, &settings);
-    else if (!entry.scalar || entry.value.empty() ||
-             entry.value.find_first_of(" =") != std::string::npos)
-      why = name.substr(0, 120) + " takes one number or keyword";
-    else
-      why = set_camera_option(name, entry.value, &settings);
-    if (!why.empty())
-      throw InputError(fmt::format("{}: cameras.{}.options: {}", entry.origin, *camera, why));
-  }
-}
-
-/// `record: [poses, images]` switches its words on.
+/// `record: [poses, images]` switches these keys on.
 std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
   constexpr std::string_view kGroup = "record.";
-  std::vector<std::string> words;
-  for (const Group& group : schema())
-    for (const Key& key : group.keys)
-      if (key.name.starts_with(kGroup) && !key.words.empty())
-        words.push_back(key.name.substr(kGroup.size()));
-  for (Entry& entry : entries) {
-    const bool item =
-        entry.name.starts_with(kGroup) && entry.name.size() > kGroup.size() &&
-        entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos;
-    if (!item) continue;
-    if (!entry.scalar || std::ranges::find(words, entry.value) == words.end())
-      throw InputError(fmt::format("{}: record lists \"{}\"; its values are {}{}", entry.origin,
-                                   entry.value.substr(0, 60), fmt::join(words, ", "),
-                                   did_you_mean(entry.value, words)));
-    entry.name = std::string(kGroup) + entry.value;
-    entry.value = "on";
-  }
+  for (Entry& entry : entries)
+    if (entry.name.starts_with(kGroup) && entry.name.size() > kGroup.size() &&
+        entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos) {
+      entry.name = std::string(kGroup) + entry.value;
+      entry.value = "on";
+    }
   return entries;
 }
 
@@ -369,12 +305,9 @@ std::vector<Entry> with_preset(std::vector<Entry> entries) {
 }
 
 Configuration from_entries(const std::vector<Entry>& given, const std::string& name) {
-  const std::vector<Entry> entries =
-      with_preset(with_record_as_switches(with_faults_as_text(given)));
   Configuration configuration;
-  for (const Entry& entry : entries)
-    if (std::string option; !camera_of_options(entry, &option)) apply(entry, &configuration);
-  apply_camera_options(entries, &configuration);
+  for (const Entry& entry : with_preset(with_record_as_switches(with_groups_as_text(given))))
+    apply(entry, &configuration);
   if (const std::string message = find_contradiction(configuration); !message.empty())
     throw InputError(name + ": " + message);
   return configuration;
@@ -385,16 +318,6 @@ Configuration load(const std::optional<YamlFile>& file, const std::vector<std::s
   if (file) add_file(*file, &entries);
   for (const std::string& argument : set) add_argument(argument, &entries);
   return from_entries(entries, file ? file->name() : "--set");
-}
-
-// Maximum number of bytes of an input text that a message repeats.
-constexpr std::size_t kMaxShown = 60;
-
-std::string no_such_option(const std::string& name, const CameraSettings& camera) {
-  std::vector<std::string> names;
-  for (const OptionRow& row : option_rows(camera.options)) names.push_back(row.name);
-  return fmt::format("there is no option \"{}\"; {} cameras have {}{}", name.substr(0, kMaxShown),
-                     camera.driver, fmt::join(names, ", "), did_you_mean(name, names));
 }
 
 }  // namespace
@@ -423,14 +346,11 @@ std::vector<std::pair<std::string, std::string>> changed_settings(const Configur
 }
 
 std::string canonical_text(const Configuration& configuration) {
-  std::vector<std::string> lines;
+  std::set<std::string> lines;
   for (const Group& group : schema())
     for (const Key& key : group.keys)
-      lines.push_back(key.name + "=" + to_text(key.get(configuration)) + "\n");
-  std::ranges::sort(lines);
-  std::string text;
-  for (const std::string& line : lines) text += line;
-  return text;
+      lines.insert(key.name + "=" + to_text(key.get(configuration)) + "\n");
+  return fmt::format("{}", fmt::join(lines, ""));
 }
 
 std::string configuration_hash(const Configuration& configuration) {
@@ -441,36 +361,33 @@ std::string configuration_hash(const Configuration& configuration) {
   return fmt::format("{:016x}", hash);
 }
 
-std::string set_camera_option(const std::string& name, const std::string& value,
-                              CameraSettings* camera) {
-  if (std::holds_alternative<std::monostate>(camera->options)) {
-    const auto begin = default_options(camera->driver);
-    if (!begin) return {};
-    camera->options = *begin;
-  }
-  if (set_option(name, value, &camera->options)) return {};
-  const OptionRow* row = find_option(camera->options, name);
-  if (row == nullptr) return no_such_option(name, *camera);
-  return fmt::format("{} is \"{}\"; it takes {}", name.substr(0, kMaxShown),
-                     value.substr(0, kMaxShown), row->values);
-}
-
-std::string set_camera_options(const std::string& text, CameraSettings* camera) {
+void set_camera_options(const std::string& text, CameraSettings* camera) {
+  const auto defaults = default_options(camera->driver);
   camera->options = {};
+  if (text.empty() || !defaults) return;
+  camera->options = *defaults;
   std::istringstream words(text);
   for (std::string word; words >> word;) {
-    const auto equals = word.find('=');
-    if (equals == std::string::npos || equals == 0 || equals + 1 == word.size())
-      return fmt::format(
+    // Maximum number of bytes that a message repeats.
+    constexpr std::size_t kShown = 60;
+    const auto equals = std::min(word.find('='), word.size());
+    const std::string name = word.substr(0, equals),
+                      value = word.substr(std::min(equals + 1, word.size()));
+    if (name.empty() || value.empty())
+      throw InputError(fmt::format(
           "\"{}\" is not an option; write NAME=VALUE, as in packet_size=9000, or a group "
           "{{packet_size: 9000}}",
-          word.substr(0, kMaxShown));
-    if (std::string why =
-            set_camera_option(word.substr(0, equals), word.substr(equals + 1), camera);
-        !why.empty())
-      return why;
+          word.substr(0, kShown)));
+    if (set_option(name, value, &camera->options)) continue;
+    if (const OptionRow* row = find_option(camera->options, name))
+      throw InputError(fmt::format("{} is \"{}\"; it takes {}", name.substr(0, kShown),
+                                   value.substr(0, kShown), row->values));
+    std::vector<std::string> names;
+    for (const OptionRow& row : option_rows(camera->options)) names.push_back(row.name);
+    throw InputError(fmt::format("there is no option \"{}\"; {} cameras have {}{}",
+                                 name.substr(0, kShown), camera->driver, fmt::join(names, ", "),
+                                 did_you_mean(name, names)));
   }
-  return {};
 }
 
 }  // namespace vergence::app

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "app/runtime/realtime.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/options.hpp"
 #include "core/odometry/options.hpp"
@@ -123,8 +124,6 @@ struct ComparisonSettings {
   double heading_sigma_deg = 0;
   double max_gap_ms = 100;
   double max_wait_ms = 500;
-  double jump_m = 20;
-  double scale_tolerance = 0.02;
 };
 
 /// Selection of the four cameras of a KITTI raw sequence.
@@ -189,19 +188,6 @@ struct SessionsSettings {
   int quota_mb = 0;
 };
 
-/// `realtime:` scheduling of the drive's threads (docs/deployment.md).
-struct RealtimeSettings {
-  /// SCHED_FIFO priority of the most urgent threads; 0: none.
-  int priority = 0;
-  /// Processors of all threads but the solver's, such as `0-1,3`; empty: any.
-  std::string affinity{};
-  std::string solver_affinity{};
-  /// 1: call mlockall().
-  int lock_memory = 0;
-  /// Time budget per frame of a live drive; 0: its frame interval.
-  double frame_budget_ms = 0;
-};
-
 inline constexpr std::size_t kMaxFaults = 16;
 
 /// All user settings with their defaults. Each member is bound to a row of the schema
@@ -260,13 +246,8 @@ struct Configuration {
 /// 16 hexadecimal digits (FNV-1a, 64 bit) of canonical_text(), equal for equal configurations.
 [[nodiscard]] std::string configuration_hash(const Configuration& configuration);
 
-/// Sets one option. Returns an empty string on success or if the driver has no options, else a
-/// message fragment about the problem.
-[[nodiscard]] std::string set_camera_option(const std::string& name, const std::string& value,
-                                            CameraSettings* camera);
-
-/// Sets all options from `NAME=VALUE …`; the others get their defaults. Returns as
-/// set_camera_option() does.
-[[nodiscard]] std::string set_camera_options(const std::string& text, CameraSettings* camera);
+/// Sets all options from `NAME=VALUE …`; the others get the driver's defaults. Throws InputError
+/// with a message about the option; without a driver there are none.
+void set_camera_options(const std::string& text, CameraSettings* camera);
 
 }  // namespace vergence::app

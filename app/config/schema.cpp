@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <type_traits>
@@ -17,39 +18,30 @@ namespace vergence::app {
 namespace groups {
 namespace {
 
-/// Rows whose values are fields of one part of the configuration. `part` gives that part, of a
-/// Configuration const or not.
-template <class Settings>
+/// Rows whose values are fields of one part of the configuration. `part` is the member that is that
+/// part, or a function that gives it, of a Configuration const or not.
+template <class Part>
 class Rows {
+  using Settings = std::remove_reference_t<std::invoke_result_t<Part, Configuration&>>;
+
  public:
-  template <class Part>
   Rows(std::string prefix, std::string meaning, Part part)
-      : prefix_(std::move(prefix)),
-        part_([part](Configuration& c) -> Settings& { return part(c); }),
-        const_part_([part](const Configuration& c) -> const Settings& { return part(c); }) {
+      : prefix_(std::move(prefix)), part_(part) {
     group_.name = prefix_.substr(0, prefix_.find('.'));
     group_.meaning = std::move(meaning);
   }
-
-  /// `part` is the member of the configuration that has the fields.
-  Rows(std::string prefix, std::string meaning, Settings Configuration::*part)
-      : Rows(
-            std::move(prefix), std::move(meaning), [part](auto& c) -> auto& { return c.*part; }) {}
 
   /// Any integral field.
   template <class Integer>
   Rows& integer(const char* name, Integer Settings::*field, std::int64_t least, std::int64_t most,
                 const char* unit, const char* meaning) {
-    return add<std::int64_t>(
-        name, KeyType::integer, static_cast<double>(least), static_cast<double>(most), unit,
-        meaning, [field](auto& s) -> auto& { return s.*field; });
+    return add<std::int64_t>(name, KeyType::integer, static_cast<double>(least),
+                             static_cast<double>(most), unit, meaning, field);
   }
 
   Rows& number(const char* name, double Settings::*field, double least, double most,
                const char* unit, const char* meaning) {
-    return add<double>(
-        name, KeyType::number, least, most, unit,
-        meaning, [field](auto& s) -> auto& { return s.*field; });
+    return add<double>(name, KeyType::number, least, most, unit, meaning, field);
   }
 
   /// A list: one key for each number, `name.0` and so on. The first one has the meaning.
@@ -66,9 +58,16 @@ class Rows {
 
   Rows& text(const char* name, std::string Settings::*field, std::size_t longest,
              const char* meaning) {
-    return add<std::string>(
-        name, KeyType::text, 0, static_cast<double>(longest), "",
-        meaning, [field](auto& s) -> auto& { return s.*field; });
+    return add<std::string>(name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
+                            field);
+  }
+
+  /// A text that is one of a few words, or empty where that is the default.
+  Rows& word(const char* name, std::string Settings::*field, std::vector<std::string> words,
+             const char* meaning) {
+    text(name, field, 0, meaning);
+    group_.keys.back().words = std::move(words);
+    return *this;
   }
 
   /// A number that is chosen by its word: the first stands for 0.
@@ -99,24 +98,12 @@ class Rows {
     return *this;
   }
 
-  /// A text that is one of a few words, or empty where that is the default.
-  Rows& word(const char* name, std::string Settings::*field, std::vector<std::string> words,
-             const char* meaning) {
-    text(name, field, 0, meaning);
-    group_.keys.back().words = std::move(words);
-    return *this;
-  }
-
   /// The options of a camera's driver, as one text.
-  Rows& options(const char* name, CameraOptions Settings::*field, std::size_t longest,
-                const char* meaning) {
-    add(
+  Rows& options(const char* name, std::size_t longest, const char* meaning) {
+    return add(
         name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
-        [](Settings& s, const KeyValue& v) {
-          (void)set_camera_options(std::get<std::string>(v), &s);
-        },
-        [field](const Settings& s) -> KeyValue { return options_text(s.*field); });
-    return *this;
+        [](Settings& s, const KeyValue& v) { set_camera_options(std::get<std::string>(v), &s); },
+        [](const Settings& s) -> KeyValue { return options_text(s.options); });
   }
 
   /// The rows of another part, behind these.
@@ -129,40 +116,39 @@ class Rows {
   operator Group() { return std::move(group_); }
 
  private:
-  /// `access` gives the field, of Settings const or not.
-  template <class Value, class Access>
+  /// `field` is a member of Settings, or a function that gives it.
+  template <class Value, class Field>
   Rows& add(const std::string& name, KeyType type, double least, double most, const char* unit,
-            const char* meaning, const Access& access) {
-    add(
+            const char* meaning, Field field) {
+    return add(
         name, type, least, most, unit, meaning,
-        [access](Settings& s, const KeyValue& v) {
-          auto& field = access(s);
-          field = static_cast<std::remove_reference_t<decltype(field)>>(std::get<Value>(v));
+        [field](Settings& s, const KeyValue& v) {
+          auto& target = std::invoke(field, s);
+          target = static_cast<std::remove_reference_t<decltype(target)>>(std::get<Value>(v));
         },
-        [access](const Settings& s) -> KeyValue { return static_cast<Value>(access(s)); });
+        [field](const Settings& s) -> KeyValue {
+          return static_cast<Value>(std::invoke(field, s));
+        });
+  }
+
+  template <class Set, class Get>
+  Rows& add(const std::string& name, KeyType type, double least, double most, const char* unit,
+            const char* meaning, Set set, Get get) {
+    group_.keys.push_back(
+        {prefix_.empty() ? name : prefix_ + "." + name,
+         type,
+         unit,
+         least,
+         most,
+         meaning,
+         [part = part_, set](Configuration& c, const KeyValue& v) { set(std::invoke(part, c), v); },
+         [part = part_, get](const Configuration& c) { return get(std::invoke(part, c)); },
+         {}});
     return *this;
   }
 
-  void add(const std::string& name, KeyType type, double least, double most, const char* unit,
-           const char* meaning, std::function<void(Settings&, const KeyValue&)> set,
-           std::function<KeyValue(const Settings&)> get) {
-    group_.keys.push_back({prefix_.empty() ? name : prefix_ + "." + name,
-                           type,
-                           unit,
-                           least,
-                           most,
-                           meaning,
-                           [part = part_, set = std::move(set)](
-                               Configuration& c, const KeyValue& v) { set(part(c), v); },
-                           [part = const_part_, get = std::move(get)](const Configuration& c) {
-                             return get(part(c));
-                           },
-                           {}});
-  }
-
   std::string prefix_;
-  std::function<Settings&(Configuration&)> part_;
-  std::function<const Settings&(const Configuration&)> const_part_;
+  Part part_;
   Group group_;
 };
 
@@ -170,7 +156,7 @@ class Rows {
 constexpr auto whole = [](auto& c) -> auto& { return c; };
 
 Group general() {
-  return Rows<Configuration>("", "Keys that belong to no group.", whole)
+  return Rows("", "Keys that belong to no group.", whole)
       .integer(
           "threads", &Configuration::threads, 1, 2, "",
           "Threads of the estimator: 2 processes both images in parallel; the poses are the same.");
@@ -192,9 +178,8 @@ Group record() {
               &Configuration::record)
       .choice("poses", &R::poses, off_on, "Odometry and transforms of every frame.")
       .choice("ins", &R::ins, off_on, "All INS samples, as compared.")
-      .choice(
-          "images", &R::images, off_on,
-          "All images of the estimator, with camera_info; `replay --format session` needs them.")
+      .choice("images", &R::images, off_on,
+              "All images, with camera_info; a replay of the session needs them.")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
       .integer("split_mb", &R::split_mb, 0, 10'000'000, "MB",
                "Size at which a new file starts; 0: one file.");
@@ -206,23 +191,18 @@ Group publish() {
               "Pose stream and live page of a running session or replay (docs/live_interface.md).",
               &Configuration::publish)
       .text("pose_stream", &P::pose_stream, 200,
-            "Address of the pose stream, one JSON object per frame: `unix:///PATH` (stream socket) "
-            "or `udp://HOST:PORT`; empty: off.")
-      .text("http", &P::http, 200,
-            "HOST:PORT of the live page, e.g. `127.0.0.1:8080`; viewers on other machines need the "
-            "token. Empty: off.")
+            "Pose stream: `unix:///PATH` or `udp://HOST:PORT`; empty: off.")
+      .text("http", &P::http, 200, "HOST:PORT of the live page, e.g. `127.0.0.1:8080`; empty: off.")
       .text("token_file", &P::token_file, 400,
-            "File whose first line is the page's token, 16 to 128 letters and digits; empty: a new "
-            "one each session, shown when it starts.");
+            "File with the page's token; empty: a new token each session.");
 }
 
 Group sessions() {
   using S = SessionsSettings;
   return Rows("sessions", "Session directories next to the one of `--out`.",
               &Configuration::sessions)
-      .integer(
-          "quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
-          "Maximum total size: before a run the oldest sessions beyond it are removed. 0: never.");
+      .integer("quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
+               "Maximum total size: a run first removes the oldest beyond it. 0: never.");
 }
 
 Group realtime() {
@@ -232,17 +212,15 @@ Group realtime() {
               "setting, a warning is printed and the run continues.",
               &Configuration::realtime)
       .integer("priority", &R::priority, 0, 90, "",
-               "SCHED_FIFO priority of the threads of cameras, trigger and synchroniser; the "
-               "estimator has one less, the INS two, files three, the solver none. 0: off.")
+               "SCHED_FIFO priority of the most urgent threads; 0: off.")
       .text("affinity", &R::affinity, 64,
-            "Processors of these threads, in the syntax of taskset: `0-1,3`. Empty: any.")
+            "Processors of all threads but the solver, e.g. `0-1,3`; empty: any.")
       .text("solver_affinity", &R::solver_affinity, 64,
-            "Processors of the calibration solver. Empty: any.")
+            "Processors of the calibration solver; empty: any.")
       .choice("lock_memory", &R::lock_memory, {"off", "on"},
-              "`on`: lock memory before the first frame (mlockall), so that it is never paged out.")
+              "`on`: lock memory before the first frame (mlockall).")
       .number("frame_budget_ms", &R::frame_budget_ms, 0, 10000, "ms",
-              "Time per live frame beyond which the estimator omits work other than the pose. 0: "
-              "the frame interval.");
+              "Time budget per live frame; 0: the frame interval.");
 }
 
 std::vector<std::pair<std::string, trigger_board::Edge>> edges() {
@@ -262,20 +240,15 @@ std::vector<std::pair<std::string, SyncMode>> sync_modes() {
 Group rig() {
   using R = RigSettings;
   return Rows("rig", "The rig as a whole.", &Configuration::rig)
-      .text("name", &R::name, 64,
-            "Name of the rig in `calibration.yaml` and in the path of the state file.")
+      .text("name", &R::name, 64, "Name in `calibration.yaml` and in the path of the state file.")
       .number("nominal.baseline_m", &R::baseline_m, 0.02, 10, "m",
               "Distance of the right camera from the left one, to its right.")
       .number("nominal.focal_px", &R::focal_px, 0, 20000, "px",
               "Focal length of every camera; 0: 0.72 of the image's width.")
-      .number("nominal.k1", &R::k1, -1, 1, "",
-              "First radial distortion coefficient of every camera, in its lens model.")
-      .number("nominal.k2", &R::k2, -1, 1, "",
-              "Second radial distortion coefficient of every camera.")
+      .number("nominal.k1", &R::k1, -1, 1, "", "First radial coefficient of every camera.")
+      .number("nominal.k2", &R::k2, -1, 1, "", "Second radial coefficient of every camera.")
       .text("state_dir", &R::state_dir, 400,
-            "Directory of `calibration_state.yaml`, the last calibration accepted or verified, "
-            "with which the next `run` starts. Empty: `$XDG_STATE_HOME/vergence/NAME`, without "
-            "that variable `~/.local/state/vergence/NAME`; `none`: no state file.");
+            "Directory of the state file (docs/calibration.md); `none`: no state file.");
 }
 
 Group cameras() {
@@ -283,69 +256,55 @@ Group cameras() {
   Group all;
   for (std::size_t k = 0; k < kMaxCameras; ++k) {
     Group one =
-        Rows<C>(
+        Rows(
             "cameras." + std::to_string(k), "The cameras, a list; the first is the left one.",
             [k](auto& c) -> auto& { return c.cameras[k]; })
             .word("driver", &C::driver, {"mock", "gige", "iidc-usb", "iidc-1394", "v4l2"},
                   "Driver. Empty: there is no such camera.")
             .text("name", &C::name, 32, "Name in messages and in calibration.yaml.")
             .text("serial", &C::serial, 64,
-                  "Serial number, or for GigE the address; empty: the next camera found.")
+                  "Serial number, or address of a GigE camera; empty: the next found.")
             .choice<ImageHalf>(
                 "image_half", &C::half,
                 {{"whole", ImageHalf::whole},
                  {"left", ImageHalf::left},
                  {"right", ImageHalf::right}},
-                "For a camera that sends both images side by side in one frame: the half that is "
-                "this image; `whole`: the frame is one image. Write two entries with the same "
-                "`driver` and `serial`, `left` and `right`; `size` is that of one half.")
+                "Half of a frame that has both images side by side (docs/cameras.md).")
             .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
             .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
             .integer("offset.0", &C::offset_x, 0, 16384, "px",
-                     "Left edge of the region that is read out, on the sensor.")
+                     "Left edge of the region of interest on the sensor.")
             .integer("offset.1", &C::offset_y, 0, 16384, "px", "Upper edge of that region.")
             .text("pixel_format", &C::pixel_format, 32,
-                  "The device's own name (`Mono8`, `BayerGB8`, `GREY`); empty: the cheapest format "
-                  "with grey values.")
+                  "The device's name, e.g. `Mono8`; empty: the cheapest with grey values.")
             .choice<CameraTrigger>(
                 "trigger", &C::trigger,
                 {{"hardware", CameraTrigger::hardware},
                  {"software", CameraTrigger::software},
                  {"free", CameraTrigger::free}},
-                "Trigger source: `hardware`, a pulse at its input; `software`, a command at "
-                "`trigger.rate`; `free`, its own clock. Equal for all cameras.")
-            .options("options", &C::options, 400,
-                     "Options of this driver (drivers/*/README.md): `NAME=VALUE …`, or a group: "
-                     "`{packet_size: 9000}`.")
+                "Trigger source, equal for all cameras (docs/synchronisation.md).")
+            .options("options", 400,
+                     "Options of this driver (drivers/*/README.md), a group or `NAME=VALUE …`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
                     "Exposure time; 8000 suits daylight on the simulated rig.")
-            .number(
-                "trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
-                "From a pulse's edge to the start of the exposure: of the input (10 to 100 µs if "
-                "it is opto-coupled) and of the camera. With `sync.mode` `board`, `ins_syncout` or "
-                "`master_strobe` it goes into every stamp, unless `trigger.feedback` measures it.")
+            .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
+                    "Delay from a pulse's edge to the start of the exposure.")
             .number("stamp_jitter_us", &C::stamp_jitter_us, 0, 5000, "µs",
-                    "Maximum deviation of its stamps from the pulses; 0: the default of the driver "
-                    "(20; 1000 for host stamps). Above half of `trigger.dither_us` only a pause "
-                    "verifies the pairing.")
+                    "Maximum jitter of its stamps; 0: the driver's (20; host stamps 1000).")
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
             .text("mask", &C::mask, 400,
-                  "PNG or PGM of the image size; pixels of value 0 are not used (bonnet, dirt). A "
-                  "relative path is looked up in the directory of the configuration file, then in "
-                  "the working directory.")
+                  "PNG or PGM; pixels of value 0 are not used (docs/cameras.md).")
             .choice<CameraModelKind>(
                 "model", &C::model,
                 {{"pinhole-radtan", CameraModelKind::pinhole_radtan},
                  {"pinhole-equidistant", CameraModelKind::pinhole_equidistant}},
-                "Lens model: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a fisheye "
-                "lens, k1 k2 k3 k4.")
+                "Lens model; `pinhole-equidistant` is a fisheye lens.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
-                     "fx, fy, cx, cy; all four 0: the intrinsics are those of `rig.nominal`.")
+                     "fx, fy, cx, cy; all four 0: those of `rig.nominal`.")
             .numbers("distortion", &C::distortion, -2, 2, "",
-                     "With `intrinsics`: k1, k2, p1, p2, k3; of an equidistant lens k1 to k4.")
+                     "k1, k2, p1, p2, k3; of an equidistant lens k1 to k4.")
             .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
-                     "Extrinsics, X_camera = R X_left + t, as rows r11 r12 r13 t1, r21 … of [R t]. "
-                     "All zero: parallel, N baselines to the right.");
+                     "Rows of [R t], X_camera = R X_left + t; all 0: parallel cameras.");
     all.name = one.name;
     all.meaning = one.meaning;
     std::move(one.keys.begin(), one.keys.end(), std::back_inserter(all.keys));
@@ -360,72 +319,52 @@ Group exposure() {
               "Exposure and gain of all cameras together, while driving (docs/cameras.md).",
               &Configuration::exposure)
       .choice("mode", &E::mode, {"fixed", "auto"},
-              "`fixed`: as configured in `cameras`. `auto`: controlled by the brightness of camera "
-              "0, equal for all cameras, starting with the settings of camera 0.")
+              "`auto`: one exposure for all cameras, by the brightness of camera 0.")
       .number("target", &E::target, 20, 200, "grey levels", "Target mean of the unmasked pixels.")
       .number("saturated_percent", &E::saturated_percent, 0, 50, "%",
               "Maximum share of saturated pixels.")
       .number("min_us", &E::min_us, 5, 100000, "µs", "Minimum exposure.")
       .number("max_us", &E::max_us, 10, 200000, "µs",
-              "Maximum exposure, limits motion blur; beyond it the gain is raised.")
+              "Maximum exposure; beyond it the gain is raised.")
       .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Maximum gain.")
       .integer("settle_frames", &E::settle_frames, 2, 60, "frames",
-               "Images skipped after a change: one more than the cameras need to apply it.");
+               "Images skipped after a change: one more than the cameras need.");
 }
 
 Group trigger() {
   using T = TriggerSettings;
   return Rows("trigger", "Trigger of the cameras.", &Configuration::trigger)
       .word("driver", &T::driver, {"none", "mock", "board"},
-            "Source of the pulses: `board`, a trigger board on a serial port "
-            "(docs/synchronisation.md); `mock`, with mock cameras; `none`: pulses that are not "
-            "reported (a generator, a camera's strobe), or none at all.")
+            "Source of the pulses (docs/synchronisation.md).")
       .text("port", &T::port, 200,
-            "Serial port of the trigger board, `/dev/ttyACM0`, or its serial number. Empty: the "
-            "only one connected.")
-      .integer("baud", &T::baud, 0, 3000000, "baud",
-               "Baud rate of the serial link, if it has one; 0: detected.")
-      .number("rate", &T::rate, 1, 200, "Hz", "Pulse rate, and so frame rate of every camera.")
+            "Serial port of the trigger board, or its serial number; empty: the only one.")
+      .integer("baud", &T::baud, 0, 3000000, "baud", "Baud rate of the serial link; 0: detected.")
+      .number("rate", &T::rate, 1, 200, "Hz", "Pulse rate and frame rate.")
       .number("width_us", &T::width_us, 1, 100000, "µs",
               "Length of a pulse, as the camera inputs require.")
-      .number(
-          "dither_us", &T::dither_us, 0, 20000, "µs",
-          "Variation of every interval in a non-repeating order, so that camera stamps verify at "
-          "any time which frame belongs to which pulse. 0: even intervals, verified by a pause.")
+      .number("dither_us", &T::dither_us, 0, 20000, "µs",
+              "Variation of the pulse interval by which images are identified; 0: none.")
       .integer("lines", &T::lines, 0, 15, "",
-               "Bit mask of the pulsed outputs: bit k is line k, wired to camera k. 0: one for "
-               "each camera.")
+               "Bit mask of the pulsed outputs; 0: one for each camera.")
       .integer("active_low", &T::active_low, 0, 15, "", "Bit mask of the lines whose pulse is low.")
       .integer("feedback", &T::feedback, 0, 15, "",
-               "Bit mask of the inputs wired to exposure-active outputs; stamps are then the "
-               "measured middle of the exposure.")
+               "Bit mask of the inputs wired to exposure-active outputs.")
       .integer("feedback_active_low", &T::feedback_active_low, 0, 15, "",
                "Bit mask of the feedback inputs that are low during exposure.")
       .choice("pps", &T::pps, edges(),
-              "Edge of the GNSS receiver's pulse per second at the trigger board, `rising` or "
-              "`falling`; `none`: not wired.")
-      .choice("ins", &T::ins, edges(),
-              "Edge of the INS's SyncOut at the trigger board, `rising` or `falling`; `none`: not "
-              "wired.");
+              "Edge of the GNSS receiver's pulse per second at the trigger board.")
+      .choice("ins", &T::ins, edges(), "Edge of the INS's SyncOut at the trigger board.");
 }
 
 Group sync() {
   using S = SyncSettings;
   return Rows("sync", "How images are paired.", &Configuration::sync)
-      .choice<SyncMode>(
-          "mode", &S::mode, sync_modes(),
-          "How images are paired and verified (docs/synchronisation.md). Verified: `board`, by a "
-          "trigger board's pulses; `ins_syncout`, by the INS's; `master_strobe`, camera 0 triggers "
-          "the others; `ieee1394_cycle_time`, stamps of one IEEE 1394 cycle timer; `ptp`, stamps "
-          "of one PTP clock; `side_by_side`, both images are in one frame "
-          "(`cameras.N.image_half`). Not verified: `frame_counter`, images with equal exposure "
-          "counts; `approximate_time`, images stamped within `tolerance_ms` by the host's clock, "
-          "for cameras without a trigger.")
+      .choice<SyncMode>("mode", &S::mode, sync_modes(),
+                        "How images are paired and verified (docs/synchronisation.md).")
       .number("timeout_ms", &S::timeout_ms, 1, 10000, "ms",
               "Maximum wait for a late image of a pulse.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
-              "With `approximate_time`, `ieee1394_cycle_time`, `ptp` and `side_by_side`: maximum "
-              "difference of the exposure times of one set.");
+              "Maximum difference of the stamps of a set, in modes without pulses.");
 }
 
 Group ins() {
@@ -433,101 +372,71 @@ Group ins() {
   return Rows("ins", "Inertial navigation system that the pose is compared with.",
               &Configuration::ins)
       .word("driver", &I::driver, {"none", "mock", "xsens", "nmea", "ubx"},
-            "Driver: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock cameras).")
+            "Driver; `nmea` and `ubx` are satellite receivers.")
       .text("port", &I::port, 200,
-            "Serial port, preferably a stable link: `/dev/serial/by-id/…`. Empty: the only USB "
-            "serial port.")
+            "Serial port, e.g. `/dev/serial/by-id/…`; empty: the only one on USB.")
       .integer("baud", &I::baud, 0, 2000000, "baud",
-               "Baud rate to set; 0: keep the rate of the device, which is detected.")
+               "Baud rate to set; 0: keep that of the device.")
       .number("rate", &I::rate, 1, 400, "Hz",
-              "Sample rate; an MTi-G-700/710 uses the nearest it supports (100 for 120). With "
-              "`nmea` and `ubx` the rate that the receiver sends.")
+              "Sample rate; of `nmea` and `ubx` the rate that the receiver sends.")
       .number("sync_out_hz", &I::sync_out_hz, -1, 400, "Hz",
-              "Pulse rate at SyncOut; 0: unchanged, -1: off. An MTi-G-700/710 generates 400 Hz / "
-              "n, so not 30.")
+              "Pulse rate at SyncOut; 0: unchanged, -1: off.")
       .number("sync_out_width_ms", &I::sync_out_width_ms, 0.1, 100, "ms",
               "Length of a SyncOut pulse.")
       .number("processing_ms", &I::processing_ms, 0, 50, "ms",
-              "Delay from a sample to its first byte on the serial link, from the manual; enters "
-              "every stamp.")
+              "Delay from a sample to its first byte on the serial link (manual).")
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
                "Position of the left camera in the INS body: forward, left, up.")
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
-               "Rotation of the rig's forward-left-up axes relative to the INS: roll, pitch, yaw.");
+               "Rotation of the rig relative to the INS: roll, pitch, yaw.");
 }
 
 Group comparison() {
   using C = ComparisonSettings;
   return Rows("comparison", "The comparison with the INS.", &Configuration::comparison)
       .number("alignment_distance_m", &C::alignment_distance_m, 1, 100000, "m",
-              "Distance travelled with a valid fix after which the path is aligned with ENU.")
+              "Distance with a valid fix after which the path is aligned with ENU.")
       .number("correlation_s", &C::correlation_s, 0.1, 3600, "s",
               "Correlation time of the INS's position errors.")
       .number("heading_sigma_deg", &C::heading_sigma_deg, 0, 180, "°",
-              "Sigma of the INS heading including the boresight, as a weight in the alignment. 0: "
-              "heading not used, or 0.3° with extrinsics published by a data set.")
+              "Sigma of the INS heading in the alignment; 0: heading not used.")
       .number("max_gap_ms", &C::max_gap_ms, 1, 10000, "ms",
               "Maximum interval between INS samples to interpolate across.")
       .number("max_wait_ms", &C::max_wait_ms, 1, 3000, "ms",
-              "Maximum wait of a pose for the next INS sample.")
-      .number("jump_m", &C::jump_m, 0.1, 1e6, "m",
-              "A step of the INS's position beyond this (and 60 m/s) is a jump.")
-      .number("scale_tolerance", &C::scale_tolerance, 0.001, 1, "",
-              "Relative difference of the path lengths that is reported.");
+              "Maximum wait of a pose for the next INS sample.");
 }
 
 Group odometry() {
   using O = OdometryOptions;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  Rows<O> rows("odometry",
-               "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one "
-               "at a time.",
-               &Configuration::odometry);
-  rows.integer("features", &O::features, 50, 1000, "points",
-               "Points tracked in each image, spread over a grid: more cost time and constrain the "
-               "pose better where texture is poor.")
+  Rows rows("odometry",
+            "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one "
+            "at a time.",
+            &Configuration::odometry);
+  rows.integer("features", &O::features, 50, 1000, "points", "Points tracked in each image.")
       .choice("init_features", &O::init_features, {"corners", "surf"},
-              "Features matched between the first images when calibrating from scratch: the "
-              "tracked corners, or SURF-64; docs/benchmarks.md compares them.")
+              "Features of the first matches from scratch (docs/benchmarks.md).")
       .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
                "Image pyramid levels; more levels follow faster motion.")
-      .number(
-          "band_px", &O::band_px, 0.5, 5, "px",
-          "Half width of the search band along the epipolar line; wider for a poor calibration.")
+      .number("band_px", &O::band_px, 0.5, 5, "px",
+              "Half width of the search band along the epipolar line.")
       .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
-              "Standard deviation of a tracked corner per coordinate at full resolution; scales "
-              "all residuals.")
+              "Standard deviation of a tracked corner per coordinate.")
       .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
-              "Added in quadrature to `pixel_sigma`, times the sideways motion since the patch was "
-              "extracted divided by its depth, because the slope of the surface is unknown.")
+              "Added in quadrature, times the sideways motion divided by the depth.")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
                "Keyframes in the sliding window.")
       .number("extrinsic_rotation_sigma_rad", &O::extrinsic_rotation_sigma_rad, 0, 0.05, "rad",
-              "Uncertainty of the rotation between two cameras that shifts all disparities "
-              "equally, if the calibration does not state less; estimated with every window. 0: "
-              "the calibration is exact.")
-      .integer("window_steps", &O::window_steps, 1, 30, "steps",
-               "Maximum solver steps per window adjustment.")
-      .number("keyframe_parallax", &O::keyframe_parallax, 0.005, 0.3, "rad",
-              "Median parallax since the last keyframe that creates a new one.")
-      .number("keyframe_tracked", &O::keyframe_tracked, 0.1, 1, "",
-              "A new keyframe is created when less than this share of the last one's points is "
-              "still tracked.")
+              "Minimum sigma of the rotation between cameras; 0: exact.")
       .integer("min_inliers", &O::min_inliers, 6, 200, "points",
                "Minimum inliers of a pose; below, the status is `lost`.")
       .integer("ok_inliers", &O::ok_inliers, 6, 1000, "points",
-               "Below this number of inliers the pose is `degraded: few_inliers`; not below "
-               "`min_inliers`.")
-      .integer("mlesac_hypotheses", &O::mlesac_hypotheses, 10, 1000, "",
-               "Maximum MLESAC hypotheses per frame.")
+               "Below this number of inliers the pose is `degraded: few_inliers`.")
       .integer("seed", &O::seed, 0, kLargestSeed, "",
-               "Seed of that sampling: the same seed gives the same poses.");
-  return rows.also(Rows<Configuration>("odometry", "", whole)
+               "Seed of the random sampling: the same seed gives the same poses.");
+  return rows.also(Rows("odometry", "", whole)
                        .choice("preset", &Configuration::preset, {"default", "small"},
-                               "`small`, for small single-board computers: `odometry.features` "
-                               "250, `odometry.window_keyframes` 8, `calibration.max_frames` 100 "
-                               "and `calibration.max_observations` 50000 unless these are set; see "
-                               "docs/deployment.md."));
+                               "`small`: less work, for small computers (docs/deployment.md)."));
 }
 
 Group calibration_options() {
@@ -539,116 +448,72 @@ Group calibration_options() {
       .integer("max_frames", &C::max_frames, 10, 150, "frames",
                "Maximum number of frames solved together; older ones are dropped.")
       .integer("adopt_after", &C::adopt_after, 0, 1000, "frames",
-               "Frames after its snapshot within which a result is adopted or rejected; adoption "
-               "needs at least 6 frames that support it. In a replay and with `--fast` the "
-               "estimator waits for the solver, so results do not depend on the machine.")
+               "Frames after its snapshot within which a result is adopted.")
       .integer("max_observations", &C::max_observations, 10'000, 1'000'000, "",
-               "Maximum observations per solve (time and memory); beyond it frames are subsampled.")
+               "Maximum observations per solve; beyond it frames are subsampled.")
       .choice("intrinsics", &C::intrinsics,
               {{"fixed", calibration::IntrinsicsEstimation::fixed},
                {"focal", calibration::IntrinsicsEstimation::focal},
                {"full", calibration::IntrinsicsEstimation::full}},
-              "Intrinsics that are estimated with the extrinsics: none, the focal length of each "
-              "additional camera, or all of them.")
-      .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%",
-              "Prior sigma of a focal length.")
-      .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px",
-              "Assumed error of a fixed principal-point coordinate; with `intrinsics: full` its "
-              "prior sigma.")
-      .number("lens_centre_sigma_px", &C::lens_centre_sigma_px, 0.01, 100, "px",
-              "Prior sigma of an additional camera's principal point with `intrinsics: full`; a "
-              "sigma in calibration.yaml takes precedence.")
-      .number("distortion_sigma", &C::distortion_sigma, 1e-5, 1, "",
-              "Prior sigma of a radial coefficient (k1, k2; equidistant: k1 to k4).")
-      .number("tangential_sigma", &C::tangential_sigma, 1e-6, 0.1, "",
-              "Prior sigma of a tangential coefficient (p1, p2).")
+              "Intrinsics that are estimated with the extrinsics.")
       .number("max_direction_deg", &C::max_direction_deg, 0.1, 180, "°",
-              "Maximum angle between the translation and the nominal one; beyond it a calibration "
-              "is rejected.")
+              "Maximum angle of the translation to the nominal one.")
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
-              "Maximum rotation from the nominal one; not checked for the first calibration from "
-              "scratch.")
+              "Maximum rotation from the nominal one.")
       .integer("min_near_points", &C::min_near_points, 0, 1000, "points",
                "Minimum near points of the collected frames; below: `needs_near_structure`.")
-      .number("near_baselines", &C::near_baselines, 5, 500, "baselines",
-              "Maximum distance of a near point, in baselines.")
       .number("extrinsic_random_walk_mrad_per_sqrt_h", &C::extrinsic_random_walk_mrad_per_sqrt_h, 0,
-              100, "mrad/√h",
-              "Random walk of the extrinsics of an undisturbed rig; widens the prior with time.")
+              100, "mrad/√h", "Random walk of undisturbed extrinsics.")
       .number("max_depth_error_percent", &C::max_depth_error_percent, 0.1, 50, "%",
-              "Depth error up to which a calibration counts as verified; until then poses are "
-              "`degraded: unverified_calibration`.")
+              "Maximum depth error of a verified calibration.")
       .number("reference_depth_m", &C::reference_depth_m, 0.5, 500, "m",
-              "Depth of that test; nearer on a short baseline, where a single match is no better "
-              "than that.")
+              "Depth of that test; nearer on a short baseline.")
       .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
-              "Predicted depth error at 20 m up to which the calibration is rated `good`.")
+              "Maximum depth error at 20 m of the rating `good`.")
       .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
-              "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is "
-              "`poor`. A solution with a larger one at `reference_depth_m` is not adopted.")
-      .also(Rows<Configuration>("calibration", "", whole)
+              "Maximum depth error at 20 m of the rating `fair`.")
+      .also(Rows("calibration", "", whole)
                 .choice("online", &Configuration::online, {"off", "on"},
-                        "`off`: the rig is not monitored, and the initial calibration is used "
-                        "throughout."));
+                        "`off`: the initial calibration is used throughout, not monitored."));
 }
 
 Group monitor() {
   using M = calibration::MonitorOptions;
   return Rows("monitor", "Monitoring of the calibration in use.", &Configuration::monitor)
       .number("threshold", &M::threshold, 20, 500, "",
-              "Test statistic that reports a knock or a drift: higher for fewer false alarms, "
-              "lower for smaller knocks and faster detection.")
-      .number(
-          "bias_px", &M::bias_px, 0, 1, "px",
-          "Minimum slow error that imperfect intrinsics leave in stereo matches without a knock.")
+              "Test statistic that reports a knock or a drift; higher: fewer alarms.")
       .number("verified_bias_px", &M::verified_bias_px, 0, 2, "px",
-              "The same for a verified calibration, until the monitor has measured it.")
+              "Error of stereo matches by imperfect intrinsics, once verified.")
       .number("unverified_bias_px", &M::unverified_bias_px, 0, 5, "px",
-              "Expected value of that error with an unverified calibration.")
-      .integer("min_matches", &M::min_matches, 12, 1000, "matches",
-               "Frames with fewer stereo matches are not used.")
-      .integer("short_window", &M::short_window, 1, 10, "frames",
-               "Shortest window of moving frames that is tested: for large knocks.")
-      .integer("long_window", &M::long_window, 60, 1800, "frames",
-               "Longest window of moving frames that is tested: for drift.")
-      .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
-               "Consecutive frames without the expected stereo matches that are a `collapse`, or "
-               "over the threshold that are a knock at standstill.")
-      .number("collapse_share", &M::collapse_share, 0.01, 0.9, "",
-              "Share of the expected matches below which a frame counts towards a collapse.")
-      .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",
-               "Minimum expected matches for a frame to count.");
+              "The same with an unverified calibration.");
 }
 
 Group intrinsics_error() {
   using E = IntrinsicsErrorSettings;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  return Rows<E>(
+  return Rows(
              "mock.intrinsics_error", "", [](auto& c) -> auto& { return c.mock.intrinsics_error; })
-      .number(
-          "principal_point_px", &E::principal_point_px, 0, 50, "px",
-          "Sigma of the error of each supplied principal-point coordinate; rendering stays exact.")
+      .number("principal_point_px", &E::principal_point_px, 0, 50, "px",
+              "Sigma of the error of each supplied principal-point coordinate.")
       .number("focal_percent", &E::focal_percent, 0, 10, "%",
-              "Sigma of the error of the supplied focal length, drawn per camera.")
+              "Sigma of the error of the supplied focal length.")
       .integer("seed", &E::seed, 0, kLargestSeed, "", "Seed of these errors.");
 }
 
 Group calibration_error() {
   using E = CalibrationErrorSettings;
-  return Rows<E>(
+  return Rows(
              "mock.calibration_error", "",
              [](auto& c) -> auto& { return c.mock.calibration_error; })
       .number("pitch_deg", &E::pitch_deg, -45, 45, "°",
-              "Error of the supplied extrinsics of camera 1: rotation about its x axis.")
+              "Error of the rotation of camera 1 about its x axis.")
       .number("yaw_deg", &E::yaw_deg, -45, 45, "°", "The same about its y axis.")
       .number("roll_deg", &E::roll_deg, -45, 45, "°", "The same about its z axis.")
-      .number("x_m", &E::x_m, -1, 1, "m",
-              "Error of the supplied extrinsics of camera 1: translation along its x axis.")
+      .number("x_m", &E::x_m, -1, 1, "m", "Error of the translation of camera 1 along its x axis.")
       .number("y_m", &E::y_m, -1, 1, "m", "The same along its y axis.")
       .number("z_m", &E::z_m, -1, 1, "m", "The same along its z axis.")
       .number("length_percent", &E::length_percent, -60, 200, "%",
-              "Scale error of the supplied lengths including the baseline; images alone cannot "
-              "show it.");
+              "Scale error of the supplied lengths.");
 }
 
 Group mock() {
@@ -664,25 +529,25 @@ Group mock() {
                {"straight", Kind::straight},
                {"brief", Kind::brief},
                {"still", Kind::still}},
-              "Route: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
+              "Route: `loop` is 1 km, `brief` 120 m.")
       .integer("seed", &M::seed, 0, kLargestSeed, "",
-               "Seed of the world, the vehicle's motion and all noise: same seed, same run.")
+               "Seed of world, motion and noise: same seed, same run.")
       .choice("pattern", &M::pattern,
               {{"grey", vergence::mock::Pattern::grey}, {"gbrg", vergence::mock::Pattern::gbrg}},
               "Sensors: `grey`, or `gbrg` (Bayer).")
       .choice("ins", &M::ins, {{"noisy", M::Ins::noisy}, {"ideal", M::Ins::ideal}},
               "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
       .integer("texture_detail", &M::texture_detail, 0, 2, "",
-               "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel (8, 32, 128 MB).")
+               "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel.")
       .integer("noise", &M::noise, 0, 1, "", "1: shot and read noise of the sensors; 0: none.")
       .integer("blur_samples", &M::blur_samples, 1, 16, "",
-               "Poses averaged over an exposure: 1 is no motion blur; time grows with it.")
+               "Poses averaged over an exposure; 1: no motion blur.")
       .number("speed", &M::speed, 0.01, 20, "m/s", "Speed on the straights.")
       .number("suspension", &M::suspension, 0, 3, "",
               "Gain on pitch, roll and heave of the springs.")
       .number("vibration", &M::vibration, 0, 5, "", "Gain on the vibration at 6 to 12 Hz.")
       .number("stop_s", &M::stop_s, 1, 3600, "s",
-              "Duration of each stop, and of the standing start and end (at most a minute).")
+              "Duration of each stop, and of the standing start and end.")
       .number("hill_deg", &M::hill_deg, 0, 5, "°", "Steepest slope of the streets.")
       .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm",
               "Largest drift of the devices' clocks; each has its own.")
@@ -749,21 +614,20 @@ std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
 std::string find_contradiction(const Configuration& c) {
   for (std::size_t k = 0; k < c.cameras.size(); ++k)
     if (std::string unread = find_unread_lens(c.cameras[k], k); !unread.empty()) return unread;
-  if (c.odometry.ok_inliers < c.odometry.min_inliers)
-    return fmt::format(
-        "odometry.ok_inliers ({}) is below odometry.min_inliers ({}), so a pose would be lost "
-        "before it is degraded; raise odometry.ok_inliers",
-        c.odometry.ok_inliers, c.odometry.min_inliers);
-  if (c.calibration.max_frames < c.calibration.min_frames)
-    return fmt::format(
-        "calibration.max_frames ({}) is below calibration.min_frames ({}), so no calibration would "
-        "be attempted; raise calibration.max_frames",
-        c.calibration.max_frames, c.calibration.min_frames);
-  if (c.calibration.usable_depth_percent < c.calibration.good_depth_percent)
-    return fmt::format(
-        "calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({}); raise "
-        "the first or lower the second",
-        c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
+  struct Order {
+    const char *larger, *smaller;
+    double high, low;
+  };
+  for (const Order& o :
+       {Order{"odometry.ok_inliers", "odometry.min_inliers", double(c.odometry.ok_inliers),
+              double(c.odometry.min_inliers)},
+        Order{"calibration.max_frames", "calibration.min_frames", double(c.calibration.max_frames),
+              double(c.calibration.min_frames)},
+        Order{"calibration.usable_depth_percent", "calibration.good_depth_percent",
+              c.calibration.usable_depth_percent, c.calibration.good_depth_percent}})
+    if (o.high < o.low)
+      return fmt::format("{} ({}) is below {} ({}); raise the first or lower the second", o.larger,
+                         o.high, o.smaller, o.low);
   for (const auto& [key, list] :
        {std::pair<const char*, const std::string&>{"affinity", c.realtime.affinity},
         {"solver_affinity", c.realtime.solver_affinity}})

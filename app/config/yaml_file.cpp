@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -99,6 +100,11 @@ bool parse_whole(const std::string& text, Number* value) {
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, *value);
   return error == std::errc() && stop == end;
+}
+
+/// ` is "VALUE"`, as a part of a message.
+std::string is_value(const YAML::Node& node) {
+  return node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\"" : " is a list or a group";
 }
 
 /// Line `number` of a text, counted from 0; empty after the last one.
@@ -199,17 +205,8 @@ void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
 
 double YamlFile::number(const YAML::Node& node, const std::string& field) const {
   double value = 0;
-  if (!node.IsScalar() || !parse_whole(node.Scalar(), &value)) {
-    // YAML's .nan and .inf are numbers to the writer, so the message says what is wrong
-    // with it.
-    double special = 0;
-    if (node.IsScalar() && YAML::convert<double>::decode(node, special) && !std::isfinite(special))
-      fail(node, field + " is \"" + shown(node.Scalar()) + "\", not a finite number");
-    fail(node, field + (node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\", not a number"
-                                        : " is not a number"));
-  }
-  if (!std::isfinite(value))
-    fail(node, field + " is \"" + shown(node.Scalar()) + "\", not a finite number");
+  if (!node.IsScalar() || !parse_whole(node.Scalar(), &value) || !std::isfinite(value))
+    fail(node, field + is_value(node) + ", not a finite number");
   return value;
 }
 
@@ -217,8 +214,7 @@ std::int64_t YamlFile::integer(const YAML::Node& node, const std::string& field,
                                std::int64_t most) const {
   std::int64_t value = 0;
   if (!node.IsScalar() || !parse_whole(node.Scalar(), &value))
-    fail(node, field + (node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\", not an integer"
-                                        : " is not an integer"));
+    fail(node, field + is_value(node) + ", not an integer");
   if (value < least || value > most)
     fail(node, fmt::format("{} is {}; it must be in {} … {}", field, value, least, most));
   return value;
@@ -256,6 +252,19 @@ std::string double_quoted(std::string_view text) {
       out += c;
   }
   return out + "\"";
+}
+
+std::string yaml_scalar(const std::string& text) {
+  const auto is_plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
+  };
+  const bool letter_first =
+      !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
+  // YAML 1.1 reads `yes`, `off` and the like as booleans.
+  bool flag = false;
+  const bool other =
+      YAML::convert<bool>::decode(YAML::Node(text), flag) || YAML::IsNullString(text);
+  return letter_first && std::ranges::all_of(text, is_plain) && !other ? text : double_quoted(text);
 }
 
 }  // namespace vergence::app

@@ -49,5 +49,7 @@ inline constexpr std::uintmax_t kLargestYaml = 1U << 20;
 
 /// Encodes any text in double quotes.
 [[nodiscard]] std::string double_quoted(std::string_view text);
+/// Encodes a text: plain where no reader takes it for another value, else in double quotes.
+[[nodiscard]] std::string yaml_scalar(const std::string& text);
 
 }  // namespace vergence::app

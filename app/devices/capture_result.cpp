@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "app/runtime/nearest.hpp"
 #include "drivers/clock.hpp"
 #include "drivers/sync/sync_types.hpp"
 
@@ -131,11 +132,9 @@ std::vector<std::string> camera_names(const Configuration& c, int cameras) {
     std::ranges::replace_if(
         name, [](unsigned char ch) { return std::isalnum(ch) == 0 && ch != '_' && ch != '-'; },
         '_');
-    if (name.empty()) name = "camera" + std::to_string(k);
-    while (std::ranges::find(names, name) != names.end()) name += "_" + std::to_string(k);
-    names.push_back(std::move(name));
+    names.push_back(name.empty() ? "camera" + std::to_string(k) : name);
   }
-  return names;
+  return distinct_names(names);
 }
 
 CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,

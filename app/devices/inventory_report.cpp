@@ -7,35 +7,20 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/terminal_text.hpp"
 #include "app/runtime/version.hpp"
 
 namespace vergence::app {
 
 namespace {
 
-bool plain(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-';
-}
-
-/// At most 64 letters; those that mean something in a rule or a path become `other`.
+/// At most 64 characters; those that mean something in a rule or a path become `other`: `?` matches
+/// any one on the right side of `==`.
 std::string plain_text(const std::string& text, char other) {
   std::string out = text.substr(0, 64);
   std::ranges::replace_if(
-      out, [](char c) { return !plain(c); }, other);
-  return out;
-}
-
-/// The right side of `==`, which is a pattern.
-std::string pattern(const std::string& text) { return plain_text(text, '?'); }
-
-/// A name under /dev/vergence.
-std::string part_of_name(const std::string& text) { return plain_text(text, '_'); }
-
-/// For a comment: one line.
-std::string comment(const std::string& text) {
-  std::string out = text.substr(0, 80);
-  std::ranges::replace_if(
-      out, [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+      out, [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '_' && c != '-'; },
+      other);
   return out;
 }
 
@@ -45,27 +30,26 @@ std::string which(const char* attribute, std::uint16_t vendor, std::uint16_t pro
                   const std::string& serial) {
   std::string s = fmt::format("{0}{{idVendor}}==\"{1:04x}\", {0}{{idProduct}}==\"{2:04x}\"",
                               attribute, vendor, product);
-  if (!serial.empty()) s += fmt::format(", {}{{serial}}==\"{}\"", attribute, pattern(serial));
+  if (!serial.empty())
+    s += fmt::format(", {}{{serial}}==\"{}\"", attribute, plain_text(serial, '?'));
   return s;
-}
-
-const char* name_of(SerialKind kind) {
-  if (kind == SerialKind::ins) return "ins";
-  return kind == SerialKind::board ? "trigger" : "serial";
 }
 
 std::string port_rules(const FoundPort& port) {
   const SerialPortInfo& i = port.info;
   const std::string who = which("ATTRS", i.usb_vendor, i.usb_product, i.usb_serial);
-  std::string out = fmt::format("\n# {}: {}\n", i.port, comment(i.description));
+  std::string out = fmt::format("\n# {}: {}\n", i.port, plain_text(i.description, ' '));
   out += fmt::format(
       "ENV{{DEVTYPE}}==\"usb_device\", {}, ENV{{ID_MM_DEVICE_IGNORE}}=\"1\", "
       "ATTR{{power/control}}=\"on\"\n",
       which("ATTR", i.usb_vendor, i.usb_product, i.usb_serial));
   out += fmt::format("SUBSYSTEM==\"tty\", {}, GROUP=\"dialout\", MODE=\"0660\", ", who);
   if (!i.usb_serial.empty())
-    out += fmt::format("SYMLINK+=\"vergence/{}-{}\", ", name_of(port.kind),
-                       part_of_name(i.usb_serial));
+    out += fmt::format("SYMLINK+=\"vergence/{}-{}\", ",
+                       port.kind == SerialKind::ins     ? "ins"
+                       : port.kind == SerialKind::board ? "trigger"
+                                                        : "serial",
+                       plain_text(i.usb_serial, '_'));
   out += "ENV{ID_MM_PORT_IGNORE}=\"1\"\n";
   if (is_ftdi(i.usb_vendor, i.usb_product))
     out += fmt::format(
@@ -76,22 +60,19 @@ std::string port_rules(const FoundPort& port) {
 }
 
 std::string usb_camera_rules(const UsbDevice& d) {
-  const bool iidc = d.vendor == kPointGreyVendor;
-  std::string out = fmt::format("\n# camera on USB {}: {}\n", d.port, comment(d.title));
-  out += fmt::format(
-      "ENV{{DEVTYPE}}==\"usb_device\", {}, GROUP=\"video\", MODE=\"0660\", "
-      "ATTR{{power/control}}=\"on\"",
-      which("ATTR", d.vendor, d.product, d.serial));
-  if (iidc && !d.serial.empty())
-    out += fmt::format(", SYMLINK+=\"vergence/camera-{}\"", part_of_name(d.serial));
-  out += "\n";
-  if (!d.video.empty())
-    out += fmt::format("SUBSYSTEM==\"video4linux\", {}, GROUP=\"video\", MODE=\"0660\"\n",
-                       which("ATTRS", d.vendor, d.product, d.serial));
-  if (!d.video.empty() && !d.serial.empty())
-    out += fmt::format(
-        "SUBSYSTEM==\"video4linux\", ATTR{{index}}==\"0\", {}, SYMLINK+=\"vergence/camera-{}\"\n",
-        which("ATTRS", d.vendor, d.product, d.serial), part_of_name(d.serial));
+  const std::string above = which("ATTRS", d.vendor, d.product, d.serial),
+                    link = d.serial.empty() ? ""
+                                            : fmt::format(", SYMLINK+=\"vergence/camera-{}\"",
+                                                          plain_text(d.serial, '_'));
+  std::string out = fmt::format(
+      "\n# camera on USB {}: {}\nENV{{DEVTYPE}}==\"usb_device\", {}, GROUP=\"video\", "
+      "MODE=\"0660\", ATTR{{power/control}}=\"on\"{}\n",
+      d.port, plain_text(d.title, ' '), which("ATTR", d.vendor, d.product, d.serial),
+      d.vendor == kPointGreyVendor ? link : "");
+  if (d.video.empty()) return out;
+  out += fmt::format("SUBSYSTEM==\"video4linux\", {}, GROUP=\"video\", MODE=\"0660\"\n", above);
+  if (!link.empty())
+    out += fmt::format("SUBSYSTEM==\"video4linux\", ATTR{{index}}==\"0\", {}{}\n", above, link);
   return out;
 }
 
@@ -99,92 +80,18 @@ std::string firewire_rules(const iidc::FirewireNode& node) {
   return fmt::format(
       "\n# camera on IEEE 1394, {}: {}\nSUBSYSTEM==\"firewire\", ATTR{{guid}}==\"0x{:016x}\", "
       "GROUP=\"video\", MODE=\"0660\", SYMLINK+=\"vergence/camera-{:016x}\"\n",
-      node.device, comment(node.rom.model.data()), node.rom.guid, node.rom.guid);
+      node.device, plain_text(node.rom.model.data(), ' '), node.rom.guid, node.rom.guid);
 }
 
 using Json = nlohmann::ordered_json;
-using Row = std::vector<std::string>;
-
-/// Rows with their columns aligned.
-std::string table(const std::vector<Row>& rows) {
-  std::vector<std::size_t> widths;
-  for (const Row& row : rows)
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      if (widths.size() <= i) widths.push_back(0);
-      widths[i] = std::max(widths[i], columns(row[i]));
-    }
-  std::string text;
-  for (const Row& row : rows) {
-    std::string line = " ";
-    for (std::size_t i = 0; i < row.size(); ++i) line += " " + padded(row[i], widths[i]) + " ";
-    text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
-  }
-  return text;
-}
 
 std::string usb_ids(const SerialPortInfo& info) {
   return info.usb_vendor == 0 ? ""
                               : fmt::format("{:04x}:{:04x}", info.usb_vendor, info.usb_product);
 }
 
-std::string cameras_text(const Inventory& inventory, const Terminal& t) {
-  std::vector<Row> rows;
-  for (const DriverFindings& d : inventory.drivers)
-    for (const DeviceInfo& c : d.cameras)
-      rows.push_back({d.name, c.serial.empty() ? "?" : harmless(c.serial), harmless(c.model),
-                      harmless(c.place)});
-  return rows.empty() ? "" : t.in(Terminal::Ink::bold, "Cameras") + "\n" + table(rows) + "\n";
-}
-
-std::string ports_text(const Inventory& inventory, const Terminal& t) {
-  if (inventory.ports.empty()) return {};
-  std::vector<Row> rows;
-  for (const FoundPort& p : inventory.ports)
-    rows.push_back({p.info.port, usb_ids(p.info), harmless(p.info.usb_serial), to_string(p.kind),
-                    p.info.latency_timer_ms
-                        ? fmt::format("latency timer {} ms", *p.info.latency_timer_ms)
-                        : ""});
-  return t.in(Terminal::Ink::bold, "Serial ports") + "\n" + table(rows) + "\n";
-}
-
-std::string paste_text(const Inventory& inventory, const Terminal& t) {
-  std::string text;
-  for (const DriverFindings& d : inventory.drivers)
-    for (const DeviceInfo& c : d.cameras)
-      if (!c.serial.empty() || d.name == "gige") text += "    - " + camera_line(c) + "\n";
-  if (!text.empty()) text = "  cameras:\n" + text;
-  for (const FoundPort& p : inventory.ports)
-    if (!p.configuration.empty()) text += "  " + p.configuration + "\n";
-  return text.empty() ? ""
-                      : t.in(Terminal::Ink::bold, "For the configuration") + "\n" + text + "\n";
-}
-
-/// One line a driver, its message beside it.
-std::string remarks_text(const Inventory& inventory, const Terminal& t) {
-  std::string text;
-  constexpr std::size_t kName = 14;
-  const auto remark = [&](const std::string& name, const std::string& message) {
-    std::string head = "  " + padded(name, kName - 2);
-    for (const std::string& line : wrapped(message, t.width - kName)) {
-      text += head + line + "\n";
-      head = std::string(kName, ' ');
-    }
-  };
-  for (const DriverFindings& d : inventory.drivers) {
-    if (!d.cameras.empty() && d.explanation.empty()) continue;
-    remark(d.name, d.explanation.empty() ? "none" : harmless(d.explanation));
-  }
-  if (inventory.ports.empty()) remark("serial", "no port");
-  return text.empty() ? "" : t.in(Terminal::Ink::bold, "Not found") + "\n" + text;
-}
-
 // Column widths in characters.
-constexpr std::size_t kState = 9, kCheck = 19;
-
-std::string state_text(FindingState state, const Terminal& t) {
-  constexpr std::array kInks{Terminal::Ink::green, Terminal::Ink::yellow, Terminal::Ink::red};
-  return t.in(kInks.at(static_cast<std::size_t>(state)), padded(to_string(state), kState));
-}
+constexpr std::size_t kState = 9, kCheck = 19, kWidth = 100;
 
 std::size_t count(const std::vector<Finding>& findings, FindingState state) {
   return static_cast<std::size_t>(
@@ -229,11 +136,25 @@ Inventory ports_of_rig(Inventory inventory, const Configuration& drive, const Ma
   return inventory;
 }
 
-std::string devices_text(const Inventory& inventory, const Terminal& t) {
-  std::string text = cameras_text(inventory, t) + ports_text(inventory, t) +
-                     paste_text(inventory, t) + remarks_text(inventory, t);
-  while (text.ends_with("\n\n")) text.pop_back();
-  return text;
+std::string devices_text(const Inventory& inventory) {
+  std::string cameras, ports, notes;
+  for (const DriverFindings& d : inventory.drivers) {
+    for (const DeviceInfo& c : d.cameras)
+      cameras +=
+          fmt::format("    {} {}  # {}, {}\n", c.serial.empty() && d.name != "gige" ? '#' : '-',
+                      camera_line(c), harmless(c.model), harmless(c.place));
+    if (d.cameras.empty() || !d.explanation.empty())
+      notes += fmt::format("# {}: {}\n", d.name,
+                           d.explanation.empty() ? "none found" : harmless(d.explanation));
+  }
+  for (const FoundPort& p : inventory.ports)
+    ports += fmt::format(
+        "  {}  # {} {} {}{}\n", p.configuration.empty() ? "# " + p.name() : p.configuration,
+        to_string(p.kind), usb_ids(p.info), harmless(p.info.usb_serial),
+        p.info.latency_timer_ms ? fmt::format(", latency timer {} ms", *p.info.latency_timer_ms)
+                                : "");
+  if (ports.empty()) notes += "# serial ports: none found\n";
+  return (cameras.empty() ? "" : "  cameras:\n" + cameras) + ports + notes;
 }
 
 std::string devices_json(const Inventory& inventory, const std::string& rules) {
@@ -269,18 +190,17 @@ std::string devices_json(const Inventory& inventory, const std::string& rules) {
   return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string doctor_text(const std::vector<Finding>& findings, bool given, const Terminal& t) {
+std::string doctor_text(const std::vector<Finding>& findings, bool given) {
   std::string text;
   const std::string margin(kState + kCheck, ' ');
   for (const Finding& f : findings) {
-    std::string head = state_text(f.state, t) + padded(f.check, kCheck);
-    for (const std::string& line : wrapped(harmless(f.message), t.width - margin.size())) {
+    std::string head = padded(to_string(f.state), kState) + padded(f.check, kCheck);
+    for (const std::string& line : wrapped(harmless(f.message), kWidth - margin.size())) {
       text += head + line + "\n";
       head = margin;
     }
     // A command is never wrapped, because users copy it.
-    for (const std::string& command : f.fix)
-      text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) + "\n";
+    for (const std::string& command : f.fix) text += margin + "  " + harmless(command) + "\n";
     if (!f.fix.empty()) text += "\n";
   }
   if (!text.ends_with("\n\n")) text += "\n";

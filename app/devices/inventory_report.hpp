@@ -4,7 +4,6 @@
 
 #include "app/devices/doctor_checks.hpp"
 #include "app/devices/inventory.hpp"
-#include "app/runtime/terminal_text.hpp"
 
 /// Output of `vergence devices` and `vergence doctor`; docs/deployment.md has the keys of the JSON.
 namespace vergence::app {
@@ -22,15 +21,14 @@ namespace vergence::app {
 [[nodiscard]] Inventory ports_of_rig(Inventory inventory, const Configuration& drive,
                                      const Machine& machine);
 
-/// Text with cameras, serial ports, lines for a configuration, and a line per driver without a
-/// device.
-[[nodiscard]] std::string devices_text(const Inventory& inventory, const Terminal& terminal);
+/// Lines for a configuration, with what is known of each camera and port as a comment; then a
+/// comment for each driver without a device.
+[[nodiscard]] std::string devices_text(const Inventory& inventory);
 /// `rules` is the file of --write-udev; empty if not requested.
 [[nodiscard]] std::string devices_json(const Inventory& inventory, const std::string& rules);
 
 /// `given` is set if there is a configuration; otherwise the last line asks for one.
-[[nodiscard]] std::string doctor_text(const std::vector<Finding>& findings, bool given,
-                                      const Terminal& terminal);
+[[nodiscard]] std::string doctor_text(const std::vector<Finding>& findings, bool given);
 [[nodiscard]] std::string doctor_json(const std::vector<Finding>& findings);
 
 }  // namespace vergence::app

@@ -144,8 +144,6 @@ ComparisonOptions comparison_options(const Configuration& c) {
     o.max_gap = std::max(o.max_gap, Duration::seconds(1.5 / c.ins.rate));
     o.max_wait = std::max(o.max_wait, Duration::seconds(0.5 + 1.5 / c.ins.rate));
   }
-  o.jump_m = c.comparison.jump_m;
-  o.scale_tolerance = c.comparison.scale_tolerance;
   return o;
 }
 

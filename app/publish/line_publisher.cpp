@@ -121,11 +121,7 @@ void LinePublisher::send(const FrameReport& report) {
   ++lines_;
   const HostStamp sent = monotonic_now();
   behind_pose_.add((sent - report.estimated).to_seconds() * 1e3);
-  if (!tie) return;
-  age_.add((tie->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
-  // In lines, because a percentile iterates over thousands of bins.
-  constexpr std::uint64_t kBetween = 64;
-  if (lines_ % kBetween == 1) age_p99_ms_.store(age_.percentile(0.99), std::memory_order_relaxed);
+  if (tie) age_.add((tie->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
 }
 
 void LinePublisher::send_status(HostStamp now) {

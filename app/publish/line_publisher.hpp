@@ -50,11 +50,6 @@ class LinePublisher final : public SessionObserver {
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
   /// Sends the remaining lines first; call when no more poses follow.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
-  /// 99th percentile of the time from mid-exposure to the line, in ms; negative if unknown.
-  /// Thread-safe.
-  [[nodiscard]] double age_p99_ms() const noexcept {
-    return age_p99_ms_.load(std::memory_order_relaxed);
-  }
 
  private:
   void work() noexcept;
@@ -85,8 +80,6 @@ class LinePublisher final : public SessionObserver {
   // Arrival of the newest INS sample; 0 if none.
   std::atomic<std::int64_t> sample_ns_{0};
   std::atomic<FixStatus> fix_{FixStatus::none};
-
-  std::atomic<double> age_p99_ms_{-1};
 
   // Used only by the publisher's thread.
   std::optional<PublishedEnuAlignment> alignment_{};

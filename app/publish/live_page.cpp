@@ -106,15 +106,12 @@ struct Posed {
 /// Errors   The constructor throws InputError (HttpServer) and std::system_error.
 class LivePage final : public SessionObserver {
  public:
-  /// `requests` must outlive it. `line_age_ms` returns the 99th percentile of the pose lines' age;
-  /// negative if there are none.
-  LivePage(const LivePageOptions& options, SessionRequests* requests,
-           std::function<double()> line_age_ms)
+  /// `requests` must outlive it.
+  LivePage(const HostPort& address, const HttpPolicy& policy, SessionRequests* requests)
       : requests_(requests),
-        line_age_ms_(std::move(line_age_ms)),
         epoch_(std::to_string(monotonic_now().ns())),
         server_(
-            options.address, options.policy, page_html(),
+            address, policy, page_html(),
             [this](HttpRoute route, const HttpRequest& request) { return handle(route, request); }),
         thread_([this] {
           try {
@@ -231,7 +228,7 @@ class LivePage final : public SessionObserver {
     if (known)
       (void)std::from_chars(request.after.data(), request.after.data() + request.after.size(),
                             version);
-    nlohmann::json out = state_.since(version, monotonic_now(), line_age_ms_());
+    nlohmann::json out = state_.since(version, monotonic_now());
     out["epoch"] = epoch_;
     if (images_.ready()) {
       newest_images_ = images_json();
@@ -269,7 +266,6 @@ class LivePage final : public SessionObserver {
   }
 
   SessionRequests* requests_;
-  std::function<double()> line_age_ms_;
 
   // Passed from the estimator's thread to the page's.
   Ring<Item, 256> items_;
@@ -299,10 +295,9 @@ class LivePage final : public SessionObserver {
 
 }  // namespace
 
-std::unique_ptr<SessionObserver> make_live_page(const LivePageOptions& options,
-                                                SessionRequests* requests,
-                                                std::function<double()> line_age_ms) {
-  return std::make_unique<LivePage>(options, requests, std::move(line_age_ms));
+std::unique_ptr<SessionObserver> make_live_page(const HostPort& address, const HttpPolicy& policy,
+                                                SessionRequests* requests) {
+  return std::make_unique<LivePage>(address, policy, requests);
 }
 
 }  // namespace vergence::app

@@ -1,5 +1,4 @@
 #pragma once
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -17,16 +16,10 @@ inline constexpr int kThumbnailWidth = 480;
 /// Encoding of RFC 4648.
 [[nodiscard]] std::string base64(std::string_view bytes);
 
-struct LivePageOptions {
-  HostPort address{};
-  HttpPolicy policy{};
-};
-
-/// The live page as an observer of a session. `line_age_ms` returns the 99th percentile of the age
-/// of the pose stream's lines; negative if unknown. Throws InputError as HttpServer does.
-[[nodiscard]] std::unique_ptr<SessionObserver> make_live_page(const LivePageOptions& options,
-                                                              SessionRequests* requests,
-                                                              std::function<double()> line_age_ms);
+/// The live page as an observer of a session. Throws InputError as HttpServer does.
+[[nodiscard]] std::unique_ptr<SessionObserver> make_live_page(const HostPort& address,
+                                                              const HttpPolicy& policy,
+                                                              SessionRequests* requests);
 
 /// The live page: HTML, style sheet and script in one, from app/publish/page/. Lives as long as
 /// the program.

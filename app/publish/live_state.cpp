@@ -135,7 +135,7 @@ json LiveState::frame_json(HostStamp now) const {
       {"state", to_string(p.state)},
       {"status", to_string(p.status)},
       {"reason", reason},
-      {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(reason)},
+      {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(p.reason)},
       {"inliers", p.inliers},
       {"stereo_inliers", p.stereo_inliers},
       {"reprojection_px", rounded(p.reprojection_px, 3)},
@@ -206,14 +206,11 @@ json LiveState::place_json(const LiveTrail::Place& p) {
   return out;
 }
 
-json LiveState::since(std::uint64_t version, HostStamp now, double line_age_ms) const {
+json LiveState::since(std::uint64_t version, HostStamp now) const {
   json out{{"version", version_},           {"session", start_.name},
            {"frames", start_.frames},       {"can_recalibrate", start_.can_recalibrate},
            {"recording", start_.recording}, {"ended", ended_}};
-  if (newest_) {
-    out["now"] = frame_json(now);
-    out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
-  }
+  if (newest_) out["now"] = frame_json(now);
   const std::size_t first = trail_.first_after(version);
   out["trail_from"] = first;
   json& trail = out["trail"] = json::array();

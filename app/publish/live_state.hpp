@@ -67,9 +67,7 @@ class LiveState {
   void end() noexcept { ended_ = true; }
 
   /// Changes after `version`; 0 returns everything. `now` determines whether frames still arrive.
-  /// `line_age_ms` is the 99th percentile of the pose lines' age; negative if there are none.
-  [[nodiscard]] nlohmann::json since(std::uint64_t version, HostStamp now,
-                                     double line_age_ms) const;
+  [[nodiscard]] nlohmann::json since(std::uint64_t version, HostStamp now) const;
 
  private:
   [[nodiscard]] static nlohmann::json place_json(const LiveTrail::Place& place);

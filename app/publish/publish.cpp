@@ -73,23 +73,19 @@ Publishing::Publishing(bool page, Configuration* configuration, SessionOptions* 
 
 void Publishing::open_page(const Configuration& configuration) {
   const PublishSettings& settings = configuration.publish;
-  LivePageOptions options;
-  options.address = parse_host_port(settings.http, "publish.http");
-  options.policy.host = options.address.host;
-  options.policy.token_to_read = !options.address.loopback();
-  options.policy.token = settings.token_file.empty()
-                             ? new_token()
-                             : read_token(configuration.folder / settings.token_file);
+  const HostPort address = parse_host_port(settings.http, "publish.http");
+  const HttpPolicy policy{settings.token_file.empty()
+                              ? new_token()
+                              : read_token(configuration.folder / settings.token_file),
+                          !address.loopback(), address.host};
   try {
-    page_ = make_live_page(options, &requests_,
-                           [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
+    page_ = make_live_page(address, policy, &requests_);
     // The fragment after # is not part of a request, so the token appears in no log.
-    fmt::print(
-        stderr, "live page: {}\n",
-        settings.token_file.empty()
-            ? fmt::format("http://{}/#{}", options.address.link().text(), options.policy.token)
-            : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
-                          options.address.link().text(), settings.token_file));
+    fmt::print(stderr, "live page: {}\n",
+               settings.token_file.empty()
+                   ? fmt::format("http://{}/#{}", address.link().text(), policy.token)
+                   : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
+                                 address.link().text(), settings.token_file));
   } catch (const InputError& e) {
     fmt::print(stderr, "vergence: {}; the run continues without the live page\n", e.what());
   }

@@ -23,7 +23,6 @@ class Publishing {
   void open_page(const Configuration& configuration);
 
   SessionRequests requests_;
-  // Must outlive the page, which shows its latency.
   std::unique_ptr<LinePublisher> lines_;
   std::unique_ptr<SessionObserver> page_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -55,7 +56,6 @@ const Event* first_verification(const Session& s) {
 /// Frames that only waited for that. What is not confirmed later on, after a knock, is held against
 /// the drive.
 void count_waiting(const Session& s, Analysis* a) {
-  a->waited_by_reason.assign(s.reasons.size(), 0);
   const Event* confirmed = first_verification(s);
   if (confirmed != nullptr && !s.frames.empty())
     a->verified_s = std::clamp(
@@ -64,41 +64,22 @@ void count_waiting(const Session& s, Analysis* a) {
   for (const Frame& f : s.frames) {
     if (f.status != PoseStatus::degraded || (confirmed != nullptr && f.stamp > confirmed->stamp))
       continue;
-    constexpr std::array kWaits{Reason::uncalibrated, Reason::unverified_calibration};
-    const std::string& reason = s.reasons[f.reason];
-    if (std::ranges::none_of(kWaits, [&reason](Reason r) { return reason == to_string(r); }))
-      continue;
+    if (f.reason != Reason::uncalibrated && f.reason != Reason::unverified_calibration) continue;
     ++a->waited;
-    ++a->waited_by_reason[f.reason];
+    ++a->waited_by_reason[static_cast<std::size_t>(f.reason)];
   }
-}
-
-/// By the gaps of their numbers, of which no damaged one counts for more than there was time for.
-std::size_t missing_frames(const Session& s, const Analysis& a) {
-  if (!(a.interval_s > 0)) return 0;
-  double missing = 0;
-  for (std::size_t i = 1; i < s.frames.size(); ++i) {
-    const std::int64_t before = s.frames[i - 1].number, number = s.frames[i].number;
-    if (before < 0 || number <= before) continue;
-    const double steps = std::round((a.time_s[i] - a.time_s[i - 1]) / a.interval_s);
-    missing += std::max(0.0, std::min(static_cast<double>(number - before), steps) - 1);
-  }
-  return static_cast<std::size_t>(missing);
 }
 
 void count_frames(const Session& s, Analysis* a) {
-  a->by_reason.assign(s.reasons.size(), 0);
   a->read = s.frames.size();
   for (const Frame& f : s.frames) {
     ++(f.status == PoseStatus::ok         ? a->ok
        : f.status == PoseStatus::degraded ? a->degraded
                                           : a->lost);
-    if (f.status != PoseStatus::ok) ++a->by_reason[f.reason];
+    if (f.status != PoseStatus::ok) ++a->by_reason[static_cast<std::size_t>(f.reason)];
   }
-  a->skipped = s.summary.is_object()
-                   ? static_cast<std::size_t>(std::clamp(
-                         number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12))
-                   : missing_frames(s, *a);
+  a->skipped = static_cast<std::size_t>(
+      std::clamp(number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12));
   if (a->read > 0)
     a->ok_share = static_cast<double>(a->ok) / static_cast<double>(a->read + a->skipped);
 }
@@ -122,33 +103,19 @@ Mat3 mean_rotation(std::span<const StampedPose> estimate, std::span<const Stampe
   return Eigen::Quaterniond(sum).normalized().toRotationMatrix();
 }
 
-struct Laid {
-  Transform T_reference_world{};
-  // Length in m.
+/// Aligns the first kAlignment metres of the estimate with the reference: by their attitudes and
+/// mean position, which a straight path determines, too.
+Transform align_start(const MatchedTrajectories& m) {
   double stretch = 0;
-  bool by_rotations = false;
-};
-
-/// Lays the first kAlignment metres of the estimate on the reference.
-Laid lay_on(const MatchedTrajectories& m) {
-  Laid laid;
   std::size_t n = 1;
-  for (; n < m.reference.size() && laid.stretch < kAlignment; ++n)
-    laid.stretch += (m.reference[n].T_world_body.t - m.reference[n - 1].T_world_body.t).norm();
+  for (; n < m.reference.size() && stretch < kAlignment; ++n)
+    stretch += (m.reference[n].T_world_body.t - m.reference[n - 1].T_world_body.t).norm();
   const auto estimate = std::span(m.estimate).first(n), reference = std::span(m.reference).first(n);
-  const Alignment fit = align(estimate, reference, AlignmentScale::one);
-  laid.T_reference_world = {fit.R_reference_estimate, fit.t_reference_estimate};
-  // Positions on a straight line, or all in one place, hold no rotation: the attitudes do.
-  // Fraction of the segment's length.
-  constexpr double kHeld = 0.02;
-  laid.by_rotations = n < 3 || fit.roll_unobservable || fit.lateral_extent < kHeld * laid.stretch;
-  if (!laid.by_rotations) return laid;
   const Mat3 R = mean_rotation(estimate, reference);
   Vec3 shift = Vec3::Zero();
   for (std::size_t i = 0; i < n; ++i)
     shift += reference[i].T_world_body.t - R * estimate[i].T_world_body.t;
-  laid.T_reference_world = {R, shift / static_cast<double>(n)};
-  return laid;
+  return {R, shift / static_cast<double>(n)};
 }
 
 /// Axes of the picture for a world whose up is +z, or for a camera's, whose up is −y: x to the
@@ -163,13 +130,14 @@ double view_angle(const Mat3& R, bool up_is_z) {
   return std::atan2(v.x, v.y);
 }
 
-void compare_with_reference(const Session& s, const MatchedTrajectories& m, const Laid& laid,
-                            bool up_is_z, Analysis* a) {
+void compare_with_reference(const Session& s, const MatchedTrajectories& m, Analysis* a) {
+  const Transform T_reference_world = align_start(m);
+  const bool up_is_z = world_up(m.reference, BodyAxes::camera).z() > 0.5;
   std::size_t k = 0;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
     if (!f.posed) continue;
-    const Transform T = laid.T_reference_world * f.T_world_left;
+    const Transform T = T_reference_world * f.T_world_left;
     const Point estimate = on_map(T.t, up_is_z);
     a->estimate_x[i] = estimate.x, a->estimate_y[i] = estimate.y;
     while (k < m.estimate.size() && m.estimate[k].stamp < f.stamp) ++k;
@@ -195,47 +163,23 @@ void add_reference(const Session& s, Analysis* a) {
         "No errors: the stamps of reference.tum and of the estimate do not overlap.";
     return;
   }
-  const Laid laid = lay_on(m);
-  const bool up_is_z = world_up(m.reference, BodyAxes::camera).z() > 0.5;
   a->source = ErrorSource::reference;
   a->source_message = fmt::format(
       "Errors against the reference trajectory. The estimate is aligned once, rigidly and without "
-      "scale, over the first {:.0f} m ({}); what grows after that is drift.",
-      laid.stretch,
-      laid.by_rotations
-          ? "by attitudes and mean position, because the path is too straight for positions alone"
-          : "by positions");
-  compare_with_reference(s, m, laid, up_is_z, a);
+      "scale, over the first {:.0f} m; what grows after that is drift.",
+      kAlignment);
+  compare_with_reference(s, m, a);
 }
 
-/// Where the way broke off the drive is placed on the earth anew: its positions step there.
+/// After an interruption the trajectory is aligned with ENU again: its positions step there.
 void find_alignments(const Session& s, Analysis* a) {
-  std::vector<Stamp> stamps;
-  for (const Event& e : s.events)
-    if (e.kind == "enu_alignment") stamps.push_back(e.stamp);
-  std::ranges::sort(stamps);
-  a->realigned.assign(s.frames.size(), 0);
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < s.frames.size(); ++i) {
-    const std::size_t before = next;
-    while (next < stamps.size() && stamps[next] <= s.frames[i].stamp) ++next;
-    if (a->placed_s.empty()) {
-      if (s.frames[i].placed) a->placed_s.push_back(a->time_s[i]);
-    } else if (next > before) {
-      a->realigned[i] = 1;
-      a->placed_s.push_back(a->time_s[i]);
-    }
+  bool placed = false;
+  for (const Event& e : s.events) {
+    if (e.kind != "enu_alignment") continue;
+    const auto next = std::ranges::lower_bound(s.frames, e.stamp, {}, &Frame::stamp);
+    if (std::exchange(placed, true) && next != s.frames.end())
+      a->map_breaks[static_cast<std::size_t>(next - s.frames.begin())] = 1;
   }
-}
-
-std::string alignment_text(const Analysis& a) {
-  constexpr std::size_t kReported = 5;
-  if (a.placed_s.size() < 2) return ", which is fitted at the start and then fixed";
-  std::string words = fmt::format(", which was fitted {} times, at ", a.placed_s.size());
-  for (std::size_t i = 0; i < std::min(kReported, a.placed_s.size()); ++i)
-    words += (i > 0 ? ", " : "") + duration_text(a.placed_s[i], 0.1);
-  return words + (a.placed_s.size() > kReported ? ", …" : "") +
-         ", after interruptions: errors and positions step there";
 }
 
 void add_ins(const Session& s, Analysis* a) {
@@ -257,8 +201,9 @@ void add_ins(const Session& s, Analysis* a) {
     return;
   }
   a->source = ErrorSource::ins;
-  a->source_message = "Errors against the INS after the ENU alignment" + alignment_text(*a) +
-                      "; they include the INS's own errors.";
+  a->source_message =
+      "Errors against the INS after the ENU alignment; they include the INS's own errors, and step "
+      "at every further event enu_alignment.";
 }
 
 void add_world(const Session& s, Analysis* a) {
@@ -384,6 +329,7 @@ double seconds_between(Stamp from, Stamp to) noexcept {
 Analysis analyse(const Session& session) {
   Analysis a;
   measure_time(session, &a);
+  a.map_breaks = a.breaks;
   measure_distance(session, &a);
   count_frames(session, &a);
   count_waiting(session, &a);

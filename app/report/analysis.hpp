@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -41,10 +43,8 @@ struct Analysis {
   };
   Spread horizontal, vertical, heading;
 
-  /// Times of the ENU alignments.
-  std::vector<double> placed_s;
-  /// Not 0 for the first frame with another alignment.
-  std::vector<std::uint8_t> realigned;
+  /// As `breaks`, and not 0 where the trajectory was aligned with ENU again: positions step there.
+  std::vector<std::uint8_t> map_breaks;
   /// True if the map's axes are east and north.
   bool map_is_enu = false;
   /// In m.
@@ -52,14 +52,15 @@ struct Analysis {
 
   /// Numbers of frames.
   std::size_t read = 0, ok = 0, degraded = 0, lost = 0;
-  /// Skipped frames; without a summary, those missing by their numbers.
+  /// Skipped frames; 0 without a summary.
   std::size_t skipped = 0;
-  /// Frames that were not ok, by Session::reasons.
-  std::vector<std::size_t> by_reason;
-  // Degraded frames, also counted in by_reason, whose only problem was a calibration not yet found
-  // or verified. They do not affect the assessment.
+  /// Frames that were not ok, indexed by Reason.
+  using ByReason = std::array<std::size_t, static_cast<std::size_t>(Reason::pairing_ambiguous) + 1>;
+  ByReason by_reason{};
+  /// Degraded frames, also counted in by_reason, whose only problem was a calibration not yet found
+  /// or verified. They do not affect the assessment.
   std::size_t waited = 0;
-  std::vector<std::size_t> waited_by_reason;
+  ByReason waited_by_reason{};
   /// Time of the first verification of the calibration in use, since the first frame.
   std::optional<double> verified_s;
   /// Share of the frames read and skipped; none if the status is unknown.

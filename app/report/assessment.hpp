@@ -1,7 +1,6 @@
 #pragma once
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/report/analysis.hpp"
@@ -9,8 +8,8 @@
 
 namespace vergence::app::report {
 
-/// Advice for a pose's reason or the kind of a skipped frame's event; empty for an unknown value.
-[[nodiscard]] std::string_view advice_for(std::string_view word) noexcept;
+/// What to do about frames with that reason; empty for Reason::none.
+[[nodiscard]] const char* advice_for(Reason reason) noexcept;
 
 enum class Grade : std::uint8_t { good, care, bad };
 /// Text such as "Good", "Usable with care" or "Do not use".

@@ -120,93 +120,20 @@ std::string metrics_table(const Session& session, const Analysis& analysis) {
     f.row("frame interval", fmt::format("{:.1f} ms", analysis.interval_s * 1e3));
   for (std::size_t i = 1; i < analysis.by_reason.size(); ++i)
     if (analysis.by_reason[i] > 0)
-      f.row("frames with " + session.reasons[i], grouped(analysis.by_reason[i]));
+      f.row(fmt::format("frames with {}", to_string(static_cast<Reason>(i))),
+            grouped(analysis.by_reason[i]));
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
+  f.group("Depth error (1 σ) predicted by the calibration");
+  for (const auto& [name, path] :
+       {std::pair{"at the start", "calibration.initial."}, {"at the end", "calibration."}})
+    for (const char* depth : {"5", "20"})
+      f.row(fmt::format("{} m, {}", depth, name),
+            number_at(session.summary, std::string(path) + "depth_error_percent." + depth),
+            "{:.2f} %");
   f.group("Processing time per frame, ms");
   for (const char* key : {"mean", "p50", "p99", "max"})
     f.row(key, number_at(session.summary, std::string("timing_ms.") + key), "{:.2f}");
   return std::move(f).finish();
-}
-
-/// One row of words about a calibration; empty when nothing is known of it.
-std::string health_row(const nlohmann::json& summary, const char* name, const std::string& path) {
-  const std::string word = text_at(summary, path + "rating");
-  if (word.empty()) return "";
-  std::string row =
-      fmt::format("<tr><th scope=\"row\">{}</th><td class=\"k\">{}</td>", name, escape(word, 60));
-  for (const char* z : {"1", "5", "10", "20", "50"}) {
-    const auto percent = number_at(summary, path + "depth_error_percent." + z);
-    row += percent
-               ? fmt::format("<td class=\"n\">{:.{}f} %</td>", *percent, *percent < 0.995 ? 2 : 1)
-               : "<td></td>";
-  }
-  return row + "</tr>\n";
-}
-
-std::string held_out_text(const CalibrationRow& c) {
-  if (!std::isfinite(c.held_out_after_px) || !(c.held_out_after_px > 0)) return "";
-  if (!(c.held_out_before_px > 0)) return fmt::format("{:.2f} px", c.held_out_after_px);
-  return fmt::format("{:.2f} → {:.2f} px", c.held_out_before_px, c.held_out_after_px);
-}
-
-/// `± 0.26 % at 20 m, off by 1.4 %` as parts that no line breaks; empty where nothing was
-/// measured.
-std::string depth_text(const CalibrationRow& c) {
-  if (!(c.reference_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
-  const bool off = c.depth_error_percent > 0;
-  std::string text = fmt::format("<span class=\"w\">± {:.2f} % at {:.0f} m{}</span>",
-                                 c.depth_sigma_percent, c.reference_depth_m, off ? "," : "");
-  if (off) text += fmt::format(" <span class=\"w\">off by {:.2f} %</span>", c.depth_error_percent);
-  return text;
-}
-
-/// The rating of the calibration and the depth errors it predicts, at the start and at the end.
-std::string health_table(const Session& session) {
-  const std::string rows = health_row(session.summary, "at the start", "calibration.initial.") +
-                           health_row(session.summary, "at the end", "calibration.");
-  if (rows.empty()) return "";
-  return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>rating</th><th "
-         "class=\"n\">1 m</th><th class=\"n\">5 m</th><th class=\"n\">10 m</th><th class=\"n\">20 "
-         "m</th><th class=\"n\">50 m</th></tr>\n" +
-         rows +
-         "</table></div>\n<p class=\"soft\">Predicted depth error (1 σ) at each distance, from the "
-         "uncertainty of the calibration.</p>\n";
-}
-
-/// The newest sixty calibrations: outcome, cause, latency, fit and depth.
-std::string calibrations_table(const Session& session) {
-  constexpr std::size_t kMax = 60;
-  std::string out =
-      "<table class=\"stack\"><tr><th>time, "
-      "s</th><th>outcome</th><th>cause</th><th>latency</th><th>held-out RMS</th><th>depth "
-      "error</th><th>reason</th></tr>\n";
-  // There is one row for all cameras if they are decided together.
-  std::vector<const CalibrationRow*> rows;
-  for (const CalibrationRow& c : session.calibrations)
-    if (c.camera == 1) rows.push_back(&c);
-  const std::size_t n = rows.size();
-  if (n > kMax)
-    out += fmt::format("<tr><td colspan=\"7\">{} earlier rows are in calibrations.csv</td></tr>",
-                       grouped(n - kMax));
-  for (std::size_t i = n > kMax ? n - kMax : 0; i < n; ++i) {
-    const CalibrationRow& c = *rows[i];
-    std::string cause = c.cause;
-    std::ranges::replace(cause, '_', ' ');
-    const std::string after = c.decided ? fmt::format("{:.0f} frames", c.latency_frames) : "";
-    const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
-    const std::string why =
-        from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
-    const char* outcome = !c.decided   ? "initial"
-                          : c.accepted ? "accepted"
-                          : c.kept     ? "unchanged"
-                                       : "rejected";
-    out += fmt::format(
-        "<tr><td class=\"t\">{}</td> <td class=\"k\">{}</td> <td class=\"w\">{}</td> <td "
-        "class=\"w\">{}</td> <td class=\"w\">{}</td> <td>{}</td> <td>{}</td></tr>\n",
-        event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c),
-        depth_text(c), escape(why));
-  }
-  return out + "</table>\n";
 }
 
 /// Successive events of one kind and message are one row; of very many the first and the last.
@@ -242,11 +169,8 @@ std::string section(std::string_view css, std::string_view head, const std::stri
 }
 
 std::string list(const std::vector<std::string>& messages) {
-  constexpr std::size_t kMax = 30;
   std::string out = "<ul>";
-  for (std::size_t i = 0; i < std::min(messages.size(), kMax); ++i)
-    out += "<li>" + escape(messages[i], 500) + "</li>\n";
-  if (messages.size() > kMax) out += fmt::format("<li>… and {} more</li>", messages.size() - kMax);
+  for (const std::string& message : messages) out += "<li>" + escape(message, 500) + "</li>\n";
   return out + "</ul>";
 }
 
@@ -331,12 +255,10 @@ std::string map_section(const Session& s, const Analysis& a) {
     legend += fmt::format("<span><i class=\"key k-theirs\"></i>{}</span>",
                           a.map_is_enu ? "INS" : "reference");
   if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>estimate, degraded</span>";
-  if (a.lost > 0) legend += "<span>× lost from here</span>";
   legend += a.map_is_enu
                 ? "<br/>View from above, north up; the bar is the scale. The estimate starts at "
-                  "the ENU alignment"
+                  "the ENU alignment."
                 : "<br/>View from above; the bar is the scale. Gaps between the lines are errors.";
-  if (a.map_is_enu) legend += a.placed_s.size() > 1 ? " and again at each later one." : ".";
   return section("tall", "Map", map + legend + "</p>");
 }
 
@@ -408,18 +330,20 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
                       calibration_plot(s, a, camera, component),
                       "Value in use with ± 2 σ; a step is a change of the calibration.");
   }
-  std::string body = health_table(s);
+  const std::string rating = text_at(s.summary, "calibration.rating");
+  std::string body = "<p>";
+  if (!rating.empty()) body += "Rating at the end: <b>" + escape(rating, 60) + "</b>. ";
   if (s.calibrations.empty())
-    body += "<p>No calibration in this session.</p>";
+    body += "No calibration in this session.";
   else if (plots.empty())
-    body += "<p>One calibration was used throughout.</p>" + calibrations_table(s);
+    body += "One calibration was used throughout.";
   else
     body +=
-        "<p class=\"soft\">Each plot shows one component of T_camera_left over time. The line is "
-        "the value in use, the band ± 2 σ (sigma_total). Hollow red marks are rejected "
-        "calibrations; hollow grey marks are online estimates that left the calibration "
-        "unchanged.</p>" +
-        calibrations_table(s);
+        "Each plot shows one component of T_camera_left over time. The line is the value in use, "
+        "the band ± 2 σ (sigma_total). Hollow red marks are rejected calibrations; hollow grey "
+        "marks "
+        "are online estimates that left the calibration unchanged; calibrations.csv has them all.";
+  body += "</p>";
   *out += section("wide long", "Calibration", body) + plots;
 }
 
@@ -449,8 +373,8 @@ std::string page_html(const Session& session, const Analysis& analysis,
          "<div class=\"grid\">\n";
   if (!assessment.advice.empty())
     out += section("wide", "What to do next", list(assessment.advice));
-  if (const std::vector<std::string> missing = session.not_had(); !missing.empty())
-    out += section("wide", "What is missing in this session", list(missing));
+  if (!session.missing.empty())
+    out += section("wide", "What is missing in this session", list(session.missing));
   out += map_section(session, analysis);
   out += running_plots(session, analysis) + errors_head(analysis);
   if (analysis.source != ErrorSource::none) out += error_plots(session, analysis);

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <functional>
+#include <string_view>
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include "app/report/svg.hpp"
 #include "core/math/angle.hpp"
@@ -80,95 +82,66 @@ std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
   return placed;
 }
 
-/// Runs of frames without a pose as stripes behind a curve over time; runs in one pixel column
-/// become one.
-void draw_holes(const PlotBox& box, std::span<const double> time, std::span<const Frame> frames,
-                Svg* svg) {
+constexpr double kLaneHeight = 21, kBandLeft = 148;
+
+/// Draws the runs of frames for which `shown` is true as rectangles from each run's first frame to
+/// the frame after it; runs in one pixel column become one.
+template <class Shown>
+void draw_runs(const char* css, const PlotBox& box, const Analysis& a, double top, double height,
+               const Shown& shown, Svg* svg) {
   double drawn_to = -1;
-  for (std::size_t i = 0; i < frames.size();) {
-    if (frames[i].posed) {
+  const std::size_t n = a.time_s.size();
+  for (std::size_t i = 0; i < n;) {
+    if (!shown(i)) {
       ++i;
       continue;
     }
-    const std::size_t begin = i;
-    while (i < frames.size() && !frames[i].posed) ++i;
-    const double from = std::max(box.x(time[begin]), drawn_to),
-                 to = std::max(box.x(time[std::min(i, frames.size() - 1)]), from + 1);
+    const std::size_t begin = i++;
+    while (i < n && shown(i) && a.breaks[i] == 0) ++i;
+    const double end = i < n && a.breaks[i] == 0 ? a.time_s[i] : a.time_s[i - 1] + a.interval_s;
+    const double from = std::max(box.x(a.time_s[begin]), drawn_to),
+                 to = std::min(std::max(box.x(end), from + 1), box.right);
     if (to <= drawn_to + 0.5) continue;
-    svg->rect("hole", from, box.top, to - from, box.bottom - box.top);
+    svg->rect(css, from, top, to - from, height);
     drawn_to = to;
   }
 }
 
+void draw_track(std::string name, const PlotBox& box, double top, Svg* svg) {
+  std::ranges::replace(name, '_', ' ');
+  svg->text("strong", Anchor::end, box.left - 8, top + 13.5, name);
+  svg->rect("track", box.left, top + 3, box.right - box.left, kLaneHeight - 7);
+}
+
+/// A row of the bands: the frames of one status or state.
 struct Lane {
-  std::string name;
+  std::string_view name;
   const char* css;
-  // A column is 1 if the status occurred in it.
-  std::vector<std::uint8_t> columns;
+  std::function<bool(std::size_t)> shown;
 };
 
-constexpr double kLaneHeight = 21, kBandLeft = 148;
-
-/// Marks the columns from the frame to the next one (or a frame interval where frames are missing).
-void mark(Lane* lane, const PlotBox& box, const Analysis& a, std::size_t i) {
-  const double from = a.time_s[i];
-  const bool missing_after = i + 1 >= a.time_s.size() || a.breaks[i + 1] != 0;
-  const double to = missing_after ? from + a.interval_s : a.time_s[i + 1];
-  const auto last = static_cast<double>(lane->columns.size() - 1);
-  const double scale = 1 / (box.right - box.left) * (last + 1);
-  const double begin = std::clamp(std::floor((box.x(from) - box.left) * scale), 0.0, last);
-  const double end = std::clamp(std::ceil((box.x(to) - box.left) * scale), begin + 1, last + 1);
-  std::fill(lane->columns.begin() + static_cast<std::ptrdiff_t>(begin),
-            lane->columns.begin() + static_cast<std::ptrdiff_t>(end), std::uint8_t{1});
-}
-
-void draw_lane(const Lane& lane, const PlotBox& box, double top, Svg* svg) {
-  const double unit = (box.right - box.left) / static_cast<double>(lane.columns.size());
-  svg->text("strong", Anchor::end, box.left - 8, top + 13.5, lane.name);
-  svg->rect("track", box.left, top + 3, box.right - box.left, kLaneHeight - 7);
-  for (std::size_t i = 0; i < lane.columns.size();) {
-    const std::size_t begin = i;
-    while (i < lane.columns.size() && lane.columns[i] == lane.columns[begin]) ++i;
-    if (lane.columns[begin] == 0) continue;
-    svg->rect(lane.css, box.left + unit * static_cast<double>(begin), top + 3,
-              std::max(1.0, unit * static_cast<double>(i - begin)), kLaneHeight - 7);
-  }
-}
-
-constexpr std::array<const char*, 3> kStatusCss{"f-good", "f-care", "f-bad"};
-constexpr std::array<const char*, 6> kStateCss{"f-care", "f-third",  "f-theirs",
-                                               "f-ours", "f-fourth", "f-bad"};
-
-std::vector<Lane> make_lanes(const Session& s, const Analysis& a, const PlotBox& box) {
-  const auto columns = static_cast<std::size_t>(box.right - box.left) * 2;
-  const auto empty = [columns](std::string_view name, const char* css) {
-    return Lane{std::string(name), css, std::vector<std::uint8_t>(columns, 0)};
-  };
+/// All statuses, and the states that occurred; the state and the status `lost` are the same frames.
+std::vector<Lane> make_lanes(std::span<const Frame> frames) {
+  constexpr std::array<const char*, 3> kStatusCss{"f-good", "f-care", "f-bad"};
+  constexpr std::array<const char*, 5> kStateCss{"f-care", "f-third", "f-theirs", "f-ours",
+                                                 "f-fourth"};
   std::vector<Lane> lanes;
-  for (std::size_t i = 0; i < 3; ++i)
-    lanes.push_back(empty(to_string(static_cast<PoseStatus>(i)), kStatusCss[i]));
-  std::array<std::optional<Lane>, 6> states;
-  for (std::size_t i = 0; i < s.frames.size(); ++i) {
-    const Frame& f = s.frames[i];
-    mark(&lanes[static_cast<std::size_t>(f.status)], box, a, i);
-    // The state and the status `lost` describe the same frames.
-    if (f.state == State::lost) continue;
-    auto& lane = states[static_cast<std::size_t>(f.state)];
-    if (!lane) {
-      std::string name(to_string(f.state));
-      std::ranges::replace(name, '_', ' ');
-      lane = empty(name, kStateCss[static_cast<std::size_t>(f.state)]);
-    }
-    mark(&*lane, box, a, i);
+  for (std::size_t k = 0; k < kStatusCss.size(); ++k) {
+    const auto status = static_cast<PoseStatus>(k);
+    lanes.push_back({to_string(status), kStatusCss[k],
+                     [=](std::size_t i) { return frames[i].status == status; }});
   }
-  for (auto& lane : states)
-    if (lane) lanes.push_back(std::move(*lane));
+  for (std::size_t k = 0; k < kStateCss.size(); ++k) {
+    const auto state = static_cast<State>(k);
+    if (std::ranges::find(frames, state, &Frame::state) != frames.end())
+      lanes.push_back({to_string(state), kStateCss[k],
+                       [=](std::size_t i) { return frames[i].state == state; }});
+  }
   return lanes;
 }
 
 void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
-  svg->text("strong", Anchor::end, box.left - 8, top + 13.5, "events");
-  svg->rect("track", box.left, top + 3, box.right - box.left, kLaneHeight - 7);
+  draw_track("events", box, top, svg);
   double last = -1;
   for (const Event& e : s.events) {
     if (s.frames.empty() || e.stamp < s.frames.front().stamp || e.stamp > s.frames.back().stamp)
@@ -180,59 +153,46 @@ void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
   }
 }
 
-constexpr double kMillimetres = 1e3;
-
-/// A value of a calibration parameter and how long it was in use.
+/// Value of a calibration parameter, in use from `from` to `to`.
 struct CalibrationValue {
+  enum class Kind : std::uint8_t { used, measured, rejected } kind = Kind::used;
   double from = 0, to = 0, value = 0;
   // 0 if unknown.
   double two_sigma = 0;
 };
 
-struct CalibrationCurve {
-  std::vector<CalibrationValue> used, rejected, measured;
-  [[nodiscard]] bool empty() const { return used.empty() && rejected.empty() && measured.empty(); }
-};
-
-CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int camera, int component) {
+std::vector<CalibrationValue> calibration_values(const Session& s, const Analysis& a, int camera,
+                                                 std::size_t component) {
+  using enum CalibrationValue::Kind;
+  constexpr double kMillimetres = 1e3;
   const double unit = component < 3 ? kDegreesPerRadian : kMillimetres;
-  const auto k = static_cast<std::size_t>(component);
-  CalibrationCurve curve;
+  std::vector<CalibrationValue> values;
+  CalibrationValue* in_use = nullptr;
+  values.reserve(s.calibrations.size());
   for (const CalibrationRow& c : s.calibrations) {
-    if (c.camera != camera) continue;
-    const double since = s.frames.empty() ? 0
-                                          : (static_cast<double>(c.stamp.ns()) -
-                                             static_cast<double>(s.frames.front().stamp.ns())) *
-                                                1e-9;
-    const double at = std::clamp(since, 0.0, a.duration_s);
-    const CalibrationValue value{at, a.duration_s, c.value[k] * unit,
-                                 c.has_sigma ? 2 * c.sigma[k] * unit : 0};
-    if (c.accepted) {
-      if (!curve.used.empty()) curve.used.back().to = at;
-      curve.used.push_back(value);
-    } else if (!c.kept) {
-      curve.rejected.push_back({at, at, value.value, 0});
-    } else if (std::isfinite(c.depth_sigma_percent)) {
-      // A sigma that is not finite marks a failed solve, which is not drawn.
-      curve.measured.push_back(value);
-    }
+    // A measurement without a finite sigma is a failed solve.
+    if (c.camera != camera || (c.kept && !std::isfinite(c.depth_sigma_percent))) continue;
+    const double since = s.frames.empty() || c.stamp < s.frames.front().stamp
+                             ? 0
+                             : seconds_between(s.frames.front().stamp, c.stamp);
+    const double at = std::min(since, a.duration_s);
+    values.push_back({c.accepted ? used
+                      : c.kept   ? measured
+                                 : rejected,
+                      at, a.duration_s, c.value[component] * unit,
+                      c.has_sigma ? 2 * c.sigma[component] * unit : 0});
+    if (!c.accepted) continue;
+    if (in_use != nullptr) in_use->to = at;
+    in_use = &values.back();
   }
-  return curve;
+  return values;
 }
 
-void fit_calibration(const CalibrationCurve& curve, PlotBox* box) {
-  double low = 1e300, high = -1e300;
-  for (const auto* values : {&curve.used, &curve.rejected, &curve.measured})
-    for (const CalibrationValue& v : *values) {
-      low = std::min(low, v.value - v.two_sigma);
-      high = std::max(high, v.value + v.two_sigma);
-    }
-  box->fit_y(low, high, false);
-}
-
-void draw_calibration(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
+void draw_calibration(const std::vector<CalibrationValue>& values, const PlotBox& box, Svg* svg) {
+  using enum CalibrationValue::Kind;
   Line steps;
-  for (const CalibrationValue& v : curve.used) {
+  for (const CalibrationValue& v : values) {
+    if (v.kind != used) continue;
     const double high = box.y(v.value + v.two_sigma), low = box.y(v.value - v.two_sigma);
     if (v.two_sigma > 0)
       svg->rect("band", box.x(v.from), high, box.x(v.to) - box.x(v.from), low - high);
@@ -240,16 +200,11 @@ void draw_calibration(const CalibrationCurve& curve, const PlotBox& box, Svg* sv
     steps.push_back({box.x(v.to), box.y(v.value)});
   }
   if (!steps.empty()) svg->lines("curve s-ours", {steps});
-  for (const CalibrationValue& v : curve.used)
-    svg->circle("f-ours", box.x(v.from), box.y(v.value), 2.6);
-  for (const CalibrationValue& v : curve.measured) {
-    const double x = box.x(v.from);
-    if (v.two_sigma > 0)
-      svg->line("whisker", x, box.y(v.value + v.two_sigma), x, box.y(v.value - v.two_sigma));
-    svg->circle("seen", x, box.y(v.value), 2.8);
-  }
-  for (const CalibrationValue& v : curve.rejected)
-    svg->circle("hollow", box.x(v.from), box.y(v.value), 3.2);
+  for (const CalibrationValue& v : values)
+    svg->circle(v.kind == used       ? "f-ours"
+                : v.kind == measured ? "seen"
+                                     : "hollow",
+                box.x(v.from), box.y(v.value), 2.8);
 }
 
 void draw_verification(double at_s, const PlotBox& box, Svg* svg) {
@@ -266,16 +221,6 @@ constexpr double kMargin = 16, kFoot = 38, kMin = 190, kMax = 420;
 constexpr double kThin = 0.4;
 constexpr std::size_t kMaxPoints = 20'000;
 
-struct Bounds {
-  double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
-  bool any = false;
-  void include(double x, double y) {
-    if (!std::isfinite(x) || !std::isfinite(y)) return;
-    if (!any) *this = {x, x, y, y, true};
-    x0 = std::min(x0, x), x1 = std::max(x1, x), y0 = std::min(y0, y), y1 = std::max(y1, y);
-  }
-};
-
 /// From metres to the paper, one scale for both axes; up is up.
 struct MapScale {
   double per_metre = 1, x_middle = 0, y_middle = 0, height = kMin;
@@ -285,53 +230,23 @@ struct MapScale {
   }
 };
 
-MapScale scale_for(const Bounds& b) {
+MapScale scale_for(const Eigen::AlignedBox2d& b) {
   // Minimum extent in m, so that the noise of a vehicle at rest is not enlarged.
   constexpr double kSmallest = 1;
-  const double width = std::max(b.x1 - b.x0, kSmallest), depth = std::max(b.y1 - b.y0, kSmallest);
+  const double width = std::max(b.sizes().x(), kSmallest),
+               depth = std::max(b.sizes().y(), kSmallest);
   MapScale s;
   s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
   s.height = std::clamp(depth * s.per_metre + kMargin + kFoot, kMin, kMax);
-  s.x_middle = (b.x0 + b.x1) / 2, s.y_middle = (b.y0 + b.y1) / 2;
+  s.x_middle = b.center().x(), s.y_middle = b.center().y();
   return s;
 }
 
-std::vector<double> placed(const std::vector<double>& values, const MapScale& s, bool vertical) {
-  std::vector<double> out(values.size());
-  for (std::size_t i = 0; i < values.size(); ++i)
-    out[i] = vertical ? s.y(values[i]) : s.x(values[i]);
-  return out;
-}
-
-void draw_path(const char* css, const std::vector<double>& x, const std::vector<double>& y,
+void draw_path(const char* css, std::vector<double> x, std::vector<double> y,
                const std::vector<std::uint8_t>& breaks, const MapScale& s, Svg* svg) {
-  const std::vector<double> on_x = placed(x, s, false), on_y = placed(y, s, true);
-  svg->lines(css, thin(on_x, on_y, breaks, kThin, kMaxPoints));
-}
-
-/// Our way also breaks off where the drive was placed on the earth anew: that step was not driven.
-std::vector<std::uint8_t> breaks_of_estimate(const Analysis& a) {
-  std::vector<std::uint8_t> breaks = a.breaks;
-  for (std::size_t i = 0; i < std::min(breaks.size(), a.realigned.size()); ++i)
-    if (a.realigned[i] != 0) breaks[i] = 1;
-  return breaks;
-}
-
-/// Where the path breaks off because there was no pose, a small red mark.
-void draw_breaks(const Analysis& a, const MapScale& s, Svg* svg) {
-  // Distance in the drawing below which two marks are merged.
-  constexpr double kApart = 6;
-  Point last{-1e9, -1e9};
-  for (std::size_t i = 1; i < a.estimate_x.size(); ++i) {
-    const bool ends =
-        std::isfinite(a.estimate_x[i - 1]) && (!std::isfinite(a.estimate_x[i]) || a.breaks[i] != 0);
-    if (!ends) continue;
-    const Point p{s.x(a.estimate_x[i - 1]), s.y(a.estimate_y[i - 1])};
-    if (std::hypot(p.x - last.x, p.y - last.y) < kApart) continue;
-    svg->lines("curve s-bad", {{{p.x - 4, p.y - 4}, {p.x + 4, p.y + 4}},
-                               {{p.x - 4, p.y + 4}, {p.x + 4, p.y - 4}}});
-    last = p;
-  }
+  for (double& v : x) v = s.x(v);
+  for (double& v : y) v = s.y(v);
+  svg->lines(css, thin(x, y, breaks, kThin, kMaxPoints));
 }
 
 /// Degraded stretches lie over the path in their own colour.
@@ -339,7 +254,7 @@ void draw_degraded(const Analysis& a, std::span<const Frame> frames, const MapSc
   std::vector<double> x = a.estimate_x;
   for (std::size_t i = 0; i < x.size(); ++i)
     if (frames[i].status != PoseStatus::degraded) x[i] = kNone;
-  draw_path("curve map-care s-care", x, a.estimate_y, breaks_of_estimate(a), s, svg);
+  draw_path("curve map-care s-care", x, a.estimate_y, a.map_breaks, s, svg);
 }
 
 void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
@@ -394,7 +309,9 @@ std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
   if (!any) return {};
   box.fit_y(low, high, plot.from_zero);
   Svg svg(kPlotWidth, kPlotHeight, plot.description);
-  draw_holes(box, analysis.time_s, frames, &svg);
+  draw_runs(
+      "hole", box, analysis, box.top, box.bottom - box.top,
+      [&](std::size_t i) { return !frames[i].posed; }, &svg);
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
   svg.lines(plot.css, on_paper(box, decimate(analysis.time_s, plot.y, analysis.breaks, box.x0,
@@ -407,7 +324,7 @@ std::string bands_plot(const Session& session, const Analysis& analysis) {
   PlotBox box = time_box(analysis);
   box.left = kBandLeft;
   box.top = 2;
-  const std::vector<Lane> lanes = make_lanes(session, analysis, box);
+  const std::vector<Lane> lanes = make_lanes(session.frames);
   constexpr std::size_t kStatuses = 3;
   // Distance between statuses, states and events.
   constexpr double kApart = 8;
@@ -415,9 +332,12 @@ std::string bands_plot(const Session& session, const Analysis& analysis) {
   box.bottom = events_top + kLaneHeight;
   Svg svg(kPlotWidth, box.bottom + 36,
           "Status of the frames, state of the estimator and events over time");
-  for (std::size_t i = 0; i < lanes.size(); ++i)
-    draw_lane(lanes[i], box,
-              box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0), &svg);
+  for (std::size_t i = 0; i < lanes.size(); ++i) {
+    const double top =
+        box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0);
+    draw_track(std::string(lanes[i].name), box, top, &svg);
+    draw_runs(lanes[i].css, box, analysis, top + 3, kLaneHeight - 7, lanes[i].shown, &svg);
+  }
   draw_events(session, box, events_top, &svg);
   box.draw_time_axis(&svg);
   return std::move(svg).finish();
@@ -425,35 +345,43 @@ std::string bands_plot(const Session& session, const Analysis& analysis) {
 
 std::string calibration_plot(const Session& session, const Analysis& analysis, int camera,
                              int component) {
-  const CalibrationCurve curve = calibration_curve(session, analysis, camera, component);
-  if (curve.empty()) return {};
+  const std::vector<CalibrationValue> values =
+      calibration_values(session, analysis, camera, static_cast<std::size_t>(component));
+  if (values.empty()) return {};
   PlotBox box = time_box(analysis);
   // The left margin has room for four decimals.
   box.left = 74;
-  fit_calibration(curve, &box);
+  double low = values.front().value, high = low;
+  for (const CalibrationValue& v : values) {
+    low = std::min(low, v.value - v.two_sigma);
+    high = std::max(high, v.value + v.two_sigma);
+  }
+  box.fit_y(low, high, false);
   Svg svg(kPlotWidth, kPlotHeight, "A calibration parameter over time with its 2 sigma band");
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
   if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
-  draw_calibration(curve, box, &svg);
+  draw_calibration(values, box, &svg);
   return std::move(svg).finish();
 }
 
 std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
-  Bounds bounds;
+  Eigen::AlignedBox2d bounds;
+  const auto include = [&](double x, double y) {
+    if (std::isfinite(x)) bounds.extend(Eigen::Vector2d(x, y));
+  };
   for (std::size_t i = 0; i < analysis.estimate_x.size(); ++i) {
-    bounds.include(analysis.estimate_x[i], analysis.estimate_y[i]);
-    bounds.include(analysis.reference_x[i], analysis.reference_y[i]);
+    include(analysis.estimate_x[i], analysis.estimate_y[i]);
+    include(analysis.reference_x[i], analysis.reference_y[i]);
   }
-  if (!bounds.any) return {};
+  if (bounds.isEmpty()) return {};
   const MapScale scale = scale_for(bounds);
   Svg svg(kPlotWidth, scale.height, "Trajectory seen from above");
   draw_path("curve map-theirs s-theirs", analysis.reference_x, analysis.reference_y,
             analysis.breaks, scale, &svg);
-  draw_path("curve map-ours s-ours", analysis.estimate_x, analysis.estimate_y,
-            breaks_of_estimate(analysis), scale, &svg);
+  draw_path("curve map-ours s-ours", analysis.estimate_x, analysis.estimate_y, analysis.map_breaks,
+            scale, &svg);
   draw_degraded(analysis, frames, scale, &svg);
-  draw_breaks(analysis, scale, &svg);
   draw_ends(analysis, scale, &svg);
   draw_scale_bar(scale, &svg);
   if (analysis.map_is_enu) draw_north(scale, &svg);

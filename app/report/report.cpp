@@ -25,16 +25,12 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
   ReportOutcome outcome;
   outcome.page = session_folder / "report.html";
   outcome.assessment = report::assess(session, analysis);
-  outcome.missing = session.not_had();
+  outcome.missing = session.missing;
   replace_durably(outcome.page, report::page_html(session, analysis, outcome.assessment));
   return outcome;
 }
 
-std::array<std::string, 3> closing_lines(const ReportOutcome& outcome, const std::string& failure) {
-  if (!failure.empty())
-    return {"result: unknown, no report was written",
-            "to do: free space or fix permissions, then run vergence report SESSION",
-            "report: " + failure};
+std::array<std::string, 3> closing_lines(const ReportOutcome& outcome) {
   const report::Assessment& a = outcome.assessment;
   const std::string why = a.usable ? fmt::format("{}: {}", report::spaced(a.grade),
                                                  first_message(a.reasons, a.message.c_str()))

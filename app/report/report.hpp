@@ -18,9 +18,8 @@ struct ReportOutcome {
 };
 
 /// Three closing lines for the terminal: usable or not with the reason, what to do, and the path of
-/// the report. `failure` is the reason for a missing report, empty otherwise.
-[[nodiscard]] std::array<std::string, 3> closing_lines(const ReportOutcome& outcome,
-                                                       const std::string& failure);
+/// the report.
+[[nodiscard]] std::array<std::string, 3> closing_lines(const ReportOutcome& outcome);
 
 /// Writes SESSION/report.html from the session's other files: one self-contained page with inline
 /// SVG and no script.

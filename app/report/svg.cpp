@@ -82,14 +82,6 @@ void append_escaped(std::string* out, std::string_view character) {
 // The limit is far outside every drawing.
 constexpr double kLargestCoordinate = 1e6;
 
-/// Least value of `steps` with at most `most` intervals over `span`; the last when none does.
-template <std::size_t N>
-double choose_step(const std::array<double, N>& steps, double span, int most) {
-  for (const double step : steps)
-    if (span / step <= most) return step;
-  return steps.back();
-}
-
 std::vector<double> multiples(double low, double high, double step, int most) {
   std::vector<double> ticks;
   const double first = std::ceil(low / step - 1e-9);
@@ -175,15 +167,13 @@ std::vector<double> nice_ticks(double low, double high, int most) {
 }
 
 std::vector<double> time_ticks(double low, double high, int most) {
-  constexpr std::array kSteps{60.0,   120.0,  300.0,   600.0,   900.0,   1800.0,
+  constexpr std::array kSteps{1.0,    2.0,    5.0,     10.0,    15.0,    30.0,
+                              60.0,   120.0,  300.0,   600.0,   900.0,   1800.0,
                               3600.0, 7200.0, 14400.0, 21600.0, 43200.0, 86400.0};
-  constexpr std::array kShort{1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0};
   const double span = high - low;
-  if (span / kShort.front() < most || span / kSteps.back() > most)
-    return nice_ticks(low, high, most);
-  const double step = span / kShort.back() <= most ? choose_step(kShort, span, most)
-                                                   : choose_step(kSteps, span, most);
-  return multiples(low, high, step, most);
+  const auto step = std::ranges::find_if(kSteps, [=](double s) { return span / s <= most; });
+  if (span / kSteps.front() < most || step == kSteps.end()) return nice_ticks(low, high, most);
+  return multiples(low, high, *step, most);
 }
 
 std::string tick_label(double value, double step) {

@@ -87,4 +87,9 @@ void BackgroundThread::work(Role role) noexcept {
   }
 }
 
+std::unique_ptr<PairRunner> make_runner(int threads) {
+  if (threads >= 2) return std::make_unique<ThreadRunner>();
+  return std::make_unique<SequentialRunner>();
+}
+
 }  // namespace vergence::app

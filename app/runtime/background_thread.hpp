@@ -1,6 +1,7 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <thread>
 
@@ -61,6 +62,9 @@ class ThreadRunner final : public PairRunner {
  private:
   BackgroundThread thread_;
 };
+
+/// Runs the two halves of a front end on one thread, or on two or more in parallel.
+[[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
 
 /// The calibration solver's runner, with a note of the frames at which it was found idle: the one
 /// thing by which time decides what the estimator does. With that note it answers in a replay as it

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "app/runtime/terminal_text.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -22,21 +23,6 @@ constexpr Duration kFirstEstimate = Duration::seconds(1);
 constexpr int kUnknownWidth = 80;
 // Maximum in s (100 hours) of a remaining time that is shown.
 constexpr double kLongestLeft = 360'000;
-
-/// A code point of UTF-8 starts at every byte that does not continue one. Each takes one column
-/// here: the line holds no others.
-bool starts_code_point(char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }
-
-std::size_t columns_of(std::string_view text) {
-  return static_cast<std::size_t>(std::ranges::count_if(text, starts_code_point));
-}
-
-std::string_view cut(std::string_view text, std::size_t columns) {
-  std::size_t seen = 0;
-  for (std::size_t i = 0; i < text.size(); ++i)
-    if (starts_code_point(text[i]) && seen++ == columns) return text.substr(0, i);
-  return text;
-}
 
 std::string clock_text(double seconds) {
   const auto s = static_cast<long>(seconds + 0.5);
@@ -140,13 +126,14 @@ void Progress::redraw(const std::string& whole) {
   // One column stays free: a terminal that has just filled its last one may already have begun the
   // next line.
   const auto room = static_cast<std::size_t>(std::max(1, (width < 1 ? kUnknownWidth : width) - 1));
-  const std::string_view shown = cut(whole, room);
-  const std::size_t columns = columns_of(shown);
+  std::string_view shown = whole;
+  while (columns(shown) > room) shown.remove_suffix(1);
+  const std::size_t used = columns(shown);
   std::string text = "\r";
   text += shown;
-  if (columns_ > columns) text.append(std::min(columns_, room) - columns, ' ');
+  if (columns_ > used) text.append(std::min(columns_, room) - used, ' ');
   out_ << text << std::flush;
-  columns_ = columns;
+  columns_ = used;
 }
 
 /// Escape sequence that erases the line.

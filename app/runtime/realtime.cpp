@@ -101,7 +101,7 @@ int RealtimeSystem::lock_memory(Locked* locked) {
 }
 
 std::vector<std::string> RealtimeThreads::lock_memory() {
-  if (!request_.lock_memory) return {};
+  if (settings_.lock_memory == 0) return {};
   RealtimeSystem::Locked locked = RealtimeSystem::Locked::everything;
   if (const int error = system_.lock_memory(&locked); error != 0)
     return {
@@ -118,7 +118,7 @@ std::vector<std::string> RealtimeThreads::lock_memory() {
 
 std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>& threads) {
   std::vector<std::string> messages;
-  if (request_.priority <= 0 && !request_.affinity && !request_.solver_affinity) return messages;
+  if (settings_.priority <= 0 && !affinity_ && !solver_affinity_) return messages;
   // One that has ended is forgotten: capture threads come and go for months, and a number is given
   // again.
   std::erase_if(done_, [&](const auto& done) {
@@ -141,9 +141,9 @@ std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>
 void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string>* messages) {
   const ThreadRole role = thread_role(thread.name);
   const bool solver = role == ThreadRole::solver;
-  if (const auto& cpus = solver ? request_.solver_affinity : request_.affinity; cpus)
+  if (const auto& cpus = solver ? solver_affinity_ : affinity_; cpus)
     set_affinity(thread.id, *cpus, solver, messages);
-  const int priority = role_priority(role, request_.priority);
+  const int priority = role_priority(role, settings_.priority);
   if (priority == 0) return;
   const int error = system_.set_fifo(thread.id, priority);
   if (error == 0 || error == ESRCH || std::exchange(priority_refused_, true)) return;
@@ -151,7 +151,7 @@ void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string
       fmt::format("realtime.priority: {} is refused priority {} ({}); the run continues without "
                   "it; allow it with `sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v "
                   "vergence)`, in a service with LimitRTPRIO={}",
-                  thread.name, priority, reason(error), request_.priority));
+                  thread.name, priority, reason(error), settings_.priority));
 }
 
 void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,

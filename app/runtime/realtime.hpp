@@ -45,14 +45,17 @@ enum class ThreadRole : std::uint8_t {
   other
 };
 
-/// `realtime:` of the configuration.
-struct RealtimeRequest {
-  // Priority of the most urgent threads; 0 means that no thread is given a real-time priority.
+/// `realtime:` of the configuration: scheduling of a run's threads (docs/deployment.md).
+struct RealtimeSettings {
+  /// SCHED_FIFO priority of the most urgent threads; 0: none.
   int priority = 0;
-  // CPUs of all roles except `other` and the solver.
-  std::optional<cpu_set_t> affinity{};
-  std::optional<cpu_set_t> solver_affinity{};
-  bool lock_memory = false;
+  /// Processors of all roles except `other` and the solver, such as `0-1,3`; empty: any.
+  std::string affinity{};
+  std::string solver_affinity{};
+  /// 1: call mlockall().
+  int lock_memory = 0;
+  /// Time budget per frame of a live run; 0: its frame interval.
+  double frame_budget_ms = 0;
 };
 
 /// The system calls below, for tests to replace. Each returns 0 or errno.
@@ -75,8 +78,11 @@ class RealtimeSystem {
 /// A refusal by the system gives a message with the fix, once per key; the run continues.
 class RealtimeThreads {
  public:
-  RealtimeThreads(const RealtimeRequest& request, RealtimeSystem& system) noexcept
-      : request_(request), system_(system) {}
+  RealtimeThreads(const RealtimeSettings& settings, RealtimeSystem& system) noexcept
+      : settings_(settings),
+        affinity_(parse_cpu_list(settings.affinity)),
+        solver_affinity_(parse_cpu_list(settings.solver_affinity)),
+        system_(system) {}
 
   /// Locks memory, if asked for: when everything is set up, before the first frame.
   [[nodiscard]] std::vector<std::string> lock_memory();
@@ -88,7 +94,8 @@ class RealtimeThreads {
   void set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
                     std::vector<std::string>* messages);
 
-  RealtimeRequest request_;
+  const RealtimeSettings settings_;
+  const std::optional<cpu_set_t> affinity_, solver_affinity_;
   RealtimeSystem& system_;
   std::map<pid_t, ThreadRole> done_{};
   bool priority_refused_ = false, affinity_refused_ = false, solver_affinity_refused_ = false;

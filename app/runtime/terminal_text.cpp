@@ -1,10 +1,6 @@
 #include "app/runtime/terminal_text.hpp"
 
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstdlib>
 
 namespace vergence::app {
 namespace {
@@ -41,29 +37,6 @@ std::vector<std::string> wrapped(std::string_view text, std::size_t width) {
       lines.emplace_back(word);
   }
   return lines;
-}
-
-Terminal Terminal::of_stdout() {
-  constexpr std::size_t kMin = 60, kMax = 140;
-  Terminal t;
-  if (::isatty(STDOUT_FILENO) == 0) return t;
-  winsize size{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0)
-    t.width = std::clamp<std::size_t>(size.ws_col, kMin, kMax);
-  const char* kind = std::getenv("TERM");
-  t.colours =
-      kind != nullptr && std::string_view(kind) != "dumb" && std::getenv("NO_COLOR") == nullptr;
-  return t;
-}
-
-std::string Terminal::in(Ink ink, std::string_view text) const {
-  if (!colours) return std::string(text);
-  const char* code = ink == Ink::red      ? "31;1"
-                     : ink == Ink::yellow ? "33;1"
-                     : ink == Ink::green  ? "32"
-                     : ink == Ink::bold   ? "1"
-                                          : "2";
-  return std::string("\033[") + code + "m" + std::string(text) + "\033[0m";
 }
 
 std::size_t utf8_length(std::string_view text) {

@@ -15,17 +15,6 @@ namespace vergence::app {
 /// at least one line.
 [[nodiscard]] std::vector<std::string> wrapped(std::string_view text, std::size_t width);
 
-/// Width of standard output (100 if it is no terminal, at least 60), and whether to use colours (a
-/// capable terminal, NO_COLOR unset).
-struct Terminal {
-  std::size_t width = 100;
-  bool colours = false;
-  [[nodiscard]] static Terminal of_stdout();
-
-  enum class Ink { red, yellow, green, bold, dim };
-  [[nodiscard]] std::string in(Ink ink, std::string_view text) const;
-};
-
 /// Length of the well-formed UTF-8 character at the front of a non-empty text; 0 if there is none.
 [[nodiscard]] std::size_t utf8_length(std::string_view text);
 /// Replaces unprintable characters by blanks and invalid UTF-8 by question marks, because texts of

@@ -13,7 +13,6 @@
 #include "app/datasets/frame_decoder.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
-#include "app/session/session_files.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
 #include "core/calibration/segment_solver.hpp"

@@ -11,23 +11,13 @@ namespace vergence::app {
 
 namespace {
 
-RealtimeRequest make_request(const RealtimeSettings& settings) {
-  RealtimeRequest request;
-  request.priority = settings.priority;
-  request.affinity = parse_cpu_list(settings.affinity);
-  request.solver_affinity = parse_cpu_list(settings.solver_affinity);
-  request.lock_memory = settings.lock_memory != 0;
-  return request;
-}
-
 void print(const std::vector<std::string>& messages, Progress* progress) {
   for (const std::string& message : messages) progress->print("vergence: " + message);
 }
 
 }  // namespace
 
-DriveThreads::DriveThreads(const RealtimeSettings& settings)
-    : realtime_(make_request(settings), system_) {
+DriveThreads::DriveThreads(const RealtimeSettings& settings) : realtime_(settings, system_) {
   // A run has fewer threads than this, so polling does not allocate.
   constexpr std::size_t kThreads = 64;
   threads_.reserve(kThreads);

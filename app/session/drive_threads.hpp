@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include "app/config/configuration.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/realtime.hpp"
 #include "app/session/summary.hpp"

@@ -2,13 +2,6 @@
 
 #include <pthread.h>
 
-#include <algorithm>
-#include <cstdio>
-#include <string_view>
-
-#include <fmt/format.h>
-
-#include "app/session/session_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "core/memory/thread_allocations.hpp"
 #include "drivers/clock.hpp"
@@ -16,24 +9,6 @@
 namespace vergence::app {
 
 namespace {
-
-void print_row(std::string_view name, std::size_t bytes) {
-  fmt::print("{:<44}{:>14}\n", name, bytes);
-}
-
-/// Parts of an arena, the largest first; those below a hundredth in one line.
-void print_parts(const MemoryRow& row) {
-  std::vector<ArenaRow> parts(row.parts.begin(), row.parts.end());
-  std::ranges::stable_sort(parts,
-                           [](const ArenaRow& a, const ArenaRow& b) { return a.bytes > b.bytes; });
-  std::size_t rest = row.bytes;
-  for (const ArenaRow& part : parts) {
-    if (part.bytes < row.bytes / 100) break;
-    print_row(fmt::format("  {}", part.name), part.bytes);
-    rest -= part.bytes;
-  }
-  if (!parts.empty()) print_row("  smaller ones", rest);
-}
 
 /// Time budget of a frame: live, the next one does not wait.
 Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
@@ -43,17 +18,6 @@ Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime
 }
 
 }  // namespace
-
-void print_memory_table(const std::vector<MemoryRow>& memory) {
-  std::size_t sum = 0;
-  for (const MemoryRow& row : memory) {
-    print_row(row.name, row.bytes);
-    print_parts(row);
-    sum += row.bytes;
-  }
-  print_row("total_bytes", sum);
-  (void)std::fflush(stdout);
-}
 
 EstimationLoop::EstimationLoop(FrameSource& source, const Configuration& configuration,
                                const SessionOptions& options)

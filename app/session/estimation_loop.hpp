@@ -1,11 +1,7 @@
 #pragma once
 #include <atomic>
-#include <cstddef>
 #include <memory>
 #include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "app/datasets/reference_track.hpp"
 #include "app/devices/camera_masks.hpp"
@@ -21,16 +17,6 @@
 #include "core/memory/arena.hpp"
 
 namespace vergence::app {
-
-/// Bytes taken by one holder, an arena's with what it holds by name.
-struct MemoryRow {
-  std::string name{};
-  std::size_t bytes = 0;
-  std::span<const ArenaRow> parts{};
-};
-
-/// The table of --print-memory on stdout, before the drive.
-void print_memory_table(const std::vector<MemoryRow>& memory);
 
 /// Loop of the estimator's thread: takes input from the source, estimates its pose, compares it
 /// with the INS, and hands everything on to the session's output.

@@ -71,100 +71,20 @@ Json enu_json(const EnuMetrics& metrics) {
           {"errors", errors_json(metrics.errors)}};
 }
 
-void InsEvents::update(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept {
-  record_attitude(sample);
-  if (contradicted && !std::exchange(contradiction_reported_, true))
-    event_log_.log(sample.stamp, "ins_attitude",
-                   "the INS heading differs from the direction of travel by more than 30 deg and "
-                   "is not used until it agrees: check its filter and ins.boresight_deg",
-                   true);
-  if (jumps == jumps_) return;
-  jumps_ = jumps;
-  event_log_.log(sample.stamp, "ins_jump",
-                 "the INS position jumped: errors from here on include the jump", true);
-}
-
-void InsEvents::update(const ComparedPose& pose, std::uint64_t matches) noexcept {
-  if (source_ != InsSource::none) record_match(pose, matches);
-  record_scale(pose);
-}
-
-void InsEvents::update(const EnuAlignment& p, Stamp stamp) noexcept {
-  event_log_.log({stamp, "enu_alignment",
-                  "aligned with ENU after {:.1f} m: heading sigma {:.2f} deg, residual {:.2f} m",
-                  p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual},
-                 false);
-}
-
-/// Once a drive: a receiver never has one, an INS has it after it has aligned.
-void InsEvents::record_attitude(const InsSample& sample) noexcept {
-  if (sample.attitude_valid || sample.heading_source == HeadingSource::none ||
-      std::exchange(attitude_reported_, true))
-    return;
-  const bool heading = sample.heading_source == HeadingSource::heading;
-  event_log_.log(
-      sample.stamp, "ins_without_attitude",
-      heading ? "the INS sends no roll and pitch (assumed level): position and heading are compared"
-              : "the INS sends no attitude (assumed level): position and course are compared",
-      false);
-}
-
-void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
-  // Number of consecutive poses before a change is reported, so that one missed sample is not.
-  constexpr std::uint64_t kSettled = 3;
-  match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
-  last_match_ = pose.ins;
-  if (match_run_ != kSettled) return;
-  const bool recorded = source_ == InsSource::recording;
-  const auto log = [&](const char* kind, const char* message, bool to_user) {
-    event_log_.log(pose.pose.stamp, kind, message, to_user);
-  };
-  if (pose.ins == InsMatch::ok && matches > kSettled)
-    log("ins_recovered", "the INS has a position again; the comparison continues", false);
-  if (pose.ins == InsMatch::none)
-    log("ins_timeout",
-        recorded ? "no INS samples in the recording here: these poses are not compared"
-                 : "the INS sends nothing; the run continues without it: check its cable and rate",
-        true);
-  if (pose.ins == InsMatch::gap)
-    log("ins_gap", "INS samples are missing: these poses are not compared", true);
-  if (pose.ins == InsMatch::no_fix)
-    log("ins_no_fix",
-        recorded ? "the INS had no position: the comparison pauses"
-                 : "the INS has no position: the comparison pauses; check its antenna",
-        true);
-  // A jump is reported with its sample, because it may fall between two frames.
-}
-
-void InsEvents::record_scale(const ComparedPose& pose) noexcept {
-  if (pose.scale_disagrees == scale_disagrees_) return;
-  scale_disagrees_ = pose.scale_disagrees;
-  const Stamp stamp = pose.pose.stamp;
-  if (!scale_disagrees_)
-    return event_log_.log(stamp, "scale_agrees", "the distance travelled agrees with the INS again",
-                          false);
-  event_log_.log({stamp, "scale_disagrees",
-                  "the distance travelled is {:.1f} % {} than the INS's over {:.0f} m: measure the "
-                  "baseline again",
-                  100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter",
-                  scale_stretch_m_},
-                 true);
-}
-
 InsComparison::InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
                              EventLog& event_log)
     : T_ins_left_(options.T_ins_left),
+      scale_stretch_m_(options.scale_stretch_m),
+      source_(source),
       comparison_(options, arena),
-      event_log_(event_log),
-      events_(source, options.scale_stretch_m, event_log) {
+      event_log_(event_log) {
   alignments_.reserve(kMaxPlacements);
 }
 
 void InsComparison::add(const InsRecord& reading) noexcept {
   output_->post(&SessionObserver::on_reading, reading);
   comparison_.add(reading.sample);
-  events_.update(reading.sample, comparison_.counters().jumps,
-                 comparison_.counters().ins_contradicted > 0);
+  record_sample(reading.sample);
 }
 
 void InsComparison::add(const FrameReport& report) noexcept {
@@ -184,7 +104,8 @@ void InsComparison::drain() noexcept {
     measure_errors(pose);
     apply_enu_alignment(pose.pose.stamp);
     if (pose.ins_valid && pose.scale_disagrees) ++scale_disagreements_;
-    events_.update(pose, matches_);
+    record_match(pose);
+    record_scale(pose);
   }
 }
 
@@ -274,7 +195,75 @@ void InsComparison::apply_enu_alignment(Stamp stamp) noexcept {
                      "too many ENU alignments for summary.json; poses.csv has all of them", true);
   }
   output_->post(&SessionObserver::on_enu_alignment, p, comparison_.plane().origin());
-  events_.update(p, stamp);
+  event_log_.log({stamp, "enu_alignment",
+                  "aligned with ENU after {:.1f} m: heading sigma {:.2f} deg, residual {:.2f} m",
+                  p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual},
+                 false);
+}
+
+/// That the INS sends no attitude is reported once a run: a receiver never has one, an INS has it
+/// after it has aligned.
+void InsComparison::record_sample(const InsSample& sample) noexcept {
+  const ComparisonCounters& counters = comparison_.counters();
+  if (!sample.attitude_valid && sample.heading_source != HeadingSource::none &&
+      !std::exchange(attitude_reported_, true))
+    event_log_.log(
+        sample.stamp, "ins_without_attitude",
+        sample.heading_source == HeadingSource::heading
+            ? "the INS sends no roll and pitch (assumed level): position and heading are "
+              "compared"
+            : "the INS sends no attitude (assumed level): position and course are compared",
+        false);
+  if (counters.ins_contradicted > 0 && !std::exchange(contradiction_reported_, true))
+    event_log_.log(sample.stamp, "ins_attitude",
+                   "the INS heading differs from the direction of travel by more than 30 deg and "
+                   "is not used until it agrees: check its filter and ins.boresight_deg",
+                   true);
+  if (std::exchange(jumps_, counters.jumps) != counters.jumps)
+    event_log_.log(sample.stamp, "ins_jump",
+                   "the INS position jumped: errors from here on include the jump", true);
+}
+
+void InsComparison::record_match(const ComparedPose& pose) noexcept {
+  // Number of consecutive poses before a change is reported, so that one missed sample is not.
+  constexpr std::uint64_t kSettled = 3;
+  match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
+  last_match_ = pose.ins;
+  if (match_run_ != kSettled) return;
+  const bool recorded = source_ == InsSource::recording;
+  const auto log = [&](const char* kind, const char* message, bool to_user) {
+    event_log_.log(pose.pose.stamp, kind, message, to_user);
+  };
+  if (pose.ins == InsMatch::ok && matches_ > kSettled)
+    log("ins_recovered", "the INS has a position again; the comparison continues", false);
+  if (pose.ins == InsMatch::none)
+    log("ins_timeout",
+        recorded ? "no INS samples in the recording here: these poses are not compared"
+                 : "the INS sends nothing; the run continues without it: check its cable and rate",
+        true);
+  if (pose.ins == InsMatch::gap)
+    log("ins_gap", "INS samples are missing: these poses are not compared", true);
+  if (pose.ins == InsMatch::no_fix)
+    log("ins_no_fix",
+        recorded ? "the INS had no position: the comparison pauses"
+                 : "the INS has no position: the comparison pauses; check its antenna",
+        true);
+  // A jump is reported with its sample, because it may fall between two frames.
+}
+
+void InsComparison::record_scale(const ComparedPose& pose) noexcept {
+  if (pose.scale_disagrees == scale_disagrees_) return;
+  scale_disagrees_ = pose.scale_disagrees;
+  const Stamp stamp = pose.pose.stamp;
+  if (!scale_disagrees_)
+    return event_log_.log(stamp, "scale_agrees", "the distance travelled agrees with the INS again",
+                          false);
+  event_log_.log({stamp, "scale_disagrees",
+                  "the distance travelled is {:.1f} % {} than the INS's over {:.0f} m: measure the "
+                  "baseline again",
+                  100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter",
+                  scale_stretch_m_},
+                 true);
 }
 
 }  // namespace vergence::app

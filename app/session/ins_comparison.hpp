@@ -56,40 +56,10 @@ struct EnuMetrics {
 /// Null without an origin.
 [[nodiscard]] nlohmann::ordered_json enu_json(const EnuMetrics& metrics);
 
-enum class InsSource : std::uint8_t { none, device, recording };
-
-/// Events about an INS and its comparison with the poses, each reported once per change. Runs on
-/// the estimator's thread, which is sealed.
-class InsEvents {
- public:
-  /// Without a source its silence is not reported. `event_log` must outlive this object.
-  InsEvents(InsSource source, double scale_stretch_m, EventLog& event_log) noexcept
-      : source_(source), scale_stretch_m_(scale_stretch_m), event_log_(event_log) {}
-
-  /// Handles a sample after the comparison has counted `jumps` of the position. `contradicted`
-  /// means that the attitude disagrees with the direction of travel.
-  void update(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept;
-  /// Handles a pose whose samples have arrived; `matches` counts the poses with samples.
-  void update(const ComparedPose& pose, std::uint64_t matches) noexcept;
-  void update(const EnuAlignment& alignment, Stamp stamp) noexcept;
-
- private:
-  void record_attitude(const InsSample& sample) noexcept;
-  void record_match(const ComparedPose& pose, std::uint64_t matches) noexcept;
-  void record_scale(const ComparedPose& pose) noexcept;
-
-  const InsSource source_;
-  const double scale_stretch_m_;
-  EventLog& event_log_;
-  bool attitude_reported_ = false, contradiction_reported_ = false, scale_disagrees_ = false;
-  std::uint64_t jumps_ = 0;
-  InsMatch last_match_ = InsMatch::ok;
-  // Number of consecutive poses with that result.
-  std::uint64_t match_run_ = 0;
-};
+enum class InsSource : std::uint8_t { device, recording };
 
 /// Compares a session with its live or recorded INS pose by pose, passes the results to the
-/// recorder and reports events.
+/// recorder and reports events, each once per change.
 ///
 /// Runs on the estimator's thread, which is sealed; no synchronisation is needed after joining it.
 /// Memory is from the arena. Samples and poses are added in order of arrival; every add() of a pose
@@ -100,12 +70,12 @@ class InsComparison {
   /// and counted.
   static constexpr std::size_t kMaxPlacements = 4096;
 
-  /// Without a source poses are passed on without events. `event_log` must outlive this object.
+  /// `event_log` must outlive this object.
   InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
                 EventLog& event_log);
 
-  /// Call before the first add(). `output` must outlive the last one; with a source its recorder
-  /// needs Recorder::Options::ins.
+  /// Call before the first add(). `output` must outlive the last one; its recorder needs
+  /// Recorder::Options::ins.
   void open(SessionOutput* output) noexcept { output_ = output; }
   void add(const InsRecord& reading) noexcept;
   void add(const FrameReport& report) noexcept;
@@ -124,11 +94,22 @@ class InsComparison {
   void measure_way(const ComparedPose& pose) noexcept;
   void measure_errors(const ComparedPose& pose) noexcept;
   void apply_enu_alignment(Stamp stamp) noexcept;
+  void record_sample(const InsSample& sample) noexcept;
+  void record_match(const ComparedPose& pose) noexcept;
+  void record_scale(const ComparedPose& pose) noexcept;
+
   const Transform T_ins_left_;
+  const double scale_stretch_m_;
+  const InsSource source_;
   Comparison comparison_;
   EventLog& event_log_;
-  InsEvents events_;
   SessionOutput* output_ = nullptr;
+  // Events that are reported once, or again when they have changed.
+  bool attitude_reported_ = false, contradiction_reported_ = false, scale_disagrees_ = false;
+  std::uint64_t jumps_ = 0;
+  InsMatch last_match_ = InsMatch::ok;
+  // Number of consecutive poses with that result.
+  std::uint64_t match_run_ = 0;
   // Indexed by the count of poses.
   std::array<FrameReport, Comparison::kPending> pending_{};
   std::uint64_t added_ = 0, drained_ = 0;

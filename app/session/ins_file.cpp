@@ -37,89 +37,94 @@ void append_sigma(std::string* line, double sigma, double unit) {
     fmt::format_to(std::back_inserter(*line), "{:.6g}", sigma * unit);
 }
 
-/// One line on its way in: its columns one after the other, each refused with file:line.
-class Columns {
+/// The fields of a line, taken in their order; one that is no value of its column is refused with
+/// file:line.
+class Fields {
  public:
-  Columns(const fs::path& file, std::size_t line, std::span<const std::string_view> fields)
-      : file_(file), line_(line), fields_(fields) {}
-
-  [[nodiscard]] std::int64_t integer(const char* what, std::int64_t least, std::int64_t most) {
-    const std::string_view field = fields_[next_++];
-    const auto value = parse_integer(field);
-    if (!value || *value < least || *value > most) refuse(field, what);
-    return *value;
+  Fields(const fs::path& file, std::size_t number, std::string_view line)
+      : file_(file), line_(number) {
+    const std::size_t count = split(line, ',', fields_);
+    if (count != kColumns)
+      refuse(fmt::format("has {} columns instead of {}; the line is damaged", count, kColumns));
   }
-  [[nodiscard]] std::int64_t integer_or_nothing(const char* what, std::int64_t least,
-                                                std::int64_t most) {
-    if (!fields_[next_].empty()) return integer(what, least, most);
-    ++next_;
-    return 0;
+
+  /// 0 for an empty field if it is `optional`.
+  [[nodiscard]] std::int64_t integer(std::int64_t least, std::int64_t most, bool optional = false) {
+    const std::string_view field = fields_[next_++];
+    if (optional && field.empty()) return 0;
+    const auto value = parse_integer(field);
+    if (!value || *value < least || *value > most) refuse_field();
+    return *value;
   }
   /// False: all of them are empty.
   template <std::size_t N>
-  [[nodiscard]] bool numbers(const char* what, std::array<double, N>* values) {
-    const auto mine = fields_.subspan(next_, N);
-    next_ += N;
-    if (std::ranges::all_of(mine, [](std::string_view f) { return f.empty(); })) return false;
-    for (std::size_t i = 0; i < N; ++i)
-      if (!parse_number(mine[i], &(*values)[i])) refuse(mine[i], what);
-    return true;
+  [[nodiscard]] bool numbers(std::array<double, N>* values) {
+    const auto mine = std::span(fields_).subspan(next_, N);
+    const bool none = std::ranges::all_of(mine, [](std::string_view f) { return f.empty(); });
+    for (double& value : *values)
+      if (!parse_number(fields_[next_++], &value) && !none) refuse_field();
+    return !none;
   }
   [[nodiscard]] double sigma() {
     std::array<double, 1> value{};
-    if (numbers("a sigma", &value) && value[0] < 0) refuse(fields_[next_ - 1], "a sigma");
+    if (numbers(&value) && value[0] < 0) refuse_field();
     return value[0];
   }
   [[nodiscard]] FixStatus fix() {
     const auto found = std::ranges::find(kFixes, fields_[next_++]);
-    if (found == kFixes.end()) refuse(fields_[next_ - 1], "none, dead_reckoning, fix_2d or fix_3d");
+    if (found == kFixes.end()) refuse_field();
     return static_cast<FixStatus>(found - kFixes.begin());
-  }
-  [[noreturn]] void refuse(std::string_view field, const char* what) const {
-    app::refuse(file_, line_, "`" + std::string(field.substr(0, 40)) + "` is not " + what);
   }
   [[noreturn]] void refuse(const std::string& message) const { app::refuse(file_, line_, message); }
 
  private:
+  /// The field that was taken last.
+  [[noreturn]] void refuse_field() const {
+    std::array<std::string_view, kColumns> names;
+    (void)split(kInsHeader, ',', names);
+    refuse(fmt::format("`{}` is not a value of the column {}; the line is damaged",
+                       fields_[next_ - 1].substr(0, 40), names[next_ - 1]));
+  }
+
   const fs::path& file_;
   std::size_t line_;
-  std::span<const std::string_view> fields_;
+  std::array<std::string_view, kColumns> fields_{};
   std::size_t next_ = 0;
 };
 
-InsRecord parse(Columns columns) {
+InsRecord parse(Fields fields) {
   constexpr std::int64_t kMax = std::numeric_limits<std::int64_t>::max();
   InsRecord r;
   InsSample& s = r.sample;
-  s.stamp = Stamp(columns.integer("a stamp in whole nanoseconds", 0, kMax));
-  s.stamp_error = Duration::nanoseconds(columns.integer("a bound in whole nanoseconds", 0, kMax));
-  s.number = static_cast<std::uint64_t>(columns.integer("a sample number", 0, kMax));
-  s.fix = columns.fix();
+  s.stamp = Stamp(fields.integer(0, kMax));
+  s.stamp_error = Duration::nanoseconds(fields.integer(0, kMax));
+  s.number = static_cast<std::uint64_t>(fields.integer(0, kMax));
+  s.fix = fields.fix();
   std::array<double, 3> place{};
-  if (columns.numbers("a coordinate", &place)) {
+  if (fields.numbers(&place)) {
     s.position = {place[0], place[1], place[2]};
     if (!s.position.plausible())
-      columns.refuse("the position is not a valid latitude and longitude");
+      fields.refuse("the position is not a valid latitude and longitude; the line is damaged");
   } else {
     s.fix = FixStatus::none;
   }
-  s.velocity_valid = columns.numbers("a velocity", &s.velocity_enu);
-  s.attitude_valid = columns.numbers("a part of a quaternion", &s.q_enu_ins);
+  s.velocity_valid = fields.numbers(&s.velocity_enu);
+  s.attitude_valid = fields.numbers(&s.q_enu_ins);
   const auto& q = s.q_enu_ins;
   const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
   if (!(std::abs(length - 1) <= kQuaternionLength))
-    columns.refuse(fmt::format("the quaternion has the length {:.3g} instead of 1", length));
-  s.position_sigma = columns.sigma();
-  s.height_sigma = columns.sigma();
-  s.velocity_sigma = columns.sigma();
-  s.tilt_sigma = columns.sigma() / kDegreesPerRadian;
-  s.heading_sigma = columns.sigma() / kDegreesPerRadian;
-  r.quality.status = static_cast<std::uint32_t>(
-      columns.integer("a status word", 0, std::numeric_limits<std::uint32_t>::max()));
-  r.quality.satellites =
-      static_cast<std::uint8_t>(columns.integer_or_nothing("a number of satellites", 0, 255));
-  r.quality.filter_valid = columns.integer("0 or 1", 0, 1) != 0;
-  r.quality.utc_ns = columns.integer_or_nothing("a time in whole nanoseconds", 0, kMax);
+    fields.refuse(fmt::format(
+        "the quaternion has the length {:.3g} instead of 1; the line is damaged", length));
+  s.position_sigma = fields.sigma();
+  s.height_sigma = fields.sigma();
+  s.velocity_sigma = fields.sigma();
+  s.tilt_sigma = fields.sigma() / kDegreesPerRadian;
+  s.heading_sigma = fields.sigma() / kDegreesPerRadian;
+  r.quality.status =
+      static_cast<std::uint32_t>(fields.integer(0, std::numeric_limits<std::uint32_t>::max()));
+  r.quality.satellites = static_cast<std::uint8_t>(fields.integer(0, 255, true));
+  r.quality.filter_valid = fields.integer(0, 1) != 0;
+  r.quality.utc_ns = fields.integer(0, kMax, true);
   r.quality.utc_valid = r.quality.utc_ns != 0;
   return r;
 }
@@ -176,12 +181,7 @@ std::vector<InsRecord> read_ins_file(const fs::path& file) {
     refuse(file, 1, "is not the first line of an ins.csv; pass a file that `vergence run` wrote");
   std::vector<InsRecord> records;
   while (lines.next(&line)) {
-    std::array<std::string_view, kColumns> fields;
-    const std::size_t count = split(line, ',', fields);
-    if (count != kColumns)
-      refuse(file, lines.number(),
-             fmt::format("has {} columns instead of {}; the line is damaged", count, kColumns));
-    const InsRecord record = parse(Columns(file, lines.number(), fields));
+    const InsRecord record = parse(Fields(file, lines.number(), line));
     if (records.empty() || records.back().sample.stamp < record.sample.stamp)
       records.push_back(record);
   }

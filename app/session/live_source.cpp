@@ -126,24 +126,11 @@ class LiveSource final : public FrameSource {
         c.sync.acquiring.begin(), c.sync.acquiring.begin() + facts_.begin.file.rig.cameras);
     input->skipped = c.dropped_sets + c.sync.missed + *acquiring;
     input->devices = counters();
-    input->time = time_.json(c, devices_);
+    input->time = time_.json(c, devices_.cameras().size(), devices_.ins() != nullptr);
     if (devices_.mock() != nullptr) input->truth = truth_metrics(totals, estimator);
   }
   void print_metrics(const SummaryInput& input, Progress* progress) const override {
-    if (!input.truth || !input.truth->evaluation ||
-        input.truth->evaluation->status != EvaluationStatus::ok)
-      return;
-    const TrajectoryEvaluation& e = *input.truth->evaluation;
-    const SegmentErrors &far = e.segments[0], &near = e.segments[1];
-    const std::string segments =
-        far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
-        : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
-                         : "";
-    progress->print(fmt::format("error against ground truth over {:.1f} m: ATE {:.3f} m{}{}",
-                                e.path_reference, e.ate_se3.rmse, segments,
-                                devices_.ins() != nullptr
-                                    ? " (the report compares with the INS, including its errors)"
-                                    : ""));
+    if (input.truth) print_evaluation("ground truth", input.truth->evaluation, progress);
   }
   [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override {
     if (acquisition_->missing().empty()) return std::nullopt;
@@ -261,37 +248,57 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const {
     const AcquisitionCounters& c = acquisition_->counters();
     std::vector<std::pair<std::string, std::uint64_t>> out{
-        {"sets_complete", c.sync.complete},
-        {"sets_incomplete", c.sync.incomplete},
-        {"pulses_missed", c.sync.missed},
-        {"sets_superseded", c.dropped_sets},
-        {"readings_dropped", c.dropped_readings},
-        {"frames_incomplete", c.incomplete},
-        {"sets_ambiguous", c.sync.ambiguous},
-        {"clock_resets", c.clock_resets},
-        {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
+        {"sets_complete", c.sync.complete},     {"sets_incomplete", c.sync.incomplete},
+        {"sets_superseded", c.dropped_sets},    {"sets_ambiguous", c.sync.ambiguous},
+        {"sets_unreported", c.sync.unreported}, {"sets_pushed_out", c.sync.pushed_out},
+        {"frames_incomplete", c.incomplete},    {"readings_dropped", c.dropped_readings},
+        {"clock_resets", c.clock_resets},       {"pulses", c.pulses},
+        {"pulses_missed", c.sync.missed},       {"pauses", c.pauses},
+        {"pauses_refused", c.pauses_refused}};
+    const auto add = [&out](const std::string& name, std::uint64_t count) {
+      out.emplace_back(name, count);
+    };
     if (exposure_) {
       const ExposureCounters e = exposure_->counters();
-      out.insert(out.end(),
-                 {{"exposure_changes", e.changes},
-                  {"exposure_refused", e.refused},
-                  {"exposure_unequal", e.unequal},
-                  {"exposure_again", e.again},
-                  {"exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000)},
-                  {"gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db)}});
+      add("exposure_changes", e.changes);
+      add("exposure_refused", e.refused);
+      add("exposure_unequal", e.unequal);
+      add("exposure_again", e.again);
+      add("exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000));
+      add("gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db));
     }
-    for (int k = 0; k < facts_.begin.file.rig.cameras; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      const CameraStatistics s = devices_.cameras()[i]->statistics();
+    for (std::size_t k = 0; k < devices_.cameras().size(); ++k) {
+      const CameraStatistics s = devices_.cameras()[k]->statistics();
       const std::string name = fmt::format("camera{}_", k);
-      out.insert(out.end(), {{name + "delivered", s.delivered},
-                             {name + "lost", s.lost},
-                             {name + "underruns", s.underruns},
-                             {name + "starts", s.starts},
-                             {name + "unpaired", c.sync.lost[i]},
-                             {name + "absent", c.sync.absent[i]},
-                             {name + "duplicate", c.sync.duplicate[i]},
-                             {name + "late", c.sync.late[i]}});
+      for (const auto& [what, count] : {std::pair{"delivered", s.delivered},
+                                        {"lost", s.lost},
+                                        {"underruns", s.underruns},
+                                        {"starts", s.starts},
+                                        {"unpaired", c.sync.lost[k]},
+                                        {"absent", c.sync.absent[k]},
+                                        {"duplicate", c.sync.duplicate[k]},
+                                        {"late", c.sync.late[k]},
+                                        {"missed_trigger", c.sync.missed_trigger[k]},
+                                        {"pending", c.sync.acquiring[k]},
+                                        {"acquisitions", c.sync.acquisitions[k]},
+                                        {"contradictions", c.sync.contradictions[k]}})
+        add(name + what, count);
+    }
+    if (devices_.ins() != nullptr) {
+      const InsStatistics s = devices_.ins()->statistics();
+      add("ins_lost", s.lost);
+      add("ins_malformed", s.malformed);
+      add("ins_restarts", s.restarts);
+      add("ins_overruns", s.overruns);
+    }
+    if (devices_.trigger() != nullptr) {
+      const TriggerStatistics s = devices_.trigger()->statistics();
+      add("board_pulses", s.pulses);
+      add("board_lost", s.lost);
+      add("board_malformed", s.malformed);
+      add("board_overruns", s.overruns);
+      add("board_reboots", c.reboots);
+      add("board_starts", s.starts);
     }
     return out;
   }

@@ -116,21 +116,6 @@ SourceEvent make_event(const DecodedPair& pair, std::uint64_t unread) noexcept {
   return event;
 }
 
-void report_enu_errors(const EnuMetrics& earth, double alignment_distance_m, Progress* progress) {
-  const EnuErrors& e = earth.errors;
-  if (e.poses > 0)
-    progress->print(fmt::format(
-        "error against the INS after the alignment: {:.2f} m at the end ({:.2f} % of {:.1f} m), "
-        "maximum {:.2f} m; heading {:.2f} deg RMS, {:.2f} deg at the end",
-        e.horizontal_end_m, e.ins_path_m > 0 ? 100 * e.horizontal_end_m / e.ins_path_m : 0,
-        e.ins_path_m, e.horizontal_max_m, e.heading_rms_deg, e.heading_end_deg));
-  else
-    progress->print(
-        fmt::format("not compared with the INS: the alignment needs {:g} m with a fix "
-                    "(comparison.alignment_distance_m)",
-                    alignment_distance_m));
-}
-
 /// A recorded drive as the source of a session. Nothing is dropped; an INS that was recorded comes
 /// in the order of its stamps, before the frames that are not older.
 ///
@@ -215,28 +200,7 @@ class RecordedSource final : public FrameSource {
     input->skipped = skipped_;
   }
   void print_metrics(const SummaryInput& input, Progress* progress) const override {
-    if (input.evaluation && input.evaluation->status == EvaluationStatus::ok) {
-      const TrajectoryEvaluation& e = *input.evaluation;
-      const SegmentErrors& near = e.segments[1];
-      const std::string segments =
-          near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation)
-                         : "";
-      progress->print(
-          fmt::format("error against the reference over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m "
-                      "(Sim(3), scale {:.4f}){}",
-                      e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
-      if (!facts_.ins)
-        progress->print(fmt::format("next: vergence evaluate {} {}",
-                                    (request_.session.out / "trajectory.tum").string(),
-                                    request_.data.string()));
-    } else if (!facts_.ins) {
-      progress->print(
-          fmt::format("no reference to compare with; next: vergence evaluate {} REFERENCE",
-                      (request_.session.out / "trajectory.tum").string()));
-    }
-    if (facts_.ins)
-      report_enu_errors(*input.earth, request_.configuration.comparison.alignment_distance_m,
-                        progress);
+    print_evaluation("the reference", input.evaluation, progress);
   }
 
  private:

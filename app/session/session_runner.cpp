@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -15,13 +17,15 @@
 
 #include <fmt/format.h>
 
+#include "app/report/report.hpp"
+#include "app/runtime/durable_file.hpp"
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/service_manager.hpp"
+#include "app/runtime/terminal_text.hpp"
 #include "app/session/calibration_writer.hpp"
 #include "app/session/drive_recorder.hpp"
 #include "app/session/drive_threads.hpp"
 #include "app/session/estimation_loop.hpp"
-#include "app/session/session_files.hpp"
 #include "app/session/session_quota.hpp"
 #include "core/memory/allocation_guard.hpp"
 
@@ -44,7 +48,7 @@ class SessionRunner {
   [[nodiscard]] ExitCode run() {
     std::vector<std::string> faults;
     open();
-    if (request_.print_memory) print_memory_table(memory());
+    if (request_.print_memory) print_memory_table();
     Progress progress = Progress::on_stderr(request_.quiet);
     const auto allocations_before = AllocationGuard::runtime_allocations();
     print_remarks(&progress);
@@ -76,11 +80,10 @@ class SessionRunner {
     // Assigning {} would keep the memory.
     totals->trajectory = std::vector<StampedPose>();
     totals->reference = std::vector<StampedPose>();
-    const SessionReport report = write_session_report(request_.out);
-    ExitCode code = verdict(*totals, faults, &progress);
-    if (code == ExitCode::done && !report.outcome.assessment.usable) code = ExitCode::not_usable;
-    print_verdict(report, request_.quiet, &progress);
-    return signals_.stop_code().value_or(code);
+    const ExitCode code = verdict(*totals, faults, &progress);
+    const bool usable = report(&progress);
+    return signals_.stop_code().value_or(code == ExitCode::done && !usable ? ExitCode::not_usable
+                                                                           : code);
   }
 
  private:
@@ -239,24 +242,38 @@ class SessionRunner {
       input.comparison = comparison->counters();
       input.earth = comparison->earth(facts_.ins->mount_source);
     }
-    describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(), &input);
+    const Estimator& estimator = loop_.estimator();
+    input.calibrated = estimator.calibrated();
+    input.online = loop_.options().online;
+    input.verified = input.online && estimator.verified();
+    input.calibration = estimator.calibration();
+    input.calibration_source = totals.accepted > 0 ? "online" : facts_.begin.source;
+    if (facts_.begin.trust != CalibrationTrust::none) input.before = facts_.begin.file.rig;
+    input.options = loop_.options().calibration;
     input.runtime_allocations = allocations;
     input.frame_budget = loop_.options().frame_budget;
     input.allocations = threads_.allocations();
-    for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
+    input.memory = memory();
     input.configuration_hash = configuration_hash(configuration_);
     input.assumptions = facts_.assumptions;
-    source_.describe(totals, loop_.estimator(), &input);
+    source_.describe(totals, estimator, &input);
     for (SessionObserver* observer : observers_)
       for (auto& counter : observer->counters()) input.devices.push_back(std::move(counter));
     return input;
   }
   void write_files(const SessionTotals& totals, const SummaryInput& input,
                    std::vector<std::string>* faults, Progress* progress) {
-    write_session_summary(request_.out, totals, input, faults);
+    try {
+      // Names of files need not be UTF-8.
+      replace_durably(request_.out / "summary.json",
+                      summary_json(totals, input)
+                              .dump(2, ' ', false, nlohmann::json::error_handler_t::replace) +
+                          "\n");
+    } catch (const InputError& e) {
+      faults->emplace_back(e.what());
+    }
     faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-    for (const std::string& message : recorder_->pop_errors())
-      progress->print("vergence: " + message);
+    print_recording_errors(progress);
     for (const std::string& message : *faults) progress->print("vergence: " + message);
   }
   void print_metrics(const SessionTotals& totals, const SummaryInput& input,
@@ -267,8 +284,12 @@ class SessionRunner {
                     request_.out.string(), totals.read, totals.ok + totals.degraded,
                     totals.degraded, totals.lost, input.skipped, facts_.skipped_label,
                     totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
-    if (const std::string message = verification_message(input); !message.empty())
-      progress->print(message);
+    if (input.calibrated && !input.online)
+      progress->print("the calibration is not verified: calibration.online is off");
+    else if (input.calibrated && !input.verified)
+      progress->print(
+          "the calibration was never verified; drive turns past near objects, with tracks in the "
+          "image corners");
     if (const std::string message = allocations_message(input.allocations);
         request_.print_memory && !message.empty())
       progress->print(message);
@@ -292,14 +313,53 @@ class SessionRunner {
     }
     return faults.empty() ? ExitCode::done : ExitCode::not_written;
   }
-  [[nodiscard]] std::vector<MemoryRow> memory() const {
-    return {{"estimator_bytes", loop_.estimator_arena().used(), loop_.estimator_arena().rows()},
+  /// Writes report.html and prints the closing lines; with `quiet` only those that must not be
+  /// missed. Returns false if no pose can be relied on.
+  [[nodiscard]] bool report(Progress* progress) const {
+    ReportOutcome outcome;
+    try {
+      outcome = write_report(request_.out);
+    } catch (const InputError& e) {
+      progress->print(std::string("vergence: ") + e.what());
+      return true;
+    }
+    if (request_.quiet) {
+      if (!outcome.assessment.usable)
+        progress->print("vergence: do not use these poses: " + outcome.assessment.main_reason);
+      return outcome.assessment.usable;
+    }
+    // Number of columns.
+    constexpr std::size_t kWidth = 110;
+    for (const std::string& message : closing_lines(outcome))
+      progress->print(fmt::format("{}", fmt::join(wrapped(message, kWidth), "\n  ")));
+    return outcome.assessment.usable;
+  }
+  /// Bytes by component.
+  [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const {
+    return {{"estimator_bytes", loop_.estimator_arena().used()},
             {"comparison_bytes",
              loop_.comparison_arena().used() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
             {"images_bytes", facts_.image_bytes},
             {"recording_bytes", recording_ ? recording_->memory() : 0},
             {"recorder_bytes", recorder_->memory() + calibrations_->memory()},
             {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
+  }
+  /// Prints the components on stdout, and the parts of the estimator's arena, the largest first.
+  void print_memory_table() const {
+    const auto print = [](const std::string& name, std::size_t bytes) {
+      fmt::print("{:<44}{:>14}\n", name, bytes);
+    };
+    std::size_t sum = 0;
+    for (const auto& [name, bytes] : memory()) {
+      print(name, bytes);
+      sum += bytes;
+    }
+    print("total_bytes", sum);
+    const auto rows = loop_.estimator_arena().rows();
+    std::vector<ArenaRow> parts(rows.begin(), rows.end());
+    std::ranges::stable_sort(parts, std::greater<>(), &ArenaRow::bytes);
+    for (const ArenaRow& part : parts) print(fmt::format("  {}", part.name), part.bytes);
+    (void)std::fflush(stdout);
   }
 
   FrameSource& source_;

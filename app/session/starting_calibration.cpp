@@ -55,24 +55,15 @@ bool placed_by_configuration(const Configuration& c, int cameras) {
 /// been replaced by its like.
 void check_same_rig(const std::string& name, const CalibrationFile& file,
                     const CalibrationFile& configured, std::vector<std::string>* remarks) {
-  if (file.rig.cameras != configured.rig.cameras)
-    throw InputError(fmt::format(
-        "{}: has {} cameras, but the configuration has {}; use the calibration of this rig", name,
-        file.rig.cameras, configured.rig.cameras));
-  for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
-    const Intrinsics &in_file = file.rig.intrinsics[k], &expected = configured.rig.intrinsics[k];
-    if (in_file.width != expected.width || in_file.height != expected.height)
-      throw InputError(
-          fmt::format("{}: is for images of {} x {} pixels, but cameras.{}.size is {} x {}; use "
-                      "the calibration of this image size",
-                      name, in_file.width, in_file.height, k, expected.width, expected.height));
+  if (const std::string other = other_images(file.rig, configured.rig); !other.empty())
+    throw InputError(name + ": " + other + "; use the calibration of this rig and image size");
+  for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k)
     if (!file.serials[k].empty() && !configured.serials[k].empty() &&
         file.serials[k] != configured.serials[k])
       remarks->push_back(
           fmt::format("{}: is of a camera {} with the serial \"{}\", but the connected one has "
                       "\"{}\"; check that it is the right calibration",
                       name, k, file.serials[k], configured.serials[k]));
-  }
   // Images show no length.
   const double found_m = file.rig.baseline, expected_m = configured.rig.baseline;
   if (std::abs(found_m - expected_m) >= kOtherLength * expected_m)

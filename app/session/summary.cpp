@@ -230,6 +230,21 @@ EvaluationOptions summary_evaluation_options() {
   return options;
 }
 
+void print_evaluation(const char* reference, const std::optional<TrajectoryEvaluation>& evaluation,
+                      Progress* progress) {
+  if (!evaluation || evaluation->status != EvaluationStatus::ok) return;
+  const TrajectoryEvaluation& e = *evaluation;
+  const SegmentErrors &far = e.segments[0], &near = e.segments[1];
+  const std::string segments =
+      far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
+      : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
+                       : "";
+  progress->print(fmt::format(
+      "error against {} over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m (Sim(3), scale "
+      "{:.4f}){}",
+      reference, e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
+}
+
 std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& estimate,
                                                       const RigCalibration& truth) {
   std::vector<std::array<double, 6>> errors;

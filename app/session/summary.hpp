@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/progress.hpp"
 #include "app/session/ins_comparison.hpp"
 #include "app/session/session_totals.hpp"
 #include "core/calibration/options.hpp"
@@ -82,6 +83,10 @@ struct SummaryInput {
 /// Options of the metrics in summary.json: segments of 100–800 m (step 10), 10–50 m
 /// (step 1), and these once more after one scale.
 [[nodiscard]] EvaluationOptions summary_evaluation_options();
+
+/// Prints the absolute and the relative error against what `reference` names, if there is one.
+void print_evaluation(const char* reference, const std::optional<TrajectoryEvaluation>& evaluation,
+                      Progress* progress);
 
 /// Error of a calibration against the true one: rotation vector in rad and translation in m, which
 /// lead from the true transform of each camera k ≥ 1 to the estimated one (left perturbation).

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <utility>
 
@@ -59,14 +58,6 @@ Json clock_json(const std::string& device, const ClockRecord& clock) {
           {"worst_error_us", rounded(us(clock.worst_error()))}};
 }
 
-Json latency_json(const TimeHistogram& latency, bool is_virtual) {
-  if (latency.count() == 0) return nullptr;
-  Json json = {{"mean", rounded(latency.mean())}};
-  json.update(distribution_json(latency));
-  json["virtual"] = is_virtual;
-  return json;
-}
-
 }  // namespace
 
 SourceEvent TimingMonitor::of_device(const DeviceEvent& event) noexcept {
@@ -98,13 +89,10 @@ std::optional<SourceEvent> TimingMonitor::of_reading(const InsRecord& reading) n
   any_quality_ = true;
   quality_ = q;
   fix_ = reading.sample.fix;
-  std::array<char, 32> satellites{};
-  if (count > 0)
-    (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
   // A device that reports no filter state has no status either.
   const bool given = q.status != 0 || q.filter_valid;
-  return SourceEvent{EventRecord(reading.sample.stamp, "ins_status", "the INS has {}{}{}",
-                                 fix_name(fix_), satellites.data(),
+  return SourceEvent{EventRecord(reading.sample.stamp, "ins_status",
+                                 "the INS has {}, {} satellites{}", fix_name(fix_), count,
                                  !given           ? ""
                                  : q.filter_valid ? ", filter valid"
                                                   : ", filter not valid")};
@@ -116,8 +104,7 @@ std::optional<SourceEvent> TimingMonitor::of_utc(const InsRecord& reading) noexc
   if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return std::nullopt;
   const double ahead =
       static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
-  if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return std::nullopt;
-  utc_reported_ = true;
+  if (reported_ahead_s_ && std::abs(ahead - *reported_ahead_s_) < kStep) return std::nullopt;
   reported_ahead_s_ = ahead;
   return SourceEvent{EventRecord(
       reading.sample.stamp, "utc_offset",
@@ -128,74 +115,36 @@ std::optional<SourceEvent> TimingMonitor::of_utc(const InsRecord& reading) noexc
 void TimingMonitor::record_pose(const AcquiredFrame& frame, float estimate_ms,
                                 HostStamp now) noexcept {
   const SyncedSet& set = frame.set;
-  const double ms =
-      virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + static_cast<double>(estimate_ms)
-               : (now - set.stamp).to_seconds() * 1e3;
-  latency_.add(ms);
+  latency_.add(virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + double{estimate_ms}
+                        : (now - set.stamp).to_seconds() * 1e3);
 }
 
-nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
-                                           const DriveDevices& devices) const {
-  Json clocks = Json::array(), board = Json::object(), ins = Json::object(),
-       cameras = Json::array();
-  bool all_verified = verifies_pairing(mode_);
-  for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
+nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c, std::size_t cameras,
+                                           bool has_ins) const {
+  Json clocks = Json::array();
+  const bool verifiable = verifies_pairing(mode_);
+  bool verified = verifiable;
+  for (std::size_t k = 0; k < cameras; ++k) {
     clocks.push_back(clock_json(fmt::format("camera {}", k), c.cameras[k]));
-    const CameraStatistics s = devices.cameras()[k]->statistics();
-    all_verified = all_verified && c.verified[k];
-    cameras.push_back({{"verified", verifies_pairing(mode_) && c.verified[k]},
-                       {"acquisitions", c.sync.acquisitions[k]},
-                       {"losses",
-                        {{"missed_trigger", c.sync.missed_trigger[k]},
-                         {"lost", c.sync.lost[k]},
-                         {"pairing_pending", c.sync.acquiring[k]},
-                         {"contradictions", c.sync.contradictions[k]},
-                         {"late", c.sync.late[k]},
-                         {"duplicate", c.sync.duplicate[k]},
-                         {"absent", c.sync.absent[k]},
-                         {"incomplete", s.incomplete},
-                         {"underruns", s.underruns}}}});
+    verified = verified && c.verified[k];
   }
   if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
-  if (devices.ins() != nullptr) {
-    clocks.push_back(clock_json("INS", c.ins));
-    const InsStatistics s = devices.ins()->statistics();
-    ins = {{"lost", s.lost},
-           {"malformed", s.malformed},
-           {"restarts", s.restarts},
-           {"overruns", s.overruns},
-           {"dropped", c.dropped_readings}};
+  if (has_ins) clocks.push_back(clock_json("INS", c.ins));
+  Json latency;
+  if (latency_.count() > 0) {
+    latency = {{"mean", rounded(latency_.mean())}};
+    latency.update(distribution_json(latency_));
+    latency["virtual"] = virtual_;
   }
-  if (devices.trigger() != nullptr) {
-    const TriggerStatistics s = devices.trigger()->statistics();
-    board = {{"pulses", s.pulses},     {"lost", s.lost},       {"malformed", s.malformed},
-             {"overruns", s.overruns}, {"reboots", c.reboots}, {"starts", s.starts}};
-  }
-  const Json pairing = {{"mode", to_string(mode_)},
-                        {"message", proof_message(mode_)},
-                        {"verifiable", verifies_pairing(mode_)},
-                        {"verified", all_verified},
-                        {"worst_acquisition_s", rounded(c.sync.worst_acquisition.to_seconds())},
-                        {"pauses", c.pauses},
-                        {"pauses_refused", c.pauses_refused},
-                        {"sets",
-                         {{"complete", c.sync.complete},
-                          {"incomplete", c.sync.incomplete},
-                          {"ambiguous", c.sync.ambiguous},
-                          {"unreported", c.sync.unreported},
-                          {"pulses", c.pulses},
-                          {"pulses_missed", c.sync.missed},
-                          {"pushed_out", c.sync.pushed_out},
-                          {"overtaken", c.dropped_sets},
-                          {"frames_incomplete", c.incomplete}}},
-                        {"cameras", cameras}};
   return {{"clocks", clocks},
-          {"clock_resets", c.clock_resets},
           {"worst_stamp_error_us", rounded(static_cast<double>(c.worst_stamp_error_ns) * 1e-3)},
-          {"pairing", pairing},
-          {"board", board},
-          {"ins", ins},
-          {"latency_ms", latency_json(latency_, virtual_)}};
+          {"pairing",
+           {{"mode", to_string(mode_)},
+            {"message", proof_message(mode_)},
+            {"verifiable", verifiable},
+            {"verified", verified},
+            {"worst_acquisition_s", rounded(c.sync.worst_acquisition.to_seconds())}}},
+          {"latency_ms", latency}};
 }
 
 }  // namespace vergence::app

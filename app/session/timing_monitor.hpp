@@ -3,15 +3,14 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/devices/drive_devices.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/session_totals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 
 namespace vergence::app {
 
-/// Timing of a session: clocks, pairing, latencies, its stamps against the INS's UTC. Events
-/// as messages, figures for summary.json.
+/// Timing of a session: clocks, pairing and latencies. Events as messages, figures for
+/// summary.json.
 ///
 /// Threads  note…(): the estimator's, sealed. json(): any, after that has joined. Memory: fixed;
 ///          messages are in place.
@@ -33,7 +32,7 @@ class TimingMonitor {
 
   /// The block `time` of summary.json.
   [[nodiscard]] nlohmann::ordered_json json(const AcquisitionCounters& counters,
-                                            const DriveDevices& devices) const;
+                                            std::size_t cameras, bool has_ins) const;
 
  private:
   [[nodiscard]] std::optional<SourceEvent> of_utc(const InsRecord& reading) noexcept;
@@ -46,9 +45,9 @@ class TimingMonitor {
   // Quality reported last.
   InsQuality quality_{};
   FixStatus fix_ = FixStatus::none;
-  bool any_quality_ = false, utc_reported_ = false;
+  bool any_quality_ = false;
   // Last reported lead of the session's stamps over the INS's UTC, in s.
-  double reported_ahead_s_ = 0;
+  std::optional<double> reported_ahead_s_{};
 };
 
 }  // namespace vergence::app

@@ -61,7 +61,6 @@ function showNow(now) {
     ["exposure spread", number(now.spread_us, 1) + " µs"],
     ["pairing", now.pairing],
     ["residual", number(now.reprojection_px, 2) + " px"],
-    ["pose stream, age p99", now.line_age_p99_ms === null || now.line_age_p99_ms === undefined ? "off" : number(now.line_age_p99_ms, 1) + " ms"],
     ["latitude", now.enu ? number(now.enu.latitude_deg, 6) + "°" : "not aligned yet"],
     ["longitude", now.enu ? number(now.enu.longitude_deg, 6) + "°" : "not aligned yet"],
     ["heading", now.enu ? number(now.enu.heading_deg, 1) + "°" : "not aligned yet"],

@@ -148,14 +148,14 @@ def drive(machine, session, more, limit=240):
 def look(machine, session):
     """What a session that was closed holds; → its summary."""
     summary = json.loads(done(machine, "cat %s/%s/summary.json" % (SESSIONS, session)))
-    frames, board = summary["frames"], summary["time"]["board"]
+    frames, devices = summary["frames"], summary["devices"]
     statuses = done(machine, "tail -n +2 %s/%s/poses.csv | cut -d, -f4,5 | sort | uniq -c" % (SESSIONS, session))
     say("session %s: %d frames read, %d posed; statuses: %s; %d readings of the INS; %d pulses of the board, %d lost; drops %s" % (
         session, frames["read"], frames["posed"], "; ".join(" ".join(line.split()) for line in statuses.splitlines()),
-        summary["comparison"]["ins_samples"], board["pulses"] if board else 0, board["lost"] if board else 0, summary["drops"]["frames"]))
+        summary["comparison"]["ins_samples"], devices["board_pulses"], devices["board_lost"], summary["drops"]["frames"]))
     need(frames["read"] > 0 and frames["read"] == sum(frames[word] for word in ("ok", "degraded", "lost")), "frames without a status")
     need(summary["comparison"]["ins_samples"] > 0, "no reading of the INS")
-    need(board and board["pulses"] > 0, "no pulse of the board")
+    need(devices["board_pulses"] > 0, "no pulse of the board")
     done(machine, "test -s %s/%s/report.html" % (SESSIONS, session))
     return summary
 

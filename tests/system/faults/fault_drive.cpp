@@ -43,7 +43,7 @@ FaultDrive drive_with_faults(const FaultCase& c) {
     d.poses.push_back({frame.stamp, frame.status, frame.T_world_left});
     d.at_s.push_back((frame.stamp - start).to_seconds());
     if (d.at_s.back() >= c.from_s && frame.status != PoseStatus::ok)
-      ++d.reasons[session.reasons[frame.reason]];
+      ++d.reasons[std::string(to_string(frame.reason))];
   }
   for (const app::report::Event& event : session.events)
     if ((event.stamp - start).to_seconds() >= c.from_s) ++d.events[event.kind];
@@ -51,7 +51,7 @@ FaultDrive drive_with_faults(const FaultCase& c) {
     d.truth = app::read_tum(folder / "s" / "truth.tum");
   d.summary = session.summary;
   // An error without truth beside it would be none.
-  d.whole = session.not_had().empty() && std::filesystem::exists(folder / "s" / "report.html") &&
+  d.whole = session.missing.empty() && std::filesystem::exists(folder / "s" / "report.html") &&
             !d.truth.empty() && !d.poses.empty() &&
             d.truth.back().stamp + Duration::seconds(1) >= d.poses.back().stamp &&
             d.at_s.back() >= c.duration_s - (c.system.empty() ? 1 : kStarting);

@@ -161,9 +161,10 @@ TEST(BoardRun, triggerBoardCamerasAndInsMakeOneSession) {
   expect_a_drive(out, summary, film);
   const auto& pairing = summary.at("time").at("pairing");
   EXPECT_TRUE(pairing.at("verified").get<bool>());
-  EXPECT_EQ(pairing.at("sets").at("ambiguous").get<int>(), 0);
-  for (const auto& camera : pairing.at("cameras"))
-    EXPECT_EQ(camera.at("acquisitions").get<int>(), 1);
+  const auto& devices = summary.at("devices");
+  EXPECT_EQ(devices.at("sets_ambiguous").get<int>(), 0);
+  for (const char* name : {"camera0_acquisitions", "camera1_acquisitions"})
+    EXPECT_EQ(devices.at(name).get<int>(), 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Buses, IidcRun,

@@ -234,7 +234,7 @@ TEST(Run, impossibleSettingIsNamedAndExitsTwo) {
         std::pair{"--fault knok@3", "unknown fault \"knok\""},
         std::pair{"--fault 'cover@1 camera=3'", "there is no camera 3"},
         std::pair{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
-        std::pair{"--duration=-1", "--duration must be above 0"}}) {
+        std::pair{"--duration=-1", "--duration: \"-1\" must be"}}) {
     const TemporaryFolder folder;
     const Outcome o = drive(folder / "s", arguments);
     EXPECT_EQ(o.code, 2) << o.err;

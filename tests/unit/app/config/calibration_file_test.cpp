@@ -339,8 +339,8 @@ TEST(CalibrationCovariance, wrongCovarianceIsRefusedWithReason) {
             "not a parameter"},
            // An equidistant lens has no p1.
            {with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters", "not a parameter"},
-           {with_block("[right.rx, 1.rx]", "[1, 0, 1]"),
-            "c.yaml:7: covariance.parameters has 1.rx twice"},
+           {with_block("[right.rx, right.rx]", "[1, 0, 1]"),
+            "c.yaml:7: covariance.parameters has right.rx twice"},
            {with_block("[]", "[]"), "c.yaml:7: covariance.parameters is not a list of parameters"},
            {with_block("right.rx", "[1]"),
             "c.yaml:7: covariance.parameters is not a list of parameters"},

@@ -100,7 +100,7 @@ TEST(ImageFileNames, cameraNamesGiveFileNames) {
   Configuration c;
   c.cameras[0].name = "../left eye";
   c.cameras[2].name = "camera1";
-  EXPECT_EQ(camera_names(c, 3), (std::vector<std::string>{"___left_eye", "camera1", "camera1_2"}));
+  EXPECT_EQ(camera_names(c, 3), (std::vector<std::string>{"___left_eye", "camera1", "camera1_1"}));
 }
 
 Configuration example(const std::string& name) {

@@ -60,25 +60,23 @@ TEST(LiveState, sendsChangesSinceAVersion) {
   report.pose.reason = Reason::few_inliers;
   add_frame(&state, report);
   state.add(event("mark", "a <b>mark</b> \xff"));
-  const json first = state.since(0, kNow, -1);
+  const json first = state.since(0, kNow);
   EXPECT_EQ(first["session"], "a drive");
   EXPECT_FALSE(first["ended"].get<bool>());
   EXPECT_EQ(first["now"]["frame"], 41);
   EXPECT_EQ(first["now"]["read"], 3);
   EXPECT_EQ(first["now"]["status"], "degraded");
   EXPECT_NE(first["now"]["advice"], "");
-  EXPECT_TRUE(first["now"]["line_age_p99_ms"].is_null());
   EXPECT_EQ(first["trail"].size(), 2U);
   EXPECT_EQ(first["events"].size(), 1U);
   EXPECT_TRUE(first.contains("calibration"));
   add_frame(&state, at(2));
-  const json second = state.since(first["version"], kNow, 3.25);
+  const json second = state.since(first["version"], kNow);
   EXPECT_EQ(second["trail"], json::parse("[[0.0,0.0,2.0,0]]"));
   EXPECT_EQ(second["trail_from"], 2);
   EXPECT_TRUE(second["events"].empty());
   EXPECT_FALSE(second.contains("calibration"));
-  EXPECT_EQ(second["now"]["line_age_p99_ms"], 3.25);
-  EXPECT_EQ(state.since(0, kNow, -1)["trail"].size(), 3U);
+  EXPECT_EQ(state.since(0, kNow)["trail"].size(), 3U);
 }
 
 TEST(LiveState, longTrailIsThinnedOverItsWholeLength) {
@@ -89,13 +87,13 @@ TEST(LiveState, longTrailIsThinnedOverItsWholeLength) {
   for (int i = 0; i < 50'000; ++i) {
     add_frame(&state, at(i));
     if (i % 100 != 0) continue;
-    const json update = state.since(version, kNow, -1);
+    const json update = state.since(version, kNow);
     version = update["version"];
     const auto from = update["trail_from"].get<std::size_t>();
     anew = anew || from < reported;
     reported = from + update["trail"].size();
   }
-  const json trail = state.since(0, kNow, -1)["trail"];
+  const json trail = state.since(0, kNow)["trail"];
   EXPECT_TRUE(anew);
   EXPECT_LE(trail.size(), LiveTrail::kMax);
   EXPECT_GE(trail.size(), LiveTrail::kMax / 2);
@@ -112,7 +110,7 @@ struct Map {
 
 Map map_of(const LiveState& state) {
   Map out;
-  const json trail = state.since(0, kNow, -1)["trail"];
+  const json trail = state.since(0, kNow)["trail"];
   out.places = trail.size();
   for (std::size_t i = 0; i < trail.size(); ++i) {
     if (trail[i][3] == 1) ++out.degraded;
@@ -150,7 +148,7 @@ TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
   LiveState state;
   for (int i = 0; i < 100; ++i) add_frame(&state, come(50 + 0.05 * i));
   const auto now = [&](double seconds) {
-    return state.since(0, HostStamp(Duration::seconds(seconds).ns()), -1)["now"];
+    return state.since(0, HostStamp(Duration::seconds(seconds).ns()))["now"];
   };
   EXPECT_FALSE(now(55.5)["silent"].get<bool>());
   const json silent = now(67.95);
@@ -164,24 +162,24 @@ TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
 TEST(LiveState, keepsNewestEventsAndCalibrations) {
   LiveState state;
   for (int i = 0; i < 1000; ++i) state.add(event("mark", std::to_string(i)));
-  const json events = state.since(0, kNow, -1)["events"];
+  const json events = state.since(0, kNow)["events"];
   EXPECT_EQ(events.size(), LiveState::kEvents);
   EXPECT_EQ(events.back()["message"], "999");
   for (int i = 0; i < 100; ++i) state.add(calibration(true, -0.5));
-  EXPECT_EQ(state.since(0, kNow, -1)["calibration"]["history"].size(), LiveState::kCalibrations);
+  EXPECT_EQ(state.since(0, kNow)["calibration"]["history"].size(), LiveState::kCalibrations);
 }
 
 TEST(LiveState, calibrationHasTwoSigmaAndMeasuredOne) {
   LiveState state;
   state.add(calibration(false, -0.75));
-  json c = state.since(0, kNow, -1)["calibration"];
+  json c = state.since(0, kNow)["calibration"];
   EXPECT_FALSE(c["verified"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["parameters"][3][0], -750.0);
   EXPECT_TRUE(c["cameras"][1]["parameters"][3][1].is_null()) << "given without a sigma";
   EXPECT_FALSE(c.contains("measured"));
   state.add(event("calibration_verified", ""));
   state.add(calibration(true, -0.751));
-  c = state.since(0, kNow, -1)["calibration"];
+  c = state.since(0, kNow)["calibration"];
   EXPECT_TRUE(c["verified"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["parameters"][3][0], -750.0) << "what is in use stays";
   EXPECT_EQ(c["measured"][1]["parameters"][3][0], -751.0);

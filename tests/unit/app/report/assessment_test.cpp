@@ -35,7 +35,6 @@ struct Case {
                        {"runtime_allocations", 0}};
     analysis.read = analysis.ok = 1000;
     analysis.ok_share = 1.0;
-    analysis.by_reason = {0};
     analysis.source = ErrorSource::reference;
     analysis.drift = 0.008;
     analysis.scale = 1.001;
@@ -135,10 +134,10 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
        "no calibration was found"},
       {"waited for the first confirmation",
        [](Case& c) {
-         c.session.reasons.emplace_back("unverified_calibration");
          c.frames_of(400, 0);
          c.analysis.waited = 400, c.analysis.verified_s = 20;
-         c.analysis.by_reason = c.analysis.waited_by_reason = {0, 400};
+         constexpr auto kReason = static_cast<std::size_t>(Reason::unverified_calibration);
+         c.analysis.by_reason[kReason] = c.analysis.waited_by_reason[kReason] = 400;
          c.given(true);
        },
        good},
@@ -196,7 +195,7 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
       {"a camera that never came back",
        event(49.96, "camera_disconnected", "camera 1 is disconnected; check it"), bad,
        "no frame after 50.0 s: camera 1 was disconnected",
-       "Camera 1 was disconnected from 50.0 s on, to the end"},
+       "Camera 1 was disconnected once, to the end"},
       {"a board that never came back", event(49.96, "trigger_board_disconnected", "x"), bad,
        "the trigger board was disconnected"},
       {"a camera that the others drove on without",
@@ -217,12 +216,6 @@ TEST(Assessment, everyFindingHasGradeReasonAndAdvice) {
       {"a short outage leaves lengths to be judged",
        [](Case& c) { c.analysis.scale = 1.045, c.outage(20, 23); }, care, "lengths are 4",
        "Lengths disagree"},
-      {"an outage after the frames that are read",
-       [](Case& c) {
-         c.session.left_out = {"poses.csv has more lines"};
-         c.event(70, "camera_disconnected", "camera 0 is disconnected");
-       },
-       care, "longer than the report reads"},
   };
   for (const Row& row : rows) {
     SCOPED_TRACE(row.name);
@@ -253,11 +246,10 @@ TEST(Assessment, worstReasonComesFirst) {
 TEST(Assessment, everyReasonOfPoseHasAdvice) {
   for (int i = 1; i <= static_cast<int>(Reason::pairing_ambiguous); ++i) {
     Case c;
-    c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
-    c.analysis.by_reason = {0, 3};
+    c.analysis.by_reason[static_cast<std::size_t>(i)] = 3;
     c.event(1, "rig_changed");
     EXPECT_TRUE(any_has(assess(c.session, c.analysis).advice, "3 frames"))
-        << c.session.reasons.back();
+        << to_string(static_cast<Reason>(i));
     c.session.events.clear();
     if (static_cast<Reason>(i) == Reason::recalibrating) {
       EXPECT_FALSE(any_has(assess(c.session, c.analysis).advice, "knocked")) << "a passing doubt";
@@ -266,12 +258,12 @@ TEST(Assessment, everyReasonOfPoseHasAdvice) {
 }
 
 /// Frames that are all degraded for one reason, the last `lost` of them without a pose.
-Session degraded_drive(std::size_t frames, const char* reason, std::size_t lost = 0) {
-  Session s{.reasons = {"", reason}};
+Session degraded_drive(std::size_t frames, Reason reason, std::size_t lost = 0) {
+  Session s;
   for (std::size_t i = 0; i < frames; ++i) {
     Frame f{.stamp = at(0.1 * static_cast<double>(i)), .posed = i + lost < frames};
     f.status = f.posed ? PoseStatus::degraded : PoseStatus::lost;
-    f.reason = 1;
+    f.reason = reason;
     s.frames.push_back(f);
   }
   s.summary = nlohmann::json::object();
@@ -285,32 +277,34 @@ TEST(Usability, driveWithoutOkFrameIsNotUsable) {
     std::string main_reason;
   };
   std::vector<Drive> drives{
-      {degraded_drive(100, "few_inliers"), false, "few_inliers (100 of 100 frames)"},
-      {degraded_drive(30, "few_inliers"), false, "few_inliers"},
-      {degraded_drive(40, "cameras_swapped", 40), false, "no frame has a pose: cameras_swapped"},
-      {degraded_drive(30, "unverified_calibration", 10), false, ""},
+      {degraded_drive(100, Reason::few_inliers), false, "few_inliers (100 of 100 frames)"},
+      {degraded_drive(30, Reason::few_inliers), false, "few_inliers"},
+      {degraded_drive(40, Reason::cameras_swapped, 40), false,
+       "no frame has a pose: cameras_swapped"},
+      {degraded_drive(30, Reason::unverified_calibration, 10), false, ""},
   };
-  for (const char* waits : {"unverified_calibration", "uncalibrated"}) {
+  for (const Reason waits : {Reason::unverified_calibration, Reason::uncalibrated}) {
     drives.push_back({degraded_drive(59, waits), true, ""});
-    drives.push_back({degraded_drive(60, waits), false, waits});
+    drives.push_back({degraded_drive(60, waits), false, std::string(to_string(waits))});
   }
   // Why no calibration was found is the main reason.
-  drives.push_back({degraded_drive(100, "uncalibrated"), false, "the right camera is on the left"});
+  drives.push_back(
+      {degraded_drive(100, Reason::uncalibrated), false, "the right camera is on the left"});
   CalibrationRow rejected{.reason = "the right camera is on the left"};
   drives.back().session.calibrations = {rejected};
   // Frames that stand still confirm nothing: fifty moved.
-  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  drives.push_back({degraded_drive(100, Reason::unverified_calibration), true, ""});
   drives.back().session.summary = {{"calibration", {{"baseline_m", 0.5}}}};
   for (std::size_t i = 50; i < 100; ++i)
     drives.back().session.frames[i].T_world_left.t.z() = 0.2 * static_cast<double>(i - 50);
   // Frames that were not read are the reason where they are most.
   drives.push_back(
-      {degraded_drive(1, "unverified_calibration"), false, "image_truncated (99 of 100"});
+      {degraded_drive(1, Reason::unverified_calibration), false, "image_truncated (99 of 100"});
   drives.back().session.summary = {{"frames", {{"skipped", 99}}}};
   for (int i = 0; i < 99; ++i)
     drives.back().session.events.push_back({Stamp(i), "image_truncated", ""});
   // One ok frame.
-  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  drives.push_back({degraded_drive(100, Reason::unverified_calibration), true, ""});
   drives.back().session.frames.back().status = PoseStatus::ok;
   for (std::size_t i = 0; i < drives.size(); ++i) {
     const Assessment v = assess(drives[i].session, analyse(drives[i].session));

@@ -66,8 +66,7 @@ TEST(Realtime, refusalIsOneMessageWithTheFix) {
   system.fifo_error = EPERM;
   system.affinity_error = EINVAL;
   system.lock_error = ENOMEM;
-  RealtimeRequest request{.priority = 40, .lock_memory = true};
-  request.affinity = parse_cpu_list("900");
+  RealtimeSettings request{.priority = 40, .affinity = "900", .lock_memory = 1};
   RealtimeThreads threads(request, system);
   const auto memory = threads.lock_memory();
   ASSERT_EQ(memory.size(), 1U);
@@ -95,7 +94,7 @@ TEST(Realtime, kernelSchedulesAsRequested) {
   ASSERT_EQ(::sched_getaffinity(0, sizeof(here), &here), 0);
   unsigned first = 0;
   while (!CPU_ISSET(first, &here)) ++first;
-  RealtimeRequest request{.priority = 10, .affinity = parse_cpu_list(std::to_string(first))};
+  RealtimeSettings request{.priority = 10, .affinity = std::to_string(first)};
   RealtimeSystem system;
   RealtimeThreads threads(request, system);
   std::vector<ProcessThread> all;

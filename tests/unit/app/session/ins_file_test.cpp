@@ -81,21 +81,21 @@ TEST(InsFile, refusalNamesPlaceOfMalformedLine) {
     return refusal(kHead + line_of(reading(0)) + line);
   };
   EXPECT_TRUE(
-      test::contains(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds"))
+      test::contains(with(0, "1.5"), "ins.csv:3: `1.5` is not a value of the column stamp_ns"))
       << with(0, "1.5");
-  EXPECT_TRUE(test::contains(with(0, "99999999999999999999"), "is not a stamp"));
-  EXPECT_TRUE(test::contains(with(1, "-1"), "is not a bound"));
-  EXPECT_TRUE(test::contains(with(3, "great"), "`great` is not none, dead_reckoning"));
+  EXPECT_TRUE(test::contains(with(0, "99999999999999999999"), "column stamp_ns"));
+  EXPECT_TRUE(test::contains(with(1, "-1"), "column stamp_error_ns"));
+  EXPECT_TRUE(test::contains(with(3, "great"), "`great` is not a value of the column fix"));
   EXPECT_TRUE(test::contains(with(4, "153"), "not a valid latitude"));
-  EXPECT_TRUE(test::contains(with(5, ""), "`` is not a coordinate"));
-  EXPECT_TRUE(test::contains(with(7, "nan"), "`nan` is not a velocity"));
+  EXPECT_TRUE(test::contains(with(5, ""), "`` is not a value of the column longitude_deg"));
+  EXPECT_TRUE(test::contains(with(7, "nan"), "`nan` is not a value of the column velocity_east"));
   EXPECT_TRUE(test::contains(with(10, "7"), "the quaternion has the length"));
   EXPECT_TRUE(test::contains(with(10, "1e308"), "the quaternion has the length"));
-  EXPECT_TRUE(test::contains(with(14, "-2"), "`-2` is not a sigma"));
-  EXPECT_TRUE(test::contains(with(19, "4294967296"), "is not a status word"));
-  EXPECT_TRUE(test::contains(with(20, "256"), "is not a number of satellites"));
-  EXPECT_TRUE(test::contains(with(21, "yes"), "`yes` is not 0 or 1"));
-  EXPECT_TRUE(test::contains(with(22, "later"), "is not a time"));
+  EXPECT_TRUE(test::contains(with(14, "-2"), "`-2` is not a value of the column position_sigma_m"));
+  EXPECT_TRUE(test::contains(with(19, "4294967296"), "column status"));
+  EXPECT_TRUE(test::contains(with(20, "256"), "column satellites"));
+  EXPECT_TRUE(test::contains(with(21, "yes"), "`yes` is not a value of the column filter_valid"));
+  EXPECT_TRUE(test::contains(with(22, "later"), "column utc_ns"));
   EXPECT_TRUE(test::contains(with(22, "1,2"), "has 24 columns instead of 23"));
   EXPECT_TRUE(test::contains(refusal(kHead + "1,2\n"), "ins.csv:2: has 2 columns"));
   EXPECT_TRUE(test::contains(refusal("a,b\n" + good), "ins.csv:1: is not the first line"));
