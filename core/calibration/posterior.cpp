@@ -21,11 +21,9 @@ void let_drift(double hours, const CalibrationOptions& options, RigCalibration* 
       1e-3 * options.extrinsic_random_walk_mrad_per_sqrt_h * std::sqrt(std::max(0.0, hours));
   for (int k = 0; k < rig->cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    if (k > 0) {
-      for (int i = 0; i < 3; ++i) widen(&rig->covariance, extrinsic_row(k) + i, angle);
-      for (int i = 3; i < 6; ++i)
-        widen(&rig->covariance, extrinsic_row(k) + i, angle * rig->T_camera_left[c].t.norm());
-    }
+    const double length = rig->T_camera_left[c].t.norm();
+    for (int i = 0; k > 0 && i < 6; ++i)
+      widen(&rig->covariance, extrinsic_row(k) + i, i < 3 ? angle : angle * length);
     const int first = intrinsic_row(k);
     const double fx = rig->intrinsics[c].fx;
     for (int i = 0; i < kIntrinsicsSize; ++i)
