@@ -11,6 +11,7 @@
 #include "app/config/calibration_checks.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "core/math/robust.hpp"
 #include "core/math/se3.hpp"
 
 namespace vergence::app {
@@ -76,12 +77,6 @@ Transform transform_from(const cv::Mat& rotation, const cv::Mat& t) {
   return T;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 cv::Point3f object_point(const BoardPattern& board, std::size_t index) {
   const Eigen::Vector3f X = board.corner(index).cast<float>();
   return {X.x(), X.y(), X.z()};
@@ -107,7 +102,8 @@ class BoardCalibrator {
       for (const bool hold : {true, false})
         for (int round = 0; round < kMaxRounds; ++round) {
           s = solve(used, hold, nullptr);
-          const double limit = std::max(kNeverRejected, kRejectedRatio * median(s.view_rms));
+          std::vector<double> rms = s.view_rms;
+          const double limit = std::max(kNeverRejected, kRejectedRatio * median(std::span(rms)));
           std::vector<std::size_t> kept;
           for (std::size_t i = 0; i < used.size(); ++i) {
             result.views[used[i]].rms_px = s.view_rms[i];

@@ -3,7 +3,6 @@
 #include <glob.h>
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <set>
 
@@ -17,49 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The last run of digits in a file's name without zeros in front, which one camera's files may
-/// have and another's not: `left08.jpg` → `8`. Empty: there is none.
+/// Last run of digits in a file's name, with zeros in front so that numbers sort as text; empty if
+/// there is none.
 std::string number_in(const fs::path& file) {
-  const std::string stem = file.stem().string();
-  std::size_t end = stem.size();
-  while (end > 0 && std::isdigit(static_cast<unsigned char>(stem[end - 1])) == 0) --end;
-  std::size_t begin = end;
-  while (begin > 0 && std::isdigit(static_cast<unsigned char>(stem[begin - 1])) != 0) --begin;
-  while (begin + 1 < end && stem[begin] == '0') ++begin;
-  return stem.substr(begin, end - begin);
-}
-
-/// Shorter numbers are smaller.
-struct LessNumber {
-  bool operator()(const std::string& a, const std::string& b) const {
-    return a.size() != b.size() ? a.size() < b.size() : a < b;
-  }
-};
-
-using Numbered = std::map<std::string, fs::path, LessNumber>;
-
-/// By number; empty where two files have the same or one has none.
-Numbered numbered(const std::vector<fs::path>& files) {
-  Numbered by_number;
-  for (const fs::path& file : files) {
-    const std::string number = number_in(file);
-    if (number.empty() || !by_number.emplace(number, file).second) return {};
-  }
-  return by_number;
-}
-
-/// In order of number.
-std::vector<fs::path> list_files(const Numbered& numbered) {
-  std::vector<fs::path> files;
-  for (const auto& [number, file] : numbered) files.push_back(file);
-  return files;
-}
-
-std::vector<std::vector<fs::path>> by_order(const std::vector<std::vector<fs::path>>& cameras) {
-  std::vector<std::vector<fs::path>> views(cameras[0].size());
-  for (std::size_t v = 0; v < views.size(); ++v)
-    for (const auto& files : cameras) views[v].push_back(files[v]);
-  return views;
+  constexpr std::string_view kDigits = "0123456789";
+  std::string stem = file.stem().string();
+  stem.erase(stem.find_last_of(kDigits) + 1);
+  stem.erase(0, stem.find_last_not_of(kDigits) + 1);
+  return stem.empty() ? stem : fmt::format("{:0>20}", stem);
 }
 
 struct Grey {
@@ -71,7 +35,7 @@ ImageFileStatus read_grey(const fs::path& file, Grey* grey) {
   std::vector<std::uint8_t> bytes;
   if (const auto status = read_image_file(file, &bytes); status != ImageFileStatus::ok)
     return status;
-  if (const auto status = check_image(bytes, &grey->size); status != ImageFileStatus::ok)
+  if (const auto status = read_image_size(bytes, &grey->size); status != ImageFileStatus::ok)
     return status;
   const auto width = static_cast<std::size_t>(grey->size.width);
   grey->pixels.resize(width * static_cast<std::size_t>(grey->size.height));
@@ -101,38 +65,36 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns,
   return sorted;
 }
 
-std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs::path>>& cameras,
+std::vector<std::vector<fs::path>> group_views(std::vector<std::vector<fs::path>> cameras,
                                                std::vector<std::string>* remarks) {
-  std::vector<Numbered> numbers;
-  numbers.reserve(cameras.size());
-  for (const auto& files : cameras) numbers.push_back(numbered(files));
-  const bool all_numbered =
-      std::ranges::none_of(numbers, [](const Numbered& n) { return n.empty(); });
+  std::map<std::string, std::vector<fs::path>> by_number;
+  bool numbered = true;
+  for (auto& files : cameras) {
+    std::ranges::stable_sort(files, {}, number_in);
+    std::set<std::string> own;
+    for (const fs::path& file : files) {
+      const std::string number = number_in(file);
+      numbered = numbered && !number.empty() && own.insert(number).second;
+      by_number[number].push_back(file);
+    }
+  }
+  const std::size_t most = cameras[0].size();
+  const bool same_length =
+      std::ranges::all_of(cameras, [&](const auto& files) { return files.size() == most; });
   std::vector<std::vector<fs::path>> views;
   std::vector<fs::path> alone;
-  if (all_numbered) {
-    for (const auto& [number, file] : numbers[0]) {
-      std::vector<fs::path> view;
-      for (const Numbered& n : numbers)
-        if (const auto other = n.find(number); other != n.end()) view.push_back(other->second);
-      if (view.size() == cameras.size())
-        views.push_back(view);
-      else
-        alone.insert(alone.end(), view.begin(), view.end());
-    }
-    for (std::size_t k = 1; k < numbers.size(); ++k)
-      for (const auto& [number, file] : numbers[k])
-        if (numbers[0].find(number) == numbers[0].end()) alone.push_back(file);
+  for (const auto& [number, files] : by_number)
+    if (files.size() == cameras.size())
+      views.push_back(files);
+    else
+      alone.insert(alone.end(), files.begin(), files.end());
+  if (same_length && (!numbered || 2 * views.size() < most)) {
+    views.assign(most, {});
+    for (std::size_t v = 0; v < most; ++v)
+      for (const auto& files : cameras) views[v].push_back(files[v]);
+    return views;
   }
-  const bool same_length = std::ranges::all_of(
-      cameras, [&](const auto& files) { return files.size() == cameras[0].size(); });
-  if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size())) {
-    if (!all_numbered) return by_order(cameras);
-    std::vector<std::vector<fs::path>> in_order(numbers.size());
-    std::ranges::transform(numbers, in_order.begin(), list_files);
-    return by_order(in_order);
-  }
-  if (views.empty()) {
+  if (!numbered || views.empty()) {
     std::string counts;
     for (const auto& files : cameras)
       counts += (counts.empty() ? "" : ", ") + std::to_string(files.size());
@@ -153,7 +115,6 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
   const std::size_t cameras = views.empty() ? 0 : views.front().size();
   BoardImages images;
   images.sizes.resize(cameras);
-  const bool part_is_enough = board.kind != BoardKind::checkerboard;
   Grey grey;
   for (std::size_t v = 0; v < views.size(); ++v) {
     BoardView view;
@@ -175,9 +136,9 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
       const ImageView pixels{grey.pixels.data(), size.width, size.height, size.width};
       view.corners[k] = find_board(pixels, board, BoardSearch::thorough, view.corners[0]);
       if (view.corners[k].empty())
-        without.push_back(fmt::format("no target with {}{} in {}", board.describe(),
-                                      part_is_enough ? ", or too little of it," : "",
-                                      file.string()));
+        without.push_back(fmt::format(
+            "no target with {}{} in {}", board.describe(),
+            board.kind == BoardKind::checkerboard ? "" : ", or too little of it,", file.string()));
     }
     const auto with = std::ranges::count_if(view.corners, [](const auto& c) { return !c.empty(); });
     const bool usable = !view.corners[0].empty() && with >= (cameras > 1 ? 2 : 1);

@@ -21,8 +21,7 @@ namespace vergence::app {
 /// cameras' numbers differ, views are the common ones; the others are reported in *remarks. Throws
 /// InputError for lists of different length without matching numbers.
 [[nodiscard]] std::vector<std::vector<std::filesystem::path>> group_views(
-    const std::vector<std::vector<std::filesystem::path>>& cameras,
-    std::vector<std::string>* remarks);
+    std::vector<std::vector<std::filesystem::path>> cameras, std::vector<std::string>* remarks);
 
 struct BoardImages {
   /// With several cameras, only views of camera 0 and another.

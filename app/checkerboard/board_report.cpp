@@ -12,76 +12,45 @@
 namespace vergence::app {
 namespace {
 
-int digits_for(double sigma) {
-  return sigma > 0 ? std::clamp(static_cast<int>(std::ceil(1 - std::log10(sigma))), 1, 7) : 5;
+/// Value and sigma with the digits that the sigma permits.
+std::string measured(double value, double sigma) {
+  const int digits =
+      sigma > 0 ? std::clamp(static_cast<int>(std::ceil(1 - std::log10(sigma))), 1, 7) : 5;
+  return fmt::format("{:.{}f} ± {:.{}f}", value, digits, sigma, digits);
 }
 
-std::vector<std::string> lens_numbers(const BoardReport& r) {
-  const bool radtan = r.file.rig.intrinsics[0].kind == CameraModelKind::pinhole_radtan;
-  std::vector<std::string> names{"fx, px", "fy, px", "cx, px", "cy, px"};
-  if (radtan)
-    names.insert(names.end(), {"k1", "k2", "p1", "p2"});
-  else
-    names.insert(names.end(), {"k1", "k2", "k3", "k4"});
-  if (radtan && r.file.rig.intrinsics[0].distortion_sigma[4] > 0) names.emplace_back("k3");
-  return names;
-}
-
-double lens_sigma(const Intrinsics& lens, std::size_t i) {
-  return i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4];
-}
-
-double lens_value(const Intrinsics& lens, std::size_t i) {
+std::string describe_lens(const BoardReport& r, std::size_t k) {
+  const Intrinsics& lens = r.file.rig.intrinsics[k];
+  const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
+  constexpr std::array kFirst{"fx", "fy", "cx", "cy"};
+  constexpr std::array kRadtan{"k1", "k2", "p1", "p2", "k3"},
+      kEquidistant{"k1", "k2", "k3", "k4", ""};
   const std::array first{lens.fx, lens.fy, lens.cx, lens.cy};
-  return i < 4 ? first[i] : lens.distortion[i - 4];
+  std::string text = fmt::format("{}: {} images, {:.4f} px RMS alone\n ", r.file.names[k],
+                                 r.found.cameras[k].images, r.found.cameras[k].alone_rms_px);
+  for (std::size_t i = 0; i < first.size(); ++i)
+    text += fmt::format(" {} {}", kFirst[i], measured(first[i], lens.sigma[i]));
+  text += " px\n ";
+  for (std::size_t i = 0; i < lens.distortion.size(); ++i)
+    if (i < 4 || lens.distortion_sigma[i] > 0)
+      text += fmt::format(" {} {}", radtan ? kRadtan[i] : kEquidistant[i],
+                          measured(lens.distortion[i], lens.distortion_sigma[i]));
+  return text + "\n";
 }
 
-std::string lens_table(const BoardReport& r) {
-  const auto cameras = static_cast<std::size_t>(r.file.rig.cameras);
-  std::string text = fmt::format("{:<14}", "");
-  for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>36}", r.file.names[k]);
-  text += "\n";
-  const auto names = lens_numbers(r);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    text += fmt::format("{:<14}", names[i]);
-    for (std::size_t k = 0; k < cameras; ++k) {
-      const Intrinsics& lens = r.file.rig.intrinsics[k];
-      const double sigma = lens_sigma(lens, i);
-      const int digits = digits_for(sigma);
-      text += fmt::format(
-          "{:>36}", fmt::format("{:.{}f} ± {:.{}f}", lens_value(lens, i), digits, sigma, digits));
-    }
-    text += "\n";
-  }
-  const auto row = [&](const char* name, auto&& value) {
-    text += fmt::format("{:<14}", name);
-    for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>36}", value(k));
-    text += "\n";
-  };
-  row("RMS of this camera, px",
-      [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].alone_rms_px); });
-  row("images", [&](std::size_t k) { return std::to_string(r.found.cameras[k].images); });
-  return text;
-}
-
-std::string place_table(const BoardReport& r, std::size_t k) {
+std::string describe_place(const BoardReport& r, std::size_t k) {
   const RigCalibration& rig = r.file.rig;
   const Vec3 turn = log_so3(rig.T_camera_left[k].R) * kDegreesPerRadian,
              t = rig.T_camera_left[k].t * 1e3;
-  constexpr std::array kNames{"rotation x, °", "rotation y, °", "rotation z, °",
-                              "t_x, mm",       "t_y, mm",       "t_z, mm"};
-  std::string text = fmt::format("{} from {}: X_{} = R X_{} + t\n", r.file.names[k],
-                                 r.file.names[0], r.file.names[k], r.file.names[0]);
-  text += fmt::format("{:<16}{:>12}{:>12}{:>14}\n", "", "", "1 σ", "intrinsics fixed");
+  std::string text =
+      fmt::format("{0} from {1}: X_{0} = R X_{1} + t, ± 1 σ (with fixed intrinsics)\n",
+                  r.file.names[k], r.file.names[0]);
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
-    const double sigma = unit * rig.sigma_total[k][i];
-    const int digits = std::max(digits_for(sigma), i < 3 ? 4 : 3);
-    const auto at = static_cast<Eigen::Index>(i % 3);
-    // ° is one column and two bytes: fmt counts columns.
-    text +=
-        fmt::format("{:<16}{:>12.{}f}{:>12.{}f}{:>14.{}f}\n", kNames[i], i < 3 ? turn(at) : t(at),
-                    digits, sigma, digits, unit * rig.sigma_noise[k][i], digits);
+    const auto axis = static_cast<Eigen::Index>(i % 3);
+    text += fmt::format("  {} {}: {} {} ({:.2g})\n", i < 3 ? "rotation" : "t", "xyz"[axis],
+                        measured(i < 3 ? turn(axis) : t(axis), unit * rig.sigma_total[k][i]),
+                        i < 3 ? "°" : "mm", unit * rig.sigma_noise[k][i]);
   }
   return text;
 }
@@ -115,10 +84,9 @@ std::string format_report(const BoardReport& r) {
   for (const BoardViewResult& v : r.found.views)
     if (!v.used) text += fmt::format("  rejected: {}, {:.3g} px RMS\n", v.name, v.rms_px);
   text += fmt::format("reprojection {:.4f} px RMS\n\n", rig.reprojection_px);
-  text += lens_table(r) + "± 1 σ\n\n";
-  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
-    text += place_table(r, k) + "\n";
-  if (rig.cameras > 1) text += baseline_message(r) + "\n";
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    text += describe_lens(r, k) + (k > 0 ? describe_place(r, k) : "");
+  if (rig.cameras > 1) text += baseline_message(r);
   const auto needs = r.coverage.needs();
   text += needs.empty() ? "Nothing is missing: every part of the images, tilts and distances.\n"
                         : fmt::format("Still missing: {}.\n", fmt::join(needs, "; "));

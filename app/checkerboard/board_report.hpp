@@ -21,7 +21,7 @@ struct BoardReport {
   std::optional<double> measured_baseline{};
 };
 
-/// Tables for a terminal: intrinsics, extrinsics with sigmas, rejected views, missing coverage.
+/// Text for a terminal: intrinsics and extrinsics with sigmas, rejected views, missing coverage.
 [[nodiscard]] std::string format_report(const BoardReport& report);
 /// Report as JSON; every key has its unit (docs/calibration.md).
 [[nodiscard]] nlohmann::ordered_json json_report(const BoardReport& report);

@@ -7,7 +7,7 @@
 
 #include "app/checkerboard/board_detector.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
-#include "app/checkerboard/view_collector.hpp"
+#include "app/checkerboard/coverage.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/capture_result.hpp"
 #include "app/devices/drive_devices.hpp"
@@ -32,12 +32,10 @@ const char* phrase(OfferResult verdict) {
 void make_empty_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder, error))
+  if (!fs::is_directory(folder, error) || !fs::is_empty(folder, error))
     throw InputError(folder.string() +
-                     ": cannot be created; --keep-views needs a new or empty directory");
-  if (!fs::is_empty(folder, error))
-    throw InputError(folder.string() +
-                     ": is not empty; --keep-views needs a new or empty directory");
+                     ": is not empty or cannot be created; --keep-views needs a new or empty "
+                     "directory");
 }
 
 /// Takes views of the target from the cameras' images.
@@ -45,13 +43,13 @@ void make_empty_folder(const fs::path& folder) {
 /// Threads  One; another one stops the source when a signal comes.
 class Collection {
  public:
-  Collection(const CalibrateRequest& request, const CalibratedRig& rig, double focal_px,
-             Acquisition* source, Progress* progress)
+  Collection(const CalibrateRequest& request, const std::vector<std::string>& names,
+             ViewCollector collector, Acquisition* source, Progress* progress)
       : request_(request),
-        rig_(rig),
+        names_(names),
         source_(source),
         progress_(progress),
-        collector_(Coverage(request.board, rig.names, rig.sizes, focal_px), rig.sizes[0].width) {}
+        collector_(std::move(collector)) {}
 
   /// Until the source ends, nothing is missing, or a signal comes.
   void run(const SignalGuard& signals) {
@@ -84,9 +82,9 @@ class Collection {
     BoardView seen;
     const std::size_t number = collector_.views().size();
     seen.name = fmt::format("view {}", number);
-    for (std::size_t k = 0; k < rig_.sizes.size(); ++k)
-      seen.corners[k] =
-          find_board(frame.images[k], request_.board, BoardSearch::quick, seen.corners[0]);
+    for (std::size_t k = 0; k < names_.size(); ++k)
+      seen.corners[k] = find_board(frame.images[k], request_.calibration.board, BoardSearch::quick,
+                                   seen.corners[0]);
     const OfferResult result = collector_.offer(seen);
     if (result == OfferResult::accepted && request_.keep_views) keep(frame, number);
     const auto needs = collector_.coverage().needs();
@@ -99,12 +97,11 @@ class Collection {
   }
 
   void keep(const RigFrame& frame, std::size_t number) {
-    for (std::size_t k = 0; k < rig_.sizes.size(); ++k) {
+    for (std::size_t k = 0; k < names_.size(); ++k) {
       if (frame.images[k].empty()) continue;
-      const fs::path file =
-          *request_.keep_views / fmt::format("{}_{:03}.png", rig_.names[k], number);
       try {
-        write_png(file, frame.images[k]);
+        write_png(*request_.keep_views / fmt::format("{}_{:03}.png", names_[k], number),
+                  frame.images[k]);
       } catch (const InputError& e) {
         progress_->print(fmt::format("vergence: {}; the view is used nevertheless", e.what()));
       }
@@ -112,27 +109,12 @@ class Collection {
   }
 
   const CalibrateRequest& request_;
-  const CalibratedRig& rig_;
+  const std::vector<std::string>& names_;
   Acquisition* source_;
   Progress* progress_;
   ProgressState state_{};
   ViewCollector collector_;
 };
-
-CalibratedRig make_rig(const Configuration& c, const DriveDevices& devices) {
-  constexpr std::array kNames{"left", "right", "camera2", "camera3"};
-  CalibratedRig rig;
-  rig.rig_name = c.rig.name;
-  for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
-    const CameraSettings& s = c.cameras[k];
-    rig.names.push_back(s.name.empty() ? kNames[k] : s.name);
-    rig.serials.push_back(devices.cameras()[k]->info().serial);
-    rig.sizes.push_back({s.width, s.height});
-  }
-  // The files of --keep-views are named after the cameras.
-  rig.names = distinct_names(rig.names);
-  return rig;
-}
 
 }  // namespace
 
@@ -143,11 +125,26 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   DriveDevices devices(c, {}, false, std::nullopt);
   Progress progress = Progress::on_stderr(request.quiet);
   for (const std::string& message : devices.remarks()) progress.print("vergence: " + message);
-  const CalibratedRig rig = make_rig(c, devices);
+  CalibrationFile file;
+  file.rig_name = c.rig.name;
+  std::vector<ImageSize> sizes;
+  for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
+    const CameraSettings& camera = c.cameras[k];
+    if (!camera.name.empty()) file.names[k] = camera.name;
+    file.serials[k] = devices.cameras()[k]->info().serial;
+    sizes.push_back({camera.width, camera.height});
+  }
+  // The files of --keep-views are named after the cameras.
+  const std::vector<std::string> names =
+      distinct_names({file.names.begin(), file.names.begin() + std::ssize(sizes)});
+  std::ranges::copy(names, file.names.begin());
+  const BoardPattern& board = request.calibration.board;
+  Coverage coverage(board, names, sizes, nominal_rig(c).intrinsics[0].fx);
   Acquisition::Options options = devices.acquisition_options();
   options.tie_host = monotonic_now();
   Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), options);
-  Collection collection(request, rig, nominal_rig(c).intrinsics[0].fx, &source, &progress);
+  Collection collection(request, names, ViewCollector(std::move(coverage), sizes[0].width), &source,
+                        &progress);
   start_acquisition(&source);
   collection.run(signals);
   source.join();
@@ -160,11 +157,12 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
     progress.print(
         fmt::format("vergence: no calibration: {} views of the target were taken, at least {} are "
                     "needed; check that it is {}, complete and well lit in every image",
-                    collection.views().size(), kMinViews, request.board.describe()));
+                    collection.views().size(), kMinViews, board.describe()));
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
                                                      : ExitCode::device_failed);
   }
-  const ExitCode code = conclude_calibration(request, rig, collection.views(), &progress);
+  const ExitCode code =
+      conclude_calibration(request, sizes, std::move(file), collection.views(), &progress);
   if (!source.missing().empty() && !stopped) return ExitCode::device_failed;
   return stopped.value_or(code);
 }

@@ -19,40 +19,6 @@
 namespace vergence::app {
 namespace {
 
-// Maximum deviation of fx over fy from 1.
-constexpr double kSquarePixels = 0.03;
-// Sigma of the focal length over the focal length.
-constexpr double kVagueFocal = 0.01;
-
-Coverage make_coverage(const CalibrateRequest& request, const CalibrationFile& file,
-                       const std::vector<ImageSize>& sizes, const std::vector<BoardView>& views,
-                       const BoardCalibration& found) {
-  const auto cameras = static_cast<std::size_t>(file.rig.cameras);
-  Coverage coverage(request.board,
-                    {file.names.begin(), file.names.begin() + static_cast<std::ptrdiff_t>(cameras)},
-                    sizes, file.rig.intrinsics[0].fx);
-  for (std::size_t v = 0; v < views.size(); ++v)
-    if (found.views[v].used) coverage.add(views[v]);
-  return coverage;
-}
-
-void remark(const CalibrationFile& file, Progress* progress) {
-  for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
-    const Intrinsics& lens = file.rig.intrinsics[k];
-    if (lens.sigma[0] > kVagueFocal * lens.fx)
-      progress->print(
-          fmt::format("vergence: {}: the focal length is only known to {:.1f} %; tilt the target "
-                      "more, and show it nearer and farther",
-                      file.names[k], 100 * lens.sigma[0] / lens.fx));
-    if (const double differ = std::abs(lens.fx / lens.fy - 1); differ > kSquarePixels)
-      progress->print(
-          fmt::format("vergence: {}: fx and fy differ by {:.1f} %, but pixels are usually square; "
-                      "check the order in --checkerboard (9x6 or 6x9), check whether images were "
-                      "stretched, and show the target tilted both ways",
-                      file.names[k], 100 * differ));
-  }
-}
-
 const char* how_to_count(BoardKind kind) {
   constexpr std::array kTexts{"count the points where four squares meet",
                               "at least four tags of the family 36h11 must be visible",
@@ -136,14 +102,12 @@ BoardCalibration calibrate_with_k3(const std::vector<BoardView>& views,
 
 }  // namespace
 
-ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedRig& rig,
-                              const std::vector<BoardView>& views, Progress* progress) {
-  BoardCalibrationOptions options;
-  options.board = request.board;
-  options.sizes = rig.sizes;
-  options.model = request.model;
-  options.sixth_order = request.sixth_order;
-  remark_square(request.board.square, progress);
+ExitCode conclude_calibration(const CalibrateRequest& request, const std::vector<ImageSize>& sizes,
+                              CalibrationFile file, const std::vector<BoardView>& views,
+                              Progress* progress) {
+  BoardCalibrationOptions options = request.calibration;
+  options.sizes = sizes;
+  remark_square(options.board.square, progress);
   const BoardCalibration found =
       calibrate_with_k3(views, options, calibrate_boards(views, options), progress);
   const std::string why = found.error.empty() ? undetermined(found) : found.error;
@@ -151,21 +115,17 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
     progress->print("vergence: no calibration: " + why);
     return ExitCode::not_usable;
   }
-  CalibrationFile file;
   file.rig = found.rig;
-  file.rig.found = Stamp(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                             std::chrono::system_clock::now().time_since_epoch())
-                             .count());
-  file.rig_name = rig.rig_name;
+  file.rig.found =
+      Stamp(std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count());
   file.source = "checkerboard";
-  for (std::size_t k = 0; k < rig.names.size(); ++k)
-    if (!rig.names[k].empty()) file.names[k] = rig.names[k];
-  for (std::size_t k = 0; k < rig.serials.size(); ++k) file.serials[k] = rig.serials[k];
   write_calibration(request.out, file);
-  const Coverage coverage = make_coverage(request, file, rig.sizes, views, found);
-  const BoardReport report{found, file, request.board, coverage, request.measured_baseline};
+  Coverage coverage(options.board, {file.names.begin(), file.names.begin() + file.rig.cameras},
+                    sizes, file.rig.intrinsics[0].fx);
+  for (std::size_t v = 0; v < views.size(); ++v)
+    if (found.views[v].used) coverage.add(views[v]);
+  const BoardReport report{found, file, options.board, coverage, request.measured_baseline};
   std::cout << (request.json ? json_report(report).dump(1) + "\n" : format_report(report));
-  remark(file, progress);
   if (file.rig.cameras > 1) {
     progress->print("vergence: " + baseline_message(file.rig));
     if (const std::string warning = baseline_warning(file.rig); !warning.empty())
@@ -189,7 +149,7 @@ ExitCode calibrate_images(const CalibrateRequest& request,
   std::vector<std::string> remarks;
   const auto views = group_views(files, &remarks);
   BoardImages images =
-      read_board_images(views, request.board, [&](std::size_t done, std::size_t found) {
+      read_board_images(views, request.calibration.board, [&](std::size_t done, std::size_t found) {
         ProgressState state;
         state.state = "calibrate";
         state.frame = done;
@@ -201,14 +161,12 @@ ExitCode calibrate_images(const CalibrateRequest& request,
   for (const std::string& message : remarks) progress.print("vergence: " + message);
   // One message per view would hide the message that helps.
   if (images.views.empty())
-    throw InputError(
-        fmt::format("no view shows the target with {}{}; {} ({})", request.board.describe(),
-                    patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.board.kind),
-                    images.remarks.empty() ? "there are no images" : images.remarks.front()));
+    throw InputError(fmt::format(
+        "no view shows the target with {}{}; {} ({})", request.calibration.board.describe(),
+        patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.calibration.board.kind),
+        images.remarks.empty() ? "there are no images" : images.remarks.front()));
   for (const std::string& message : images.remarks) progress.print("vergence: " + message);
-  CalibratedRig rig;
-  rig.sizes = images.sizes;
-  return conclude_calibration(request, rig, images.views, &progress);
+  return conclude_calibration(request, images.sizes, {}, images.views, &progress);
 }
 
 }  // namespace vergence::app

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/checkerboard/board_calibration.hpp"
+#include "app/config/calibration_file.hpp"
 #include "app/config/configuration.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
@@ -14,10 +15,8 @@
 namespace vergence::app {
 
 struct CalibrateRequest {
-  BoardPattern board{};
-  CameraModelKind model = CameraModelKind::pinhole_radtan;
-  /// Estimates k3 of radtan.
-  bool sixth_order = false;
+  /// Without image sizes, which come with the images.
+  BoardCalibrationOptions calibration{};
   /// Path of calibration.yaml.
   std::filesystem::path out{};
   /// Measured baseline in m, for comparison in the report.
@@ -35,18 +34,11 @@ struct CalibrateRequest {
 [[nodiscard]] ExitCode calibrate_live(const CalibrateRequest& request,
                                       const Configuration& configuration);
 
-/// Data of a rig in addition to its views.
-struct CalibratedRig {
-  std::string rig_name{};
-  /// One per camera.
-  std::vector<std::string> names{}, serials{};
-  std::vector<ImageSize> sizes{};
-};
-
 /// Calibrates, prints the report on standard output and writes the file; messages go to *progress.
-/// Returns done or not_usable.
+/// `file` has the names and serial numbers. Returns done or not_usable.
 [[nodiscard]] ExitCode conclude_calibration(const CalibrateRequest& request,
-                                            const CalibratedRig& rig,
+                                            const std::vector<ImageSize>& sizes,
+                                            CalibrationFile file,
                                             const std::vector<BoardView>& views,
                                             Progress* progress);
 

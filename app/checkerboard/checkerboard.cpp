@@ -17,6 +17,7 @@ constexpr int kLargeImage = 1200;
 constexpr int kNarrowestWindow = 2, kWidestWindow = 11;
 // Half window over the smallest distance between two corners.
 constexpr double kWindowOfSquare = 0.3;
+
 double smallest_spacing(const std::vector<cv::Point2f>& corners, const BoardPattern& board) {
   const auto n = static_cast<std::size_t>(board.columns);
   double least = 1e9;
@@ -71,33 +72,34 @@ double first_square_brighter(const cv::Mat& image, const BoardPattern& board,
   return sum;
 }
 
+/// True if the corners are those of a board that is rotated by 180°.
+bool is_upside_down(const cv::Mat& image, const BoardPattern& board,
+                    const std::vector<cv::Point2f>& corners, const BoardCorners& reference) {
+  if (board.is_asymmetric()) return first_square_brighter(image, board, corners) < 0;
+  if (reference.empty()) return false;
+  const Vec2 there = reference.back().pixel - reference.front().pixel;
+  const cv::Point2f here = corners.back() - corners.front();
+  return there.dot(Vec2(here.x, here.y)) < 0;
+}
+
 }  // namespace
 
-std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
-                                                   const BoardPattern& board, BoardSearch search) {
-  if (image.empty()) return std::nullopt;
+BoardCorners find_checkerboard(const ImageView& image, const BoardPattern& board,
+                               BoardSearch search, const BoardCorners& reference) {
+  if (image.empty()) return {};
   const cv::Mat pixels = to_mat(image);
   std::vector<cv::Point2f> corners;
-  if (!detect(pixels, board, search, &corners) || corners.size() != board.corners())
-    return std::nullopt;
+  if (!detect(pixels, board, search, &corners) || corners.size() != board.corners()) return {};
   const int window =
       std::clamp(static_cast<int>(kWindowOfSquare * smallest_spacing(corners, board)),
                  kNarrowestWindow, kWidestWindow);
   to_saddles(pixels, window, &corners);
   make_right_handed(board, &corners);
-  if (board.is_asymmetric() && first_square_brighter(pixels, board, corners) < 0)
-    std::ranges::reverse(corners);
-  std::vector<Vec2> found;
+  if (is_upside_down(pixels, board, corners, reference)) std::ranges::reverse(corners);
+  BoardCorners found;
   found.reserve(corners.size());
-  for (const cv::Point2f& c : corners) found.emplace_back(c.x, c.y);
+  for (const cv::Point2f& c : corners) found.push_back({found.size(), Vec2(c.x, c.y)});
   return found;
-}
-
-void same_way_up(const std::vector<Vec2>& reference, std::vector<Vec2>* corners) {
-  if (reference.empty() || corners->empty()) return;
-  const Vec2 there = reference.back() - reference.front(),
-             here = corners->back() - corners->front();
-  if (there.dot(here) < 0) std::ranges::reverse(*corners);
 }
 
 }  // namespace vergence::app

@@ -2,69 +2,104 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <cstdio>
+#include <span>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
+#include "app/recording/messages.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 namespace {
 
-namespace fs = std::filesystem;
+using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-constexpr const char* kOpenCvHead = "%YAML:1.0\n---\n";
-
-bool is_folder(const std::string& text) {
-  std::error_code ignored;
-  return text.ends_with('/') || fs::is_directory(text, ignored);
+/// List `[a, b, c]` with as many digits as reproduce the doubles.
+std::string number_list(std::span<const double> values) {
+  return fmt::format("[{}]", fmt::join(values, ", "));
 }
 
-/// ROS has a file a camera: OUT is a folder for both unless it names two.
-bool is_ros_folder(const std::string& out, CalibrationFormat format) {
-  return format == CalibrationFormat::ros && out.find(',') == std::string::npos;
+std::array<double, 9> camera_matrix(const Intrinsics& lens) {
+  return {lens.fx, 0, lens.cx, 0, lens.fy, lens.cy, 0, 0, 1};
+}
+
+std::span<const double> coefficients(const Intrinsics& lens) {
+  return std::span(lens.distortion).first(lens.kind == CameraModelKind::pinhole_radtan ? 5 : 4);
+}
+
+/// Adds a remark about data that all these formats lack.
+void remark_lost(const CalibrationFile& calibration, const char* format, Remarks* remarks) {
+  const RigCalibration& rig = calibration.rig;
+  bool sigmas = rig.baseline_sigma != 0 || !rig.covariance.empty();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    sigmas = sigmas || rig.intrinsics[k].sigma[0] > 0 || rig.sigma_total[k][0] > 0;
+  remarks->push_back(fmt::format(
+      "{} holds intrinsics and extrinsics only; {}serial numbers and origin are left out", format,
+      sigmas ? "sigmas, " : ""));
+}
+
+/// Checks a calibration for a format with one pair of cameras, and adds a remark about additional
+/// cameras. Throws InputError if the two cameras differ in model or size.
+void check_pair(const CalibrationFile& calibration, const char* format, Remarks* remarks) {
+  const RigCalibration& rig = calibration.rig;
+  const Intrinsics &l = rig.intrinsics[0], &r = rig.intrinsics[1];
+  for (const auto& [key, same] : {std::pair("model", l.kind == r.kind),
+                                  std::pair("size", l.width == r.width && l.height == r.height)})
+    if (!same)
+      throw InputError(
+          fmt::format("cameras.1.{0} differs from that of camera 0, but {1} has one {0} for both; "
+                      "choose another format",
+                      key, format));
+  if (rig.cameras > 2)
+    remarks->push_back(fmt::format("{} holds two cameras; {} of {} are left out", format,
+                                   rig.cameras - 2, rig.cameras));
+  remark_lost(calibration, format, remarks);
+}
+
+std::string ros_matrix(const char* key, int rows, int columns, std::span<const double> values) {
+  return fmt::format("{}:\n  rows: {}\n  cols: {}\n  data: {}\n", key, rows, columns,
+                     number_list(values));
+}
+
+std::string opencv_matrix(const char* key, int rows, int columns, std::span<const double> values) {
+  return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: {}\n", key,
+                     rows, columns, number_list(values));
 }
 
 }  // namespace
 
-CalibrationFormat parse_format(const std::string& word) {
-  constexpr std::array<std::string_view, 4> kFormatNames{"vergence", "kalibr", "ros", "opencv"};
-  return static_cast<CalibrationFormat>(std::ranges::find(kFormatNames, word) -
-                                        kFormatNames.begin());
-}
+namespace fs = std::filesystem;
 
 ImageSize parse_size(const std::string& text) {
   ImageSize size;
-  const char *begin = text.data(), *end = begin + text.size();
-  const auto width = std::from_chars(begin, end, size.width);
-  const bool cross = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
-  const auto height = cross ? std::from_chars(width.ptr + 1, end, size.height) : width;
-  if (!cross || height.ec != std::errc() || height.ptr != end || size.width < 1 || size.height < 1)
+  int end = 0;
+  if (std::sscanf(text.c_str(), "%5dx%5d%n", &size.width, &size.height, &end) != 2 ||
+      static_cast<std::size_t>(end) != text.size() || size.width < 1 || size.height < 1)
     throw InputError("--size is \"" + text.substr(0, 60) +
                      "\"; write the image's width and height in pixels, like 640x480");
   return size;
 }
 
-CalibrationFormat format_of_name(const std::string& out) {
-  if (is_folder(out)) return CalibrationFormat::ros;
-  const std::vector<fs::path> files = detail::split_files(out, false);
-  const fs::path extension = files.front().extension();
-  if (files.size() == 2)
-    return extension == ".yml" ? CalibrationFormat::opencv : CalibrationFormat::ros;
-  if (files.front().filename().string().find("camchain") != std::string::npos)
+CalibrationFormat format_of(const std::string& word, const std::string& out) {
+  constexpr std::array<std::string_view, 4> kWords{"vergence", "kalibr", "ros", "opencv"};
+  if (const auto at = std::ranges::find(kWords, word); at != kWords.end())
+    return static_cast<CalibrationFormat>(at - kWords.begin());
+  std::error_code ignored;
+  const fs::path file = out;
+  if (!file.has_filename() || fs::is_directory(file, ignored)) return CalibrationFormat::ros;
+  if (file.extension() == ".yml") return CalibrationFormat::opencv;
+  if (out.find(',') != std::string::npos) return CalibrationFormat::ros;
+  if (file.filename().string().find("camchain") != std::string::npos)
     return CalibrationFormat::kalibr;
-  if (extension == ".yml") return CalibrationFormat::opencv;
-  if (extension == ".yaml") return CalibrationFormat::vergence;
+  if (file.extension() == ".yaml") return CalibrationFormat::vergence;
   throw InputError(
       out +
       ": the format does not follow from the file name; add --to vergence, kalibr, ros or opencv");
-}
-
-std::vector<fs::path> files_written(const std::string& out, CalibrationFormat format) {
-  return detail::split_files(out, is_ros_folder(out, format));
 }
 
 const char* describe(CalibrationFormat format) noexcept {
@@ -73,55 +108,129 @@ const char* describe(CalibrationFormat format) noexcept {
   return kTexts.at(static_cast<std::size_t>(format));
 }
 
-void write_any_calibration(const std::string& out, CalibrationFormat format,
-                           const CalibrationFile& calibration, Remarks* remarks) {
-  const bool folder = is_ros_folder(out, format);
-  const std::vector<fs::path> files = detail::split_files(out, folder);
-  const auto one_file = [&](const char* what) {
-    if (files.size() != 1)
-      throw InputError(fmt::format("{}: {} is one file; name one file", out, what));
-  };
-  std::vector<std::string> texts;
+WrittenFiles format_calibration_as(CalibrationFormat format, const std::string& out,
+                                   const CalibrationFile& calibration, Remarks* remarks) {
+  const auto comma = out.find(',');
+  const bool two = comma != std::string::npos;
+  const std::string first = out.substr(0, comma), second = two ? out.substr(comma + 1) : "";
+  if (two && (format == CalibrationFormat::vergence || format == CalibrationFormat::kalibr))
+    throw InputError(fmt::format("{}: {} is one file; name one file", out, describe(format)));
   switch (format) {
     case CalibrationFormat::vergence:
-      one_file("calibration.yaml");
-      texts = {format_calibration(calibration)};
-      break;
+      return {{out, format_calibration(calibration)}};
     case CalibrationFormat::kalibr:
-      one_file("a camchain");
-      texts = {format_kalibr(calibration, remarks)};
+      return {{out, format_kalibr(calibration, remarks)}};
+    case CalibrationFormat::opencv:
       break;
     case CalibrationFormat::ros: {
-      const auto pair = format_ros(calibration, remarks);
-      texts = {pair[0], pair[1]};
-      break;
-    }
-    case CalibrationFormat::opencv: {
-      const auto parts = format_opencv(calibration, remarks);
-      texts = files.size() == 1 ? std::vector{kOpenCvHead + parts[0] + parts[1]}
-                                : std::vector{kOpenCvHead + parts[0], kOpenCvHead + parts[1]};
-      break;
+      const auto [left, right] = format_ros(calibration, remarks);
+      if (two) return {{first, left}, {second, right}};
+      return {{fs::path(out) / "left.yaml", left}, {fs::path(out) / "right.yaml", right}};
     }
   }
-  if (folder) {
-    std::error_code error;
-    fs::create_directories(out, error);
-    if (error)
-      throw InputError(out + ": the directory for left.yaml and right.yaml cannot be created: " +
-                       error.message());
-  }
-  for (std::size_t i = 0; i < files.size(); ++i) replace_durably(files[i], texts[i]);
+  const std::string head = "%YAML:1.0\n---\n";
+  const auto [lenses, place] = format_opencv(calibration, remarks);
+  if (two) return {{first, head + lenses}, {second, head + place}};
+  return {{out, head + lenses + place}};
 }
 
 Remarks convert_calibration(const ConversionRequest& request) {
   Remarks remarks;
-  const CalibrationFormat format = request.format ? *request.format : format_of_name(request.out);
   const CalibrationFile calibration = read_any_calibration(request.in, request.size, &remarks);
-  write_any_calibration(request.out, format, calibration, &remarks);
+  const WrittenFiles files =
+      format_calibration_as(request.format, request.out, calibration, &remarks);
+  for (const auto& [file, text] : files)
+    if (fs::exists(file) && !request.force)
+      throw InputError(file.string() +
+                       ": exists already; add --force to overwrite it, or name another file");
+  std::error_code error;
+  if (request.format == CalibrationFormat::ros && request.out.find(',') == std::string::npos)
+    fs::create_directories(request.out, error);
+  if (error)
+    throw InputError(
+        request.out +
+        ": the directory for left.yaml and right.yaml cannot be created: " + error.message());
+  for (const auto& [file, text] : files) replace_durably(file, text);
   remarks.push_back(baseline_message(calibration.rig));
   if (std::string warning = baseline_warning(calibration.rig); !warning.empty())
     remarks.push_back(std::move(warning));
+  remarks.push_back(fmt::format("{}: written as {}", request.out, describe(request.format)));
   return remarks;
+}
+
+std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks) {
+  const RigCalibration& rig = calibration.rig;
+  std::string text;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    const Intrinsics& lens = rig.intrinsics[k];
+    const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
+    if (radtan && lens.distortion[4] != 0)
+      throw InputError(
+          fmt::format("cameras.{}.distortion has k3 = {}; Kalibr's radtan has four coefficients, "
+                      "calibrate without --k3",
+                      k, lens.distortion[4]));
+    text += fmt::format("cam{}:\n", k);
+    if (k > 0) {
+      const Transform T = rig.T_camera_left[k] * rig.T_camera_left[k - 1].inverse();
+      text += "  T_cn_cnm1:\n";
+      for (int row = 0; row < 3; ++row)
+        text += "  - " + number_list(std::array{T.R(row, 0), T.R(row, 1), T.R(row, 2), T.t(row)}) +
+                "\n";
+      text += "  - [0.0, 0.0, 0.0, 1.0]\n";
+    }
+    std::vector<int> others;
+    for (int other = 0; other < rig.cameras; ++other)
+      if (other != static_cast<int>(k)) others.push_back(other);
+    text += fmt::format("  cam_overlaps: [{}]\n  camera_model: pinhole\n", fmt::join(others, ", "));
+    text += "  distortion_coeffs: " + number_list(std::span(lens.distortion).first(4)) + "\n";
+    text += fmt::format("  distortion_model: {}\n", radtan ? "radtan" : "equidistant");
+    text += "  intrinsics: " + number_list(std::array{lens.fx, lens.fy, lens.cx, lens.cy}) + "\n";
+    text += fmt::format("  resolution: [{}, {}]\n", lens.width, lens.height);
+    std::string name = calibration.names[k];
+    std::ranges::replace(name, '/', '_');
+    text += "  rostopic: " + double_quoted("/" + name + "/image_raw") + "\n";
+  }
+  remark_lost(calibration, "a camchain", remarks);
+  return text;
+}
+
+std::array<std::string, 2> format_ros(const CalibrationFile& calibration, Remarks* remarks) {
+  check_pair(calibration, "a pair of camera_info", remarks);
+  std::array<std::string, 2> texts;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Intrinsics& lens = calibration.rig.intrinsics[k];
+    const Rectification r = rectification(calibration.rig, static_cast<int>(k), true);
+    const RowMajor3 R = r.R;
+    const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> P = r.P;
+    const auto D = coefficients(lens);
+    texts[k] = fmt::format("image_width: {}\nimage_height: {}\ncamera_name: {}\n", lens.width,
+                           lens.height, double_quoted(calibration.names[k])) +
+               ros_matrix("camera_matrix", 3, 3, camera_matrix(lens)) +
+               fmt::format("distortion_model: {}\n", D.size() == 5 ? "plumb_bob" : "equidistant") +
+               ros_matrix("distortion_coefficients", 1, static_cast<int>(D.size()), D) +
+               ros_matrix("rectification_matrix", 3, 3, std::span(R.data(), 9)) +
+               ros_matrix("projection_matrix", 3, 4, std::span(P.data(), 12));
+  }
+  return texts;
+}
+
+std::array<std::string, 2> format_opencv(const CalibrationFile& calibration, Remarks* remarks) {
+  const RigCalibration& rig = calibration.rig;
+  const Intrinsics& l = rig.intrinsics[0];
+  check_pair(calibration, "an OpenCV stereo file", remarks);
+  const bool fisheye = l.kind == CameraModelKind::pinhole_equidistant;
+  std::string lenses = fmt::format("image_width: {}\nimage_height: {}\nfisheye_model: {}\n",
+                                   l.width, l.height, fisheye ? 1 : 0);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Intrinsics& lens = rig.intrinsics[k];
+    lenses += opencv_matrix(k == 0 ? "M1" : "M2", 3, 3, camera_matrix(lens));
+    lenses +=
+        opencv_matrix(k == 0 ? "D1" : "D2", fisheye ? 4 : 1, fisheye ? 1 : 5, coefficients(lens));
+  }
+  const Transform& T = rig.T_camera_left[1];
+  const RowMajor3 R = T.R;
+  return {lenses, opencv_matrix("R", 3, 3, std::span(R.data(), 9)) +
+                      opencv_matrix("T", 3, 1, std::span(T.t.data(), 3))};
 }
 
 }  // namespace vergence::app

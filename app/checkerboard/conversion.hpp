@@ -1,45 +1,68 @@
 #pragma once
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "app/checkerboard/written_formats.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 
-/// Command `vergence calibrate convert IN OUT`.
+/// Command `vergence calibrate convert IN OUT`: calibrations in other programs' file formats.
+///
+/// Model    X_camera = R X_left + t, T_camera_left = [R t] in metres; pixel centres at integers;
+///          radtan k1 k2 p1 p2 [k3], equidistant k1 … k4. All formats share pixels, metres, axes (x
+///          right, y down, z forward) and the two distortion models.
+/// Errors   InputError if the format lacks something required.
+/// Remarks  One message for each item that is not carried over.
 namespace vergence::app {
 
-/// Parses `vergence`, `kalibr`, `ros` or `opencv`, as validated by the option `--to`.
-[[nodiscard]] CalibrationFormat parse_format(const std::string& word);
+enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
+
 /// Parses `640x480`. Throws InputError if malformed.
 [[nodiscard]] ImageSize parse_size(const std::string& text);
 
-/// Format by the file name: a directory or two `.yaml` with a comma: ros; a name with `camchain`:
-/// kalibr; `.yml`, one or two: opencv; any other `.yaml`: vergence. Throws InputError for other
-/// names.
-[[nodiscard]] CalibrationFormat format_of_name(const std::string& out);
+/// Format by a value of `--to`, or else by the file name: a directory or two `.yaml` with a comma
+/// is ros, a name with `camchain` kalibr, `.yml`, one or two, opencv, any other `.yaml` vergence.
+/// Throws InputError for other names.
+[[nodiscard]] CalibrationFormat format_of(const std::string& word, const std::string& out);
 
-/// Files that are written for `out` in that format.
-[[nodiscard]] std::vector<std::filesystem::path> files_written(const std::string& out,
-                                                               CalibrationFormat format);
 /// Text such as `a Kalibr camchain`.
 [[nodiscard]] const char* describe(CalibrationFormat format) noexcept;
 
+/// Kalibr camchain: cam0, cam1 … with T_cn_cnm1, X_cn = T_cn_cnm1 X_cn-1.
+[[nodiscard]] std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks);
+
+/// ROS camera_info of a stereo pair, left and right, rectified as in recordings.
+[[nodiscard]] std::array<std::string, 2> format_ros(const CalibrationFile& calibration,
+                                                    Remarks* remarks);
+
+/// OpenCV's intrinsics and extrinsics, without the head of a file.
+[[nodiscard]] std::array<std::string, 2> format_opencv(const CalibrationFile& calibration,
+                                                       Remarks* remarks);
+
+/// Files and their content: OUT, the two that it names with a comma between, or for ros left.yaml
+/// and right.yaml in the directory OUT. Throws InputError if the format has no second file.
+using WrittenFiles = std::vector<std::pair<std::filesystem::path, std::string>>;
+[[nodiscard]] WrittenFiles format_calibration_as(CalibrationFormat format, const std::string& out,
+                                                 const CalibrationFile& calibration,
+                                                 Remarks* remarks);
+
 struct ConversionRequest {
   /// A file, two with a comma between, or a directory with left.yaml and right.yaml.
-  std::string in{}, out{};
-  /// Format of `out`; empty: by its name.
-  std::optional<CalibrationFormat> format{};
+  std::string in{};
+  /// As `in`.
+  std::string out{};
+  CalibrationFormat format = CalibrationFormat::vergence;
   /// Used if an OpenCV file has no size.
   std::optional<ImageSize> size{};
+  /// Overwrites existing files.
+  bool force = false;
 };
 
-/// Writes each file atomically.
-void write_any_calibration(const std::string& out, CalibrationFormat format,
-                           const CalibrationFile& calibration, Remarks* remarks);
-
-/// Returns remarks about data that the format lacks. Throws InputError, with nothing written.
+/// Writes each file atomically. Returns messages about what was written and what the format lacks.
+/// Throws InputError, with nothing written.
 [[nodiscard]] Remarks convert_calibration(const ConversionRequest& request);
 
 }  // namespace vergence::app

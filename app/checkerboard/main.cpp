@@ -12,11 +12,6 @@
 namespace vergence::app {
 namespace {
 
-CameraModelKind parse_model(const std::string& word) {
-  return word == "equidistant" ? CameraModelKind::pinhole_equidistant
-                               : CameraModelKind::pinhole_radtan;
-}
-
 BoardPattern make_board(const CalibrateOptions& a) {
   if (a.board.empty() && a.aprilgrid.empty() && a.charuco.empty())
     throw InputError(
@@ -32,36 +27,23 @@ BoardPattern make_board(const CalibrateOptions& a) {
 CalibrateRequest make_request(const CalibrateOptions& a) {
   if (a.sixth_order && a.model == "equidistant")
     throw InputError("--k3 is for --model radtan; remove it, because equidistant has k1 to k4");
-  CalibrateRequest r;
-  r.board = make_board(a);
-  r.model = parse_model(a.model);
-  r.sixth_order = a.sixth_order;
-  r.out = a.out;
-  r.measured_baseline = a.baseline;
-  if (a.keep_views) r.keep_views = *a.keep_views;
-  r.json = a.json;
-  r.quiet = a.common.quiet;
+  const CameraModelKind model = a.model == "equidistant" ? CameraModelKind::pinhole_equidistant
+                                                         : CameraModelKind::pinhole_radtan;
+  const CalibrateRequest r{{make_board(a), {}, model, a.sixth_order},
+                           a.out,
+                           a.baseline,
+                           a.keep_views,
+                           a.json,
+                           a.common.quiet};
   check_writable(r.out, a.force);
   return r;
 }
 
 ExitCode convert(const CalibrateOptions& a) {
-  ConversionRequest r;
-  r.in = a.in;
-  r.out = a.out;
-  if (!a.to.empty()) r.format = parse_format(a.to);
-  const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
-  for (const std::filesystem::path& file : files_written(r.out, format))
-    if (std::filesystem::exists(file) && !a.force)
-      throw InputError(file.string() +
-                       ": exists already; add --force to overwrite it, or name another file");
+  ConversionRequest r{a.in, a.out, format_of(a.to, a.out), std::nullopt, a.force};
   if (!a.size.empty()) r.size = parse_size(a.size);
   for (const std::string& message : convert_calibration(r))
     std::cerr << "vergence: " << message << '\n';
-  std::vector<std::string> written;
-  for (const std::filesystem::path& file : files_written(r.out, format))
-    written.push_back(file.string());
-  std::cerr << fmt::format("{}: written as {}\n", fmt::join(written, ", "), describe(format));
   return ExitCode::done;
 }
 

@@ -2,7 +2,7 @@
 
 #include "app/command_line/calibrate_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/datasets/sequence_format.hpp"
+#include "app/datasets/stereo_sequence.hpp"
 #include "app/session/drive_calibration.hpp"
 
 namespace vergence::app {

@@ -5,7 +5,7 @@
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/datasets/sequence_format.hpp"
+#include "app/datasets/stereo_sequence.hpp"
 #include "app/publish/publish.hpp"
 #include "app/session/replay_session.hpp"
 

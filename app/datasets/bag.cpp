@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "app/datasets/detail/bag_images.hpp"
-#include "app/datasets/detail/bag_ins.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
@@ -42,12 +41,12 @@ std::string list_of_image_topics(const BagIndex& bag) {
   std::string list;
   std::size_t unreadable = 0;
   for (const auto& [name, topic] : bag.images) {
-    const LeftOut& out = topic.left_out;
-    list += fmt::format("{}{} ({} images{})", list.empty() ? "" : ", ", name, topic.images.size(),
-                        out.unreadable > 0 ? fmt::format(", {} of the unsupported encoding \"{}\"",
-                                                         out.unreadable, out.encoding)
-                                           : "");
-    unreadable += out.unreadable;
+    list +=
+        fmt::format("{}{} ({} images{})", list.empty() ? "" : ", ", name, topic.messages.size(),
+                    topic.unreadable > 0 ? fmt::format(", {} of the unsupported encoding \"{}\"",
+                                                       topic.unreadable, topic.encoding)
+                                         : "");
+    unreadable += topic.unreadable;
   }
   if (unreadable > 0)
     list +=
@@ -67,7 +66,7 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
                    std::string_view side) {
   if (requested.empty()) return;
   const auto found = bag.images.find(requested);
-  if (found == bag.images.end() || found->second.images.empty())
+  if (found == bag.images.end() || found->second.messages.empty())
     refuse(path, 0, "has no readable image on {}; choose another with --{}-topic; image topics: {}",
            requested, side, list_of_image_topics(bag));
 }
@@ -84,21 +83,6 @@ int merit(const BagIndex& bag, const Topics& topics, bool given) {
   return sum;
 }
 
-/// Topics that differ by more than their side, if exactly one is named left and one right.
-std::optional<Topics> only_named(const std::vector<std::string>& names,
-                                 const BagTopics& requested) {
-  Topics found{requested.left, requested.right};
-  for (std::size_t k = 0; k < 2; ++k) {
-    const char* side = k == 0 ? "left" : "right";
-    std::vector<std::string> with;
-    for (const std::string& name : names)
-      if (lower(name).find(side) != std::string::npos) with.push_back(name);
-    if (found[k].empty() && with.size() != 1) return std::nullopt;
-    if (found[k].empty()) found[k] = with.front();
-  }
-  return found;
-}
-
 /// The pair that the user names, or the best one with the usual names.
 Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& requested, bool given) {
   require_topic(path, bag, requested.left, "left");
@@ -110,7 +94,7 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
     const bool of_a_camera = small.find("depth") == std::string::npos &&
                              small.find("disparity") == std::string::npos &&
                              small.find("confidence") == std::string::npos;
-    if (!topic.images.empty() && of_a_camera) names.push_back(name);
+    if (!topic.messages.empty() && of_a_camera) names.push_back(name);
   }
   std::vector<Topics> best;
   for (const Topics& pair : stereo_names(names)) {
@@ -122,8 +106,6 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
       best.push_back(pair);
   }
   if (best.size() == 1) return best.front();
-  if (best.empty())
-    if (const auto only = only_named(names, requested)) return *only;
   refuse(path, 0,
          "has {} pairs of image topics named like a left and a right camera (left/right, "
          "infra1/infra2, cam0/cam1, image_0/image_1 …); choose with --left-topic and "
@@ -199,8 +181,9 @@ std::vector<std::array<std::size_t, 2>> pair_images(
   sequence->assumptions.push_back(fmt::format(
       "images are paired by the nearest {}; right ones are later by {}",
       ambiguous ? "recording time, because their stamps are ambiguous" : "stamp", describe(kept)));
-  if (is_suspicious(kept, interval))
-    sequence->remarks.push_back(pairing_warning(topics[0], topics[1], kept, interval));
+  const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
+  sequence->left_out += alone;
+  remark_pairs(topics[0], topics[1], kept, interval, alone, &sequence->remarks);
   const Duration late = recorded_later(images, pairs) - kept.median;
   if (std::max(late, -late) > most && !ambiguous)
     sequence->remarks.push_back(fmt::format(
@@ -208,15 +191,6 @@ std::vector<std::array<std::size_t, 2>> pair_images(
         "stamps, almost one interval; check whether one camera is stamped a frame early or late",
         topics[0], topics[1], 1e3 * std::max(late, -late).to_seconds()));
   return pairs;
-}
-
-void remark_left_out(const std::string& name, const LeftOut& out,
-                     std::vector<std::string>* remarks) {
-  if (out.first.empty()) return;
-  remarks->push_back(
-      fmt::format("{}: skipped are {} unreadable images, {} of another size than the first and {} "
-                  "whose stamps do not increase; the first in {}",
-                  name, out.unreadable, out.other_size, out.backwards, out.first));
 }
 
 RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::string& topic,
@@ -232,7 +206,7 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
   const std::string& fault = is_rectified(topic) ? info.fault_rectified : info.fault;
   if (!fault.empty()) refuse(path, 0, "{}: {}; pass a calibration with --calibration", name, fault);
   RosCamera camera = info.camera;
-  const ImageSize size = bag.images.at(topic).images.front().image.size;
+  const ImageSize size = bag.images.at(topic).messages.front().image.size;
   if (const std::string remark = apply_crop(info.crop, size, &camera); !remark.empty())
     sequence->assumptions.push_back(name + ": " + remark);
   return is_rectified(topic) ? rectified(camera) : camera;
@@ -241,7 +215,7 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
 /// Adds remarks about mosaics: JPEG mixes their colours, which no demosaicing restores.
 void remark_mosaics(const BagIndex& bag, const std::string& topic, StereoSequence* sequence) {
   const ImageTopic& of_topic = bag.images.at(topic);
-  const BagImage& image = of_topic.images.front();
+  const BagImage& image = of_topic.messages.front();
   if (image.image.layout == PixelLayout::encoded_bayer) {
     std::array<std::uint8_t, 2> first{};
     (void)bag.files[image.file].bytes->read(image.place.offset + image.image.offset, first);
@@ -258,6 +232,130 @@ void remark_mosaics(const BagIndex& bag, const std::string& topic, StereoSequenc
     sequence->assumptions.push_back(
         fmt::format("{}: {} images have no stamp (0); their recording time is used", topic,
                     of_topic.unstamped));
+}
+
+// Maximum distance of two orientations that are interpolated.
+constexpr Duration kMaxGap = Duration::milliseconds(100);
+
+template <typename Topics>
+std::vector<std::string> usable(const Topics& topics) {
+  std::vector<std::string> names;
+  for (const auto& [name, topic] : topics)
+    if (!topic.messages.empty()) names.push_back(name);
+  return names;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
+}
+
+template <typename Reading>
+void remark_left_out(const std::string& name, const BagTopic<Reading>& topic,
+                     std::vector<std::string>* remarks) {
+  if (topic.unreadable + topic.backwards == 0) return;
+  remarks->push_back(fmt::format(
+      "{}: skipped are {} messages without usable numbers and {} whose stamps do not increase",
+      name, topic.unreadable, topic.backwards));
+}
+
+Eigen::Quaterniond to_quaternion(const RosAttitude& a) {
+  const auto& q = a.q_world_body;
+  return {q[3], q[0], q[1], q[2]};
+}
+
+void set_attitude(const Eigen::Quaterniond& q, InsSample* s) {
+  s->q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+  s->attitude_valid = true;
+}
+
+/// Interpolates the orientation at the fix's time. *next is the index of the first orientation that
+/// is not before the previous fix, and is advanced to this one. Returns false if none is near.
+bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, InsRecord* r) {
+  const Stamp stamp = r->sample.stamp;
+  while (*next < attitudes.size() && attitudes[*next].stamp < stamp) ++*next;
+  if (*next == attitudes.size()) return false;
+  const RosAttitude& after = attitudes[*next];
+  if (after.stamp == stamp) {
+    set_attitude(to_quaternion(after), &r->sample);
+  } else {
+    if (*next == 0) return false;
+    const RosAttitude& before = attitudes[*next - 1];
+    if (after.stamp - before.stamp > kMaxGap) return false;
+    const double share =
+        (stamp - before.stamp).to_seconds() / (after.stamp - before.stamp).to_seconds();
+    set_attitude(to_quaternion(before).slerp(share, to_quaternion(after)), &r->sample);
+  }
+  r->sample.tilt_sigma = after.tilt_sigma;
+  r->sample.heading_sigma = after.heading_sigma;
+  return true;
+}
+
+void remark_without_fix(const std::string& name, RecordedIns* ins) {
+  const auto without = std::ranges::count_if(ins->readings, [](const InsRecord& r) {
+    return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
+  });
+  if (without > 0)
+    ins->remarks.push_back(
+        fmt::format("{}: {} of {} samples have no fix: poses are not compared there", name, without,
+                    ins->readings.size()));
+}
+
+RecordedIns combine(const std::string& name, const std::vector<InsRecord>& fixes,
+                    const std::string& imu, const std::vector<RosAttitude>& attitudes) {
+  RecordedIns ins;
+  ins.readings.reserve(fixes.size());
+  std::size_t next = 0, without = 0;
+  for (const InsRecord& fix : fixes) {
+    InsRecord& r = ins.readings.emplace_back(fix);
+    r.sample.number = ins.readings.size() - 1;
+    if (!attitude_at(attitudes, &next, &r)) ++without;
+  }
+  ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
+  remark_without_fix(name, &ins);
+  if (without > 0)
+    ins.remarks.push_back(fmt::format(
+        "{}: {} fixes have no orientation of {} within {} ms: poses are not compared there", name,
+        without, imu, kMaxGap.ns() / 1'000'000));
+  return ins;
+}
+
+void require(const std::filesystem::path& path, const BagIndex& bag, const std::string& option,
+             const std::string& requested, const std::vector<std::string>& there) {
+  if (requested.empty() || std::ranges::find(there, requested) != there.end()) return;
+  refuse(
+      path, 0,
+      "has no usable sample on {} for {}; NavSatFix topics: {}; Imu topics with an orientation: {}",
+      requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes)));
+}
+
+/// INS of a bag: NavSatFix with the orientation of Imu (docs/datasets.md). Empty with a remark if
+/// there is none, it has no attitude, or several topics match. Throws InputError if topics.ins or
+/// topics.imu has other messages.
+RecordedIns bag_ins(const std::filesystem::path& path, const BagIndex& bag,
+                    const BagTopics& topics) {
+  const std::vector<std::string> fixes = usable(bag.fixes), imus = usable(bag.attitudes);
+  require(path, bag, "--ins-topic", topics.ins, fixes);
+  require(path, bag, "--imu-topic", topics.imu, imus);
+  const auto chosen = [](const std::string& requested, const std::vector<std::string>& there) {
+    return requested.empty() && there.size() == 1 ? there.front() : requested;
+  };
+  const std::string fix = chosen(topics.ins, fixes), imu = chosen(topics.imu, imus);
+  RecordedIns ins;
+  if (fix.empty() && fixes.empty()) return ins;
+  if (!fix.empty() && !imu.empty()) {
+    ins = combine(fix, bag.fixes.at(fix).messages, imu, bag.attitudes.at(imu).messages);
+    remark_left_out(imu, bag.attitudes.at(imu), &ins.remarks);
+  } else if (!fix.empty() && imus.empty()) {
+    ins.remarks.push_back("the NavSatFix of " + fix +
+                          " has no matching Imu orientation: poses are not compared");
+  } else {
+    ins.remarks.push_back(fmt::format(
+        "several topics could be the INS, so poses are not compared; choose with --ins-topic and "
+        "--imu-topic; NavSatFix topics: {}; Imu topics with an orientation: {}",
+        joined(fixes), joined(imus)));
+  }
+  if (!fix.empty()) remark_left_out(fix, bag.fixes.at(fix), &ins.remarks);
+  return ins;
 }
 
 }  // namespace
@@ -282,9 +380,15 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
   sequence.remarks = std::move(bag.remarks);
   sequence.ins = std::move(ins);
   for (const std::string& name : chosen) {
-    const LeftOut& out = bag.images[name].left_out;
-    remark_left_out(name, out, &sequence.remarks);
-    sequence.left_out += out.unreadable + out.other_size + out.backwards;
+    const ImageTopic& topic = bag.images[name];
+    const std::size_t omitted = topic.unreadable + topic.other_size + topic.backwards;
+    if (omitted > 0)
+      sequence.remarks.push_back(fmt::format(
+          "{}: skipped are {} unreadable images, {} of another size than the first and {} whose "
+          "stamps do not increase{}",
+          name, topic.unreadable, topic.other_size, topic.backwards,
+          topic.first_omitted.empty() ? "" : "; the first in " + topic.first_omitted));
+    sequence.left_out += omitted;
   }
   if (topics.left.empty() || topics.right.empty())
     if (bag.images.size() > 2 || chosen[0].find("left") == std::string::npos)
@@ -305,8 +409,8 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
     sequence.calibration_source =
         "CameraInfo of " + camera_namespace(chosen[0]) + " and " + camera_namespace(chosen[1]);
   }
-  std::array images{std::move(bag.images[chosen[0]].images),
-                    std::move(bag.images[chosen[1]].images)};
+  std::array images{std::move(bag.images[chosen[0]].messages),
+                    std::move(bag.images[chosen[1]].messages)};
   for (std::size_t k = 0; k < 2; ++k)
     if (images[k].back().image.stamp.ns() == 0)
       refuse(path, 0,
@@ -314,12 +418,6 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
                  " has neither stamps (header.stamp is 0) nor recording times; record it again "
                  "with stamps");
   const auto pairs = pair_images(path, chosen, images, &sequence);
-  const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
-  if (alone > 0)
-    sequence.remarks.push_back(
-        fmt::format("{} images have no partner within {:.0f} % of the interval and are skipped",
-                    alone, 100 * kMaxApart));
-  sequence.left_out += alone;
   const std::vector<Stamp> stamps = collect_stamps(images[0]);
   const auto store = std::make_shared<const BagImages>(bag.format, std::move(bag.files), chosen,
                                                        std::move(images));

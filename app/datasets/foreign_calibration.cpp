@@ -9,11 +9,10 @@
 #include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
+#include "app/datasets/foreign_settings.hpp"
 #include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/ros_camera.hpp"
-#include "app/datasets/settings_tree.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/datasets/vocabulary.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/so3.hpp"
 
@@ -487,14 +486,12 @@ bool is_own(const YamlFile& file) {
          (file.root()["version"] || file.root()["rig"]);
 }
 
-}  // namespace
-
-namespace detail {
-
-std::vector<std::filesystem::path> split_files(const std::string& text, bool folder) {
-  if (folder) return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
+/// Files of an argument; a directory stands for its left.yaml and right.yaml. Commas separate files
+/// unless one has the whole name.
+std::vector<fs::path> split_files(const std::string& text) {
   std::error_code ignored;
-  // A name may contain a comma.
+  if (fs::is_directory(text, ignored))
+    return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
   if (fs::exists(text, ignored)) return {text};
   std::vector<fs::path> files;
   std::istringstream parts(text);
@@ -502,7 +499,7 @@ std::vector<std::filesystem::path> split_files(const std::string& text, bool fol
   return files.empty() ? std::vector<fs::path>{text} : files;
 }
 
-}  // namespace detail
+}  // namespace
 
 bool is_own_calibration(const fs::path& file) {
   const auto trees = settings_trees(read_text(file, kLargestYaml), file.string());
@@ -557,7 +554,7 @@ CalibrationFile read_any_calibration(const std::string& in, const std::optional<
   std::error_code ignored;
   if (fs::is_regular_file(in, ignored) && is_own_calibration(in)) return read_calibration(in, use);
   std::vector<CalibrationText> texts;
-  for (const fs::path& path : detail::split_files(in, fs::is_directory(in, ignored)))
+  for (const fs::path& path : split_files(in))
     texts.push_back({path.string(), read_text(path, kLargestYaml)});
   return parse_any_calibration(texts, size, remarks, use);
 }

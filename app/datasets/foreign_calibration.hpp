@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -12,13 +11,11 @@
 ///
 /// One reader handles all: a file's syntax (YAML with or without OpenCV's header, JSON, OpenCV's
 /// XML, an ini) becomes a tree, whose keys are looked up in a vocabulary of other programs' names
-/// (vocabulary.hpp). The rig follows from the present parts: intrinsics, and the transform in any
-/// of the usual forms (docs/calibration.md).
+/// (foreign_settings.hpp). The rig follows from the present parts: intrinsics, and the transform in
+/// any of the usual forms (docs/calibration.md).
 namespace vergence::app {
 
 using Remarks = std::vector<std::string>;
-
-enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
 
 /// File of a calibration.
 struct CalibrationText {
@@ -48,11 +45,5 @@ struct CalibrationText {
 /// T_BS of a camera's sensor.yaml (EuRoC): p_body = T p_camera. Throws InputError if there is none,
 /// or it is not rigid.
 [[nodiscard]] Transform read_body_mount(const std::filesystem::path& file);
-
-namespace detail {
-/// Files of IN or OUT; a directory stands for its left.yaml and right.yaml. Commas separate files
-/// unless one has the whole name.
-[[nodiscard]] std::vector<std::filesystem::path> split_files(const std::string& text, bool folder);
-}  // namespace detail
 
 }  // namespace vergence::app

@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <cassert>
 #include <chrono>
-#include <new>
 #include <optional>
 
 #include <fmt/format.h>
 
-#include "app/datasets/decimal.hpp"
-#include "app/datasets/detail/bag_images.hpp"
+#include "app/datasets/text_file.hpp"
 #include "core/types/bayer.hpp"
 
 namespace vergence::app {
@@ -145,27 +143,13 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   return pair;
 }
 
-ImageFileStatus FrameDecoder::read(const std::string& name, ImageSize size, std::uint8_t* out,
-                                   std::size_t stride, Workspace* work) const {
-  if (name.empty()) return ImageFileStatus::missing;
-  try {
-    if (sequence_.store)
-      return sequence_.store->decode(name, size, out, stride, sequence_.deep_bits, &work->bytes);
-    if (const auto status = read_image_file(sequence_.root / name, &work->bytes);
-        status != ImageFileStatus::ok)
-      return status;
-  } catch (const std::bad_alloc&) {
-    // The file does not fit this machine's memory.
-    return ImageFileStatus::unreadable;
-  }
-  return decode_grey(work->bytes, size, out, stride, sequence_.deep_bits);
-}
-
 ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Workspace* work) {
   const ImageSize size{pool_.width(), pool_.height()};
   const std::size_t stride = FramePool::stride(size.width);
   std::uint8_t* out = pool_.writable(slot).data();
-  const auto status = read(name, size, sequence_.bayer ? work->mosaic.data() : out, stride, work);
+  const auto status =
+      decode_image(sequence_, name, size, sequence_.bayer ? work->mosaic.data() : out, stride,
+                   sequence_.deep_bits, &work->bytes);
   const auto step = static_cast<std::ptrdiff_t>(stride);
   if (sequence_.bayer && status == ImageFileStatus::ok)
     bayer_to_grey(work->mosaic.data(), step, size.width, size.height, out, step);
@@ -175,16 +159,16 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Work
 ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work) {
   const int width = pool_.width(), height = pool_.height();
   const std::size_t stride = FramePool::stride(width), wide = FramePool::stride(2 * width);
-  if (const auto status = read(name, {2 * width, height}, work->mosaic.data(), wide, work);
-      status != ImageFileStatus::ok)
-    return status;
+  const auto status = decode_image(sequence_, name, {2 * width, height}, work->mosaic.data(), wide,
+                                   sequence_.deep_bits, &work->bytes);
+  if (status != ImageFileStatus::ok) return status;
   for (std::size_t k = 0; k < 2; ++k) {
     std::uint8_t* out = pool_.writable(own_[k]).data();
     const std::uint8_t* from = work->mosaic.data() + k * static_cast<std::size_t>(width);
     for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y)
       std::copy_n(from + y * wide, width, out + y * stride);
   }
-  return ImageFileStatus::ok;
+  return status;
 }
 
 template <class Attempt>

@@ -79,9 +79,6 @@ class FrameDecoder {
     // Mosaic of a raw sequence in the pool's rows, or both images of a side-by-side file.
     std::vector<std::uint8_t> mosaic;
   };
-  /// Reads an image of that size from a file or the store into rows `stride` bytes apart.
-  [[nodiscard]] ImageFileStatus read(const std::string& name, ImageSize size, std::uint8_t* out,
-                                     std::size_t stride, Workspace* work) const;
   /// Loads an image into the slot. Two calls may run in parallel with separate workspaces.
   [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot, Workspace* work);
   /// Loads a file with both images side by side into the two slots in hand.

@@ -98,36 +98,16 @@ ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* si
 
 ImageFileStatus read_image_size(Bytes head, ImageSize* size) noexcept {
   if (const auto* kind = detect_kind(head)) return kind->size(head, size);
-  // An empty file, or one with only the first bytes of a signature, is a truncated one; other
-  // content is another kind of file.
-  return detail::may_become_png(head) ? ImageFileStatus::truncated : ImageFileStatus::not_an_image;
-}
-
-ImageFileStatus check_image(Bytes bytes, ImageSize* size) noexcept {
-  const auto status = read_image_size(bytes, size);
-  return status == ImageFileStatus::ok ? detect_kind(bytes)->check(bytes) : status;
-}
-
-std::optional<std::uint16_t> peak_of_deep_image(Bytes bytes) {
-  ImageSize size;
-  if (check_image(bytes, &size) != ImageFileStatus::ok) return std::uint16_t{0};
-  const detail::ImageKind& kind = *detect_kind(bytes);
-  if (!kind.deep(bytes)) return std::nullopt;
-  const auto width = static_cast<std::size_t>(size.width);
-  std::vector<std::uint8_t> pixels(width * static_cast<std::size_t>(size.height));
-  detail::DeepSamples deep;
-  return kind.decode(bytes, size, pixels.data(), width, &deep) == ImageFileStatus::ok
-             ? deep.peak
-             : std::uint16_t{0};
+  return head.empty() ? ImageFileStatus::truncated : ImageFileStatus::not_an_image;
 }
 
 ImageFileStatus decode_grey(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
                             int deep_bits) noexcept {
   ImageSize found;
-  if (const auto status = check_image(bytes, &found); status != ImageFileStatus::ok) return status;
+  if (const auto status = read_image_size(bytes, &found); status != ImageFileStatus::ok)
+    return status;
   if (found != size) return ImageFileStatus::wrong_size;
-  detail::DeepSamples deep{deep_bits};
-  return detect_kind(bytes)->decode(bytes, size, out, stride, &deep);
+  return detect_kind(bytes)->decode(bytes, size, out, stride, deep_bits);
 }
 
 }  // namespace vergence::app

@@ -2,7 +2,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -52,20 +51,12 @@ struct ImageSize {
 [[nodiscard]] ImageFileStatus read_image_size(std::span<const std::uint8_t> head,
                                               ImageSize* size) noexcept;
 
-/// Checks that a PNG, JPEG or BMP is complete, because decoders silently fill missing parts with
-/// grey, which would be tracked. Checks PNG chunks up to IEND with their checksums, JPEG's end
-/// marker and BMP's rows. → ok, not_an_image, truncated
-[[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes,
-                                          ImageSize* size) noexcept;
-
-/// Maximum sample of a grey 16-bit PNG; empty for other images. 0 if it cannot be decoded, as for a
-/// black image. Allocates the image.
-[[nodiscard]] std::optional<std::uint16_t> peak_of_deep_image(std::span<const std::uint8_t> bytes);
-
 /// Decodes PNG of any depth and colour, JPEG of grey or three colours, BMP of 8, 24 or 32 bits, PGM
 /// or PPM to 8-bit grey, into size.height rows of `stride` bytes at `out`, without another copy.
-/// Thread-safe. `deep_bits` is the number of used bits of 16-bit samples (8 to 16). If not `ok`,
-/// the content of `out` is undefined. → ok, not_an_image, truncated, undecodable, wrong_size
+/// Thread-safe. Incomplete and damaged files are refused, because decoders silently fill missing
+/// parts with grey, which would be tracked. `deep_bits` is the number of used bits of 16-bit
+/// samples (8 to 16). If not `ok`, the content of `out` is undefined. → ok, not_an_image,
+/// truncated, undecodable, wrong_size
 [[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size,
                                           std::uint8_t* out, std::size_t stride,
                                           int deep_bits = 16) noexcept;

@@ -1,12 +1,11 @@
 #include <algorithm>
 #include <array>
-#include <limits>
+#include <map>
 #include <optional>
 
 #include <fmt/format.h>
 
 #include "app/config/calibration_file.hpp"
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
@@ -162,9 +161,7 @@ std::string number_key(const Camera& camera, const std::string& name) {
 
 std::optional<std::size_t> parse_index(const Camera& camera, const std::string& name) {
   const std::string stem = to_stem(camera, name);
-  if (last_number(stem).empty()) return std::nullopt;
-  const std::string key = number_key(camera, name);
-  const auto n = key.empty() ? std::optional<std::int64_t>(0) : parse_integer(key);
+  const auto n = parse_integer(last_number(stem));
   return n && *n >= 0 ? std::optional(static_cast<std::size_t>(*n)) : std::nullopt;
 }
 
@@ -200,56 +197,34 @@ std::optional<std::vector<Stamp>> stamps_in(const Camera& camera, std::string* u
 
 // ---- pairs by names
 
-/// Merges both sorted lists by their keys. If one side lacks an image, it gets the name that the
-/// image should have.
+/// Pairs by equal keys, in their order. If one side lacks an image, it gets the name that the image
+/// should have. Empty if a camera has a key twice, or fewer than half of the images match.
 template <class Key>
-std::vector<StereoPair> pair_by_key(const Cameras& cameras, const Key& key) {
-  const auto &left = cameras[0].names, &right = cameras[1].names;
-  const auto missing = [&](std::size_t k, const std::string& other) {
-    return cameras[k].side.empty() ? cameras[k].in_folder(fs::path(other).filename().string()) : "";
-  };
+std::optional<std::vector<StereoPair>> pair_by_key(const Cameras& cameras, const Key& key) {
+  std::map<std::string, StereoPair, bool (*)(std::string_view, std::string_view)> by_key(
+      in_name_order);
+  for (std::size_t k = 0; k < 2; ++k)
+    for (const std::string& name : cameras[k].names) {
+      std::string& file = by_key[key(cameras[k], name)].file[k];
+      if (!file.empty()) return std::nullopt;
+      file = name;
+    }
+  const std::size_t left = cameras[0].names.size(), right = cameras[1].names.size();
+  if (2 * (left + right - by_key.size()) < std::min(left, right)) return std::nullopt;
   std::vector<StereoPair> pairs;
-  std::size_t l = 0, r = 0;
-  while (l < left.size() || r < right.size()) {
-    const std::string left_key = l < left.size() ? key(cameras[0], left[l]) : "",
-                      right_key = r < right.size() ? key(cameras[1], right[r]) : "";
-    const bool have_left =
-        l < left.size() && (r == right.size() || !in_name_order(right_key, left_key));
-    const bool have_right =
-        r < right.size() && (l == left.size() || !in_name_order(left_key, right_key));
-    StereoPair pair;
-    pair.file[0] = have_left ? left[l] : missing(0, right[r]);
-    pair.file[1] = have_right ? right[r] : missing(1, left[l]);
-    l += have_left ? 1 : 0;
-    r += have_right ? 1 : 0;
+  for (auto& [ignored, pair] : by_key) {
+    for (std::size_t k = 0; k < 2; ++k)
+      if (pair.file[k].empty() && cameras[k].side.empty())
+        pair.file[k] = cameras[k].in_folder(fs::path(pair.file[1 - k]).filename().string());
     pairs.push_back(std::move(pair));
   }
   return pairs;
 }
 
-/// Pairs by equal names, or else by equal last numbers, if at least half of the images match; empty
-/// otherwise.
-std::optional<std::vector<StereoPair>> pair_by_names(Cameras* cameras) {
-  const std::size_t least = std::min((*cameras)[0].names.size(), (*cameras)[1].names.size());
-  const auto met = [](const Cameras& c, const std::vector<StereoPair>& pairs) {
-    return c[0].names.size() + c[1].names.size() - pairs.size();
-  };
-  auto pairs = pair_by_key(*cameras, to_stem);
-  if (2 * met(*cameras, pairs) >= least) return pairs;
-  Cameras numbered = *cameras;
-  for (Camera& camera : numbered) {
-    std::ranges::stable_sort(camera.names, [&](const std::string& a, const std::string& b) {
-      return in_name_order(number_key(camera, a), number_key(camera, b));
-    });
-    if (std::ranges::adjacent_find(camera.names, [&](const std::string& a, const std::string& b) {
-          return number_key(camera, a) == number_key(camera, b);
-        }) != camera.names.end())
-      return std::nullopt;
-  }
-  pairs = pair_by_key(numbered, number_key);
-  if (2 * met(numbered, pairs) < least) return std::nullopt;
-  *cameras = std::move(numbered);
-  return pairs;
+/// Pairs by equal names, or else by equal last numbers.
+std::optional<std::vector<StereoPair>> pair_by_names(const Cameras& cameras) {
+  auto pairs = pair_by_key(cameras, to_stem);
+  return pairs ? pairs : pair_by_key(cameras, number_key);
 }
 
 std::vector<StereoPair> pair_in_order(const Cameras& cameras) {
@@ -268,7 +243,7 @@ struct Stamped {
 };
 
 /// Pairs of the nearest stamps, within kMaxApart of the interval, in the order of the left ones.
-/// Images without a partner are inserted by their stamp. Empty if there is no pair.
+/// Empty if there is no pair.
 std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 2>& cameras,
                                                       StereoSequence* sequence) {
   const auto &left = cameras[0].stamps, &right = cameras[1].stamps;
@@ -280,29 +255,12 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
   if (offset.farthest > Duration{})
     sequence->assumptions.push_back(
         "images are paired by the nearest stamp; right ones are later by " + describe(offset));
-  if (is_suspicious(offset, interval))
-    sequence->remarks.push_back(pairing_warning("left images", "right images", offset, interval));
-  constexpr std::size_t kAlone = std::numeric_limits<std::size_t>::max();
-  std::vector<std::size_t> partner(left.size(), kAlone);
-  std::vector<bool> paired(right.size(), false);
-  for (const auto& [l, r] : together) partner[l] = r, paired[r] = true;
-  std::vector<std::size_t> alone;
-  for (std::size_t r = 0; r < right.size(); ++r)
-    if (!paired[r]) alone.push_back(r);
-  std::ranges::stable_sort(alone,
-                           [&](std::size_t a, std::size_t b) { return right[a] < right[b]; });
+  const std::size_t alone = left.size() + right.size() - 2 * together.size();
+  sequence->left_out += alone;
+  remark_pairs("left images", "right images", offset, interval, alone, &sequence->remarks);
   std::vector<StereoPair> pairs;
-  auto next = alone.begin();
-  const auto pair_alone = [&] {
-    pairs.push_back({right[*next], {"", cameras[1].names[*next]}});
-    ++next;
-  };
-  for (std::size_t l = 0; l < left.size(); ++l) {
-    while (next != alone.end() && right[*next] < left[l]) pair_alone();
-    pairs.push_back(
-        {left[l], {cameras[0].names[l], partner[l] == kAlone ? "" : cameras[1].names[partner[l]]}});
-  }
-  while (next != alone.end()) pair_alone();
+  for (const auto& [l, r] : together)
+    pairs.push_back({left[l], {cameras[0].names[l], cameras[1].names[r]}});
   return pairs;
 }
 
@@ -446,11 +404,11 @@ std::vector<StereoPair> pair_by_number(const std::vector<std::size_t>& numbers,
 /// an image that the other side lost. If both sides lost one, image N gets line N. Otherwise pairs
 /// in the order of names, if both sides have one image per time.
 std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vector<TimesLine>& times,
-                                        bool by_number, Cameras* cameras,
+                                        bool by_number, const Cameras& cameras,
                                         std::vector<std::string>* assumptions) {
-  const std::size_t left = (*cameras)[0].names.size(), right = (*cameras)[1].names.size();
+  const std::size_t left = cameras[0].names.size(), right = cameras[1].names.size();
   std::vector<StereoPair> pairs = pair_by_names(cameras).value_or(std::vector<StereoPair>{});
-  const auto numbers = parse_indices(*cameras, pairs);
+  const auto numbers = parse_indices(cameras, pairs);
   const bool run = numbers && numbers->back() - numbers->front() + 1 == pairs.size();
   if (run && numbers->front() > 1 && pairs.size() == times.size())
     assumptions->push_back(
@@ -458,7 +416,7 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
   // Without names there must be one line per frame, including lost ones.
   const bool whole = pairs.size() == times.size() && !(by_number && !run);
   if (!whole && !by_number && left == right && left == times.size()) {
-    pairs = pair_in_order(*cameras);
+    pairs = pair_in_order(cameras);
   } else if (!whole && pairs.size() <= times.size()) {
     pairs = numbers ? pair_by_number(*numbers, pairs, times.size()) : std::vector<StereoPair>{};
     if (!pairs.empty() && !by_number)
@@ -479,26 +437,25 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
 // In ns.
 constexpr std::int64_t kAssumedStep = 100'000'000;
 
-std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* cameras,
+std::vector<StereoPair> pair_without_times(const fs::path& folder, const Cameras& cameras,
                                            StereoSequence* sequence) {
   std::string unit;
-  const auto left = stamps_in((*cameras)[0], &unit), right = stamps_in((*cameras)[1], &unit);
+  const auto left = stamps_in(cameras[0], &unit), right = stamps_in(cameras[1], &unit);
   if (left && right)
     if (auto pairs = pair_by_stamps(
-            {Stamped{*left, (*cameras)[0].names}, Stamped{*right, (*cameras)[1].names}},
-            sequence)) {
+            {Stamped{*left, cameras[0].names}, Stamped{*right, cameras[1].names}}, sequence)) {
       sequence->assumptions.push_back("times are the " + unit + " in the images' names");
       return std::move(*pairs);
     }
   auto named = pair_by_names(cameras);
-  const auto &of_left = (*cameras)[0].names, &of_right = (*cameras)[1].names;
+  const auto &of_left = cameras[0].names, &of_right = cameras[1].names;
   if (!named && of_left.size() != of_right.size())
     refuse(folder, 0,
            "has {} left images and {} right ones without common numbers in their names; give both "
            "images of a pair the same name, or write a times.txt that names them: stamp,left "
            "file,right file",
            of_left.size(), of_right.size());
-  std::vector<StereoPair> pairs = named ? std::move(*named) : pair_in_order(*cameras);
+  std::vector<StereoPair> pairs = named ? std::move(*named) : pair_in_order(cameras);
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kAssumedStep);
   sequence->assumptions.emplace_back(
@@ -507,12 +464,12 @@ std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* came
   return pairs;
 }
 
-void pair_cameras(Cameras* cameras, const Lists& lists, StereoSequence* sequence) {
+void pair_cameras(const Cameras& cameras, const Lists& lists, StereoSequence* sequence) {
   const fs::path& root = sequence->root;
   if (!lists.shared && lists.own[0] && lists.own[1]) {
     sequence->times = *lists.own[0];
-    auto pairs = pair_by_stamps({stamped(root, (*cameras)[0], *lists.own[0], lists, sequence),
-                                 stamped(root, (*cameras)[1], *lists.own[1], lists, sequence)},
+    auto pairs = pair_by_stamps({stamped(root, cameras[0], *lists.own[0], lists, sequence),
+                                 stamped(root, cameras[1], *lists.own[1], lists, sequence)},
                                 sequence);
     if (!pairs)
       refuse(*lists.own[1], 0,
@@ -531,8 +488,8 @@ void pair_cameras(Cameras* cameras, const Lists& lists, StereoSequence* sequence
   const std::string& name = times.lines.front().name[0];
   double ignored = 0;
   const bool named_there = !name.empty() && (!parse_number(name, &ignored) ||
-                                             holds((*cameras)[0], named((*cameras)[0], name)));
-  sequence->pairs = named_there ? pair_as_named(*lists.shared, times.lines, *cameras)
+                                             holds(cameras[0], named(cameras[0], name)));
+  sequence->pairs = named_there ? pair_as_named(*lists.shared, times.lines, cameras)
                                 : pair_with_times(root, times.lines, lists.by_number, cameras,
                                                   &sequence->assumptions);
 }
@@ -599,12 +556,13 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   sequence.root = folder;
   sequence.side_by_side = present(folder / "both");
   Cameras cameras;
-  if (auto found = find_cameras(folder); found && !sequence.side_by_side)
+  if (sequence.side_by_side)
+    for (Camera& camera : cameras) camera.below = "both";
+  else if (auto found = find_cameras(folder))
     cameras = std::move(*found);
   else
     // Left and right are reported as missing.
-    for (std::size_t k = 0; k < 2; ++k)
-      cameras[k].below = sequence.side_by_side ? "both" : k == 0 ? "left" : "right";
+    for (std::size_t k = 0; k < 2; ++k) cameras[k].below = k == 0 ? "left" : "right";
   // If the images are in DRIVE/left and DRIVE/right, DRIVE also has their calibration and times.
   if (const fs::path parent = fs::path(cameras[0].below).parent_path();
       !parent.empty() && parent == fs::path(cameras[1].below).parent_path() &&
@@ -612,11 +570,11 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
     return open_folder(folder / parent, given, use);
   for (Camera& camera : cameras)
     if (camera.names.empty()) camera.names = list_images(folder, camera.below);
-  if (sequence.side_by_side ? cameras[0].below != "both" : cameras[0].below != "left")
+  if (!sequence.side_by_side && cameras[0].below != "left")
     sequence.assumptions.push_back(fmt::format("{} is left and {} is right",
                                                cameras[0].names.front(), cameras[1].names.front()));
   sequence.times = folder / "times.txt";
-  pair_cameras(&cameras, find_lists(folder, cameras), &sequence);
+  pair_cameras(cameras, find_lists(folder, cameras), &sequence);
   if (const auto& left = cameras[0].names, &right = cameras[1].names; left.size() != right.size())
     sequence.remarks.push_back(
         fmt::format("there are {} left images and {} right ones: if one camera lost an image "
@@ -635,7 +593,7 @@ StereoSequence open_euroc(const fs::path& folder, bool given, const CalibrationU
   Cameras cameras = cameras_in(sequence.root, {"cam0/data", "cam1/data"});
   Lists lists = find_lists(sequence.root, cameras);
   lists.unit = TimeUnit::nanoseconds;
-  pair_cameras(&cameras, lists, &sequence);
+  pair_cameras(cameras, lists, &sequence);
   if (!given) read_own_calibration(use, cameras, &sequence);
   return sequence;
 }
@@ -652,7 +610,7 @@ StereoSequence open_kitti(const fs::path& folder, bool given) {
   Lists lists = find_lists(folder, cameras);
   lists.unit = TimeUnit::seconds;
   lists.by_number = true;
-  pair_cameras(&cameras, lists, &sequence);
+  pair_cameras(cameras, lists, &sequence);
   if (!colour && !given && is_colour(folder / cameras[0].names.front()))
     sequence.remarks.emplace_back(
         "image_0 and image_1 hold colour images, but P0 and P1 of calib.txt are of the grey "
@@ -686,7 +644,7 @@ StereoSequence open_kitti_raw(const fs::path& folder, bool given,
     lists.own[k] = folders.drive / camera / "timestamps.txt";
   }
   Cameras cameras = cameras_in(folders.drive, below);
-  pair_cameras(&cameras, lists, &sequence);
+  pair_cameras(cameras, lists, &sequence);
   if (given) return sequence;
   sequence.calibration = read_kitti_raw_rig(folders, numbers, first_image_size(sequence, 0)).rig;
   sequence.calibration_source = kKittiRawCalibration;

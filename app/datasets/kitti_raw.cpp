@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/kitti_calibration.hpp"
@@ -21,8 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kFields = 30;
-// In bytes.
-constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;
 
 /// Used columns of a packet; order and units are those of the development kit (dataformat.txt).
 enum Column : std::size_t {
@@ -109,11 +106,11 @@ std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
   return r;
 }
 
-/// Packets of the lines of timestamps.txt, and the number of skipped ones.
+/// Packets of the lines of timestamps.txt, and the skipped ones: missing, or not of 30 numbers.
 struct Packets {
   std::vector<InsRecord> readings{};
   std::vector<Stamp> stamps{};
-  std::size_t missing = 0, broken = 0, without_stamp = 0;
+  std::size_t missing = 0, broken = 0;
   std::string first_missing{}, first_broken{};
 };
 
@@ -126,12 +123,7 @@ Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) 
       if (out.missing++ == 0) out.first_missing = name;
       continue;
     }
-    std::optional<InsRecord> reading;
-    try {
-      reading = parse_packet(read_text(data / name, kLongestPacket));
-    } catch (const InputError&) {
-      // A file that is unreadable or longer than a packet counts as damaged.
-    }
+    auto reading = parse_packet(read_text(data / name));
     if (!reading) {
       if (out.broken++ == 0) out.first_broken = name;
       continue;
@@ -140,13 +132,6 @@ Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) 
     reading->sample.number = i;
     out.readings.push_back(*reading);
     out.stamps.push_back(lines[i].stamp);
-  }
-  std::error_code error;
-  for (fs::directory_iterator it(data, error), end; !error && it != end; it.increment(error)) {
-    const auto index = parse_integer(it->path().stem().string());
-    if (it->path().extension() == ".txt" && index && *index >= 0 &&
-        static_cast<std::size_t>(*index) >= lines.size())
-      ++out.without_stamp;
   }
   return out;
 }
@@ -159,7 +144,6 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
   add_remark(packets.broken,
              fmt::format("packets do not have {} numbers and are skipped; the first is {}", kFields,
                          packets.first_broken));
-  add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are skipped");
   add_remark(disordered, "stamps do not increase; their packets are skipped");
   const auto fixed = [](const InsRecord& r) { return r.sample.fix == FixStatus::fix_3d; };
   add_remark(

@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/datasets/reference_track.hpp"
+#include "app/datasets/text_file.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 
@@ -30,44 +30,6 @@ std::string rows(const Transform& T) {
     out += fmt::format("{}{} {} {} {}", r == 0 ? "" : " ", T.R(r, 0), T.R(r, 1), T.R(r, 2), T.t(r));
   return out;
 }
-
-/// Ground truth at the stamps of frames.
-///
-/// A frame's stamp is measured by the devices' clocks, while the simulated ground truth has exact
-/// stamps. So the first or last frame may be some 0.1 ms outside of it. Up to 1 ms beyond an end,
-/// far less than the interval of frames, the motion there is extrapolated. The error is a/2 · 1 ms
-/// · 201 ms = 1 mm if a vehicle brakes with a = 10 m/s²; the last pose itself would be off by 40 mm
-/// at 40 m/s.
-class Truth {
- public:
-  explicit Truth(const Trajectory& poses) : poses_(poses), track_(poses, kWidestHole) {}
-
-  [[nodiscard]] std::optional<Transform> at(Stamp stamp) const {
-    if (poses_.size() < 2) return track_.at(stamp);
-    if (stamp < poses_.front().stamp) return extrapolate(poses_[1], poses_[0], stamp);
-    if (stamp > poses_.back().stamp)
-      return extrapolate(poses_[poses_.size() - 2], poses_.back(), stamp);
-    return track_.at(stamp);
-  }
-  [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
-
- private:
-  static constexpr Duration kWidestHole = Duration::milliseconds(200);
-  static constexpr Duration kBeyond = Duration::milliseconds(1);
-
-  /// Extrapolates from one pose beyond the end.
-  [[nodiscard]] static std::optional<Transform> extrapolate(const StampedPose& from,
-                                                            const StampedPose& end, Stamp stamp) {
-    const double beyond = std::abs((stamp - end.stamp).to_seconds()),
-                 step = std::abs((end.stamp - from.stamp).to_seconds());
-    if (beyond > kBeyond.to_seconds() || step > kWidestHole.to_seconds()) return std::nullopt;
-    // A share above 1 continues the arc from one rotation to the other.
-    return interpolate(from.T_world_body, end.T_world_body, 1 + beyond / step);
-  }
-
-  const Trajectory& poses_;
-  ReferenceTrack track_;
-};
 
 std::string sensor_yaml(const RigCalibration& rig, std::size_t k) {
   const Intrinsics& lens = rig.intrinsics[k];
@@ -117,10 +79,13 @@ class Writer {
                                  ? fmt::format("{}.png", stamp.ns())
                                  : fmt::format("{:06}.png", index));
   }
-  void add(Stamp stamp) { stamps_.push_back(stamp); }
+  void add(Stamp stamp, const std::optional<Transform>& truth) {
+    stamps_.push_back(stamp);
+    if (truth) truth_.push_back({stamp, *truth});
+  }
 
   /// Writes the text files after all images.
-  void finish(const Truth& truth, ExportResult* result) const {
+  void finish() const {
     const fs::path& out = request_.out;
     switch (request_.format) {
       case ExportFormat::folder:
@@ -145,7 +110,7 @@ class Writer {
         replace_durably(out / "calib.txt", projections(request_.calibration.rig));
         break;
     }
-    write_truth(truth, result);
+    write_truth();
   }
 
  private:
@@ -174,39 +139,30 @@ class Writer {
     if (!tum.empty()) replace_durably(request_.out / "truth.tum", tum);
   }
 
-  void write_truth(const Truth& truth, ExportResult* result) const {
-    const bool kitti = request_.format == ExportFormat::kitti;
-    std::string text;
-    std::size_t without = 0;
-    for (const Stamp stamp : stamps_) {
-      const auto T = truth.at(stamp);
-      if (!T) {
-        ++without;
-        continue;
-      }
-      const Eigen::Quaterniond q = quaternion(T->R);
-      text += kitti
-                  ? rows(*T) + "\n"
-                  : fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp.ns(),
-                                T->t.x(), T->t.y(), T->t.z(), q.w(), q.x(), q.y(), q.z());
-    }
-    if (without > 0 && !truth.empty())
-      result->remarks.push_back(
-          fmt::format("{}{} of {} frames have no ground truth",
-                      kitti ? "poses.txt, which has a pose for every frame, is not written: " : "",
-                      without, stamps_.size()));
-    if (kitti && without == 0) replace_durably(request_.out / "poses.txt", text);
-    if (kitti || text.empty()) return;
+  void write_truth() const {
+    if (truth_.empty()) return;
     const fs::path folder = request_.out / "mav0/state_groundtruth_estimate0";
+    std::string kitti,
+        euroc =
+            "#timestamp,p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],"
+            "q_RS_z []\n";
+    for (const StampedPose& pose : truth_) {
+      const Eigen::Quaterniond q = quaternion(pose.T_world_body.R);
+      const Vec3& t = pose.T_world_body.t;
+      kitti += rows(pose.T_world_body) + "\n";
+      euroc += fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", pose.stamp.ns(),
+                           t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
+    }
+    if (request_.format == ExportFormat::kitti)
+      return replace_durably(request_.out / "poses.txt", kitti);
     make_folder(folder);
-    replace_durably(folder / "data.csv",
-                    "#timestamp,p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y "
-                    "[],q_RS_z []\n" +
-                        text);
+    replace_durably(folder / "data.csv", euroc);
   }
 
   const ExportRequest& request_;
   std::vector<Stamp> stamps_;
+  // Ground truth of these frames.
+  Trajectory truth_;
 };
 
 bool has_pair(const RecordedFrame& frame) {
@@ -263,27 +219,36 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
         first.given.cameras));
   request.calibration.rig.cameras = 2;
   Writer writer(request);
+  const ReferenceTrack track(request.truth);
   std::array<std::vector<std::uint8_t>, 2> pixels;
-  std::size_t done = 0;
+  std::size_t done = 0, without_truth = 0;
   for (const RecordedFrame& frame : session.frames()) {
     progress(done++);
     if (!load_pair(session, frame, &pixels)) {
       ++result.left_out;
       continue;
     }
+    const auto truth = track.at(frame.given.stamp);
+    without_truth += truth ? 0 : 1;
+    // KITTI has a pose for every frame.
+    if (request.format == ExportFormat::kitti && !request.truth.empty() && !truth) continue;
     for (std::size_t k = 0; k < 2; ++k) {
       const RecordedImage& image = frame.images[k];
       write_png(writer.image(result.frames, frame.given.stamp, k),
                 {pixels[k].data(), image.width, image.height, image.width});
     }
-    writer.add(frame.given.stamp);
+    writer.add(frame.given.stamp, truth);
     ++result.frames;
   }
+  if (without_truth > 0 && !request.truth.empty())
+    result.remarks.push_back(
+        fmt::format("{} frames have no ground truth{}", without_truth,
+                    request.format == ExportFormat::kitti ? " and are left out" : ""));
   if (result.frames == 0)
     throw InputError(
-        "no frame has two readable images, so nothing is exported; check that the recording is "
-        "complete");
-  writer.finish(Truth(request.truth), &result);
+        "no frame has two readable images and a ground truth, so nothing is exported; check that "
+        "the recording is complete");
+  writer.finish();
   return result;
 }
 

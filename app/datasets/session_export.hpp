@@ -36,13 +36,13 @@ struct ExportResult {
 ///   folder  left/, right/NNNNNN.png, times.txt (ns), calibration.yaml, truth.tum
 ///   euroc   mav0/cam0, cam1 with data.csv and sensor.yaml, ground truth in
 ///           mav0/state_groundtruth_estimate0 (positions and attitudes of cam0)
-///   kitti   image_0, image_1, times.txt, calib.txt; poses.txt if every frame has ground truth.
+///   kitti   image_0, image_1, times.txt, calib.txt and poses.txt: with ground truth, only frames
+///           that have it.
 ///           KITTI has rectified images: distortion and rotated cameras are refused.
 ///
-/// Frames up to 1 ms beyond the end of the ground truth are extrapolated. Only the first two
-/// cameras are exported. `progress` is called with the number of frames done. Throws InputError if
-/// the disk refuses data and, before writing, for a calibration of another image size, a rig that
-/// the format cannot hold, or without a pair.
+/// Only the first two cameras are exported. `progress` is called with the number of frames done.
+/// Throws InputError if the disk refuses data and, before writing, for a calibration of another
+/// image size, a rig that the format cannot hold, or without a pair.
 ExportResult export_session(const RecordedSession& session, ExportRequest request,
                             const std::function<void(std::size_t)>& progress);
 

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/text_file.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/so3.hpp"
@@ -105,7 +105,6 @@ struct Yaw {
   // Direction of a yaw of 0, in rad from east.
   double zero;
   int sign;
-  [[nodiscard]] double in_enu(double angle) const { return zero + sign * angle; }
 };
 constexpr std::array kYaws{Yaw{"from north counter-clockwise", std::numbers::pi / 2, 1},
                            Yaw{"a compass heading", std::numbers::pi / 2, -1},
@@ -132,8 +131,9 @@ constexpr double kFast = 5.0;
 constexpr double kApart = 1.0;
 // With fewer samples the axes are not determined.
 constexpr std::size_t kEnough = 100;
-// Minimum correlation at which the slope determines the pitch field.
-constexpr double kMinCorrelation = 0.3;
+// Minimum gain of the mean cosine at which the slopes determine the pitch field: those of a path
+// with an RMS slope of 0.7°.
+constexpr double kMinGain = 3e-4;
 // At most one line in this many may be damaged.
 constexpr std::size_t kMaxBroken = 100;
 
@@ -188,17 +188,16 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   if (broken > 0)
     remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers are skipped",
                                    log.filename().string(), broken));
-  const bool ordered =
-      std::ranges::is_sorted(out, [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
-  std::ranges::stable_sort(out, [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
-  const auto twice = std::unique(out.begin(), out.end(),
-                                 [](const Line& a, const Line& b) { return a.stamp == b.stamp; });
-  if (!ordered) remarks->push_back("the samples of the INS are sorted by their stamps");
-  if (twice != out.end())
+  std::vector<Stamp> stamps;
+  for (const Line& line : out) stamps.push_back(line.stamp);
+  const std::vector<std::size_t> kept = ascending(stamps);
+  if (kept.size() < out.size())
     remarks->push_back(
-        fmt::format("{} samples of the INS repeat a stamp and are skipped", out.end() - twice));
-  out.erase(twice, out.end());
-  return out;
+        fmt::format("{} samples of the INS have stamps that do not increase and are skipped",
+                    out.size() - kept.size()));
+  std::vector<Line> in_order;
+  for (const std::size_t i : kept) in_order.push_back(out[i]);
+  return in_order;
 }
 
 /// Swaps the columns if latitude exceeds 90 in all lines.
@@ -234,12 +233,16 @@ std::vector<Moving> motions(const std::vector<Line>& lines) {
   return out;
 }
 
-/// Selects the velocity axes that agree best with the motion of the position, and the yaw that
-/// agrees best with the course. The mean cosine is used, because the vehicle may also drive
-/// backwards.
-void decide_axes(const std::vector<Moving>& moving, const std::vector<Moving>& fast,
-                 Conventions* c) {
-  double least = 1e300, most = -1e300;
+Mat3 attitude(const Line& line, const Conventions& c) {
+  const double roll = line.angles[c.pitch_first ? 1 : 0],
+               pitch = line.angles[c.pitch_first ? 0 : 1];
+  return exp_so3(Vec3(0, 0, c.yaw.zero + c.yaw.sign * line.angles.z())) *
+         exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) * exp_so3(Vec3(roll, 0, 0));
+}
+
+/// Selects the velocity axes that agree best with the motion of the position.
+void decide_axes(const std::vector<Moving>& moving, Conventions* c) {
+  double least = 1e300;
   for (const Axes& axes : kAxes) {
     const Mat3 to_enu = to_matrix(axes);
     double sum = 0;
@@ -247,39 +250,26 @@ void decide_axes(const std::vector<Moving>& moving, const std::vector<Moving>& f
       sum += (to_enu * m.line->velocity - m.motion).head<2>().squaredNorm();
     if (sum < least) least = sum, c->enu_of_velocity = to_enu, c->axes = axes.phrase;
   }
-  for (const Yaw& yaw : kYaws) {
-    double sum = 0;
-    for (const Moving& m : fast)
-      sum += std::cos(yaw.in_enu(m.line->angles.z()) - std::atan2(m.motion.y(), m.motion.x()));
-    if (sum > most) most = sum, c->yaw = yaw;
-  }
 }
 
-double correlation(const std::vector<Moving>& fast, const std::vector<double>& slopes,
-                   Eigen::Index field) {
-  const double n = static_cast<double>(fast.size());
-  double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
-  for (std::size_t i = 0; i < fast.size(); ++i) {
-    const double a = fast[i].line->angles[field], b = slopes[i];
-    x += a, y += b, xx += a * a, yy += b * b, xy += a * b;
-  }
-  const double spread = (xx - x * x / n) * (yy - y * y / n);
-  return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : 0;
-}
-
-/// Selects as pitch the angle that correlates with the slope of the path. Returns false if neither
-/// does.
-bool decide_pitch(const std::vector<Moving>& fast, Conventions* c) {
-  std::vector<double> slopes;
-  for (const Moving& m : fast) {
-    const Vec3 v = c->enu_of_velocity * m.line->velocity;
-    slopes.push_back(std::atan2(v.z(), v.head<2>().norm()));
-  }
-  const double first = correlation(fast, slopes, 0), second = correlation(fast, slopes, 1);
-  if (std::max(std::abs(first), std::abs(second)) < kMinCorrelation) return false;
-  c->pitch_first = std::abs(first) > std::abs(second);
-  c->nose_up_positive = (c->pitch_first ? first : second) > 0;
-  return true;
+/// Selects the angles whose forward axis agrees best with the velocity. The mean cosine is used,
+/// because the vehicle may also drive backwards. On a level path the pitch is that of the MTi-G.
+void decide_angles(const std::vector<Moving>& fast, Conventions* c) {
+  double most = -2;
+  Conventions best = *c;
+  for (const Yaw& yaw : kYaws)
+    for (const bool pitch_first : {false, true})
+      for (const bool nose_up_positive : {false, true}) {
+        const Conventions next{c->enu_of_velocity, c->axes, yaw, pitch_first, nose_up_positive};
+        double sum = 0;
+        for (const Moving& m : fast)
+          sum += attitude(*m.line, next)
+                     .col(0)
+                     .dot((c->enu_of_velocity * m.line->velocity).normalized());
+        const double mean = sum / static_cast<double>(fast.size());
+        if (mean > most + kMinGain) most = mean, best = next;
+      }
+  *c = best;
 }
 
 Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* remarks) {
@@ -295,12 +285,11 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
         "yaw from north counter-clockwise are assumed");
     return c;
   }
-  decide_axes(moving, fast, &c);
-  const bool slope = decide_pitch(fast, &c);
+  decide_axes(moving, &c);
+  decide_angles(fast, &c);
   remarks->push_back(fmt::format(
-      "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
-      c.axes, c.yaw.phrase, c.pitch_first ? 10 : 11, c.nose_up_positive ? "positive" : "negative",
-      slope ? "" : " (assumed, because the path is too level)"));
+      "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up", c.axes,
+      c.yaw.phrase, c.pitch_first ? 10 : 11, c.nose_up_positive ? "positive" : "negative"));
   return c;
 }
 
@@ -313,12 +302,7 @@ InsSample to_sample(const Line& line, const Conventions& c, std::uint64_t number
   s.position = line.place;
   const Vec3 v = c.enu_of_velocity * line.velocity;
   s.velocity_enu = {v.x(), v.y(), v.z()};
-  const double roll = line.angles[c.pitch_first ? 1 : 0],
-               pitch = line.angles[c.pitch_first ? 0 : 1];
-  const Mat3 R = exp_so3(Vec3(0, 0, c.yaw.in_enu(line.angles.z()))) *
-                 exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) *
-                 exp_so3(Vec3(roll, 0, 0));
-  const Eigen::Quaterniond q = quaternion(R);
+  const Eigen::Quaterniond q = quaternion(attitude(line, c));
   s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
   return s;
 }

@@ -1,7 +1,12 @@
 #include "app/datasets/stereo_sequence.hpp"
 
 #include <algorithm>
+#include <new>
+#include <optional>
 #include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
 #include "app/datasets/detail/bag_images.hpp"
@@ -10,6 +15,8 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
 #include "app/runtime/terminal_text.hpp"
 
 namespace vergence::app {
@@ -108,8 +115,49 @@ std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& fol
   return found;
 }
 
+// In s. No stereo camera is faster than the first, and motion cannot be predicted across the
+// second.
+constexpr double kShortestStep = 1e-3, kLongestStep = 10;
+// The pairs are spread over the sequence, because a part of it may be dark.
+constexpr std::size_t kSampledPairs = 5;
+// Used bits of 16.
+constexpr int kFewestBits = 10;
+
+/// Phrase about how to unpack a bag that was compressed as a whole (`drive.mcap.zstd`); empty if it
+/// was not.
+std::string unpack_advice(const std::filesystem::path& file) {
+  struct Packed {
+    std::string_view ending, command;
+  };
+  constexpr std::array kPacked{Packed{".zstd", "zstd -d"},   Packed{".zst", "zstd -d"},
+                               Packed{".lz4", "lz4 -d"},     Packed{".gz", "gunzip -k"},
+                               Packed{".bz2", "bunzip2 -k"}, Packed{".xz", "unxz -k"},
+                               Packed{".zip", "unzip"},      Packed{".7z", "7z x"},
+                               Packed{".tar", "tar -xf"},    Packed{".tgz", "tar -xf"}};
+  const std::string name = file.filename().string();
+  const auto packed =
+      std::ranges::find_if(kPacked, [&](const Packed& p) { return name.ends_with(p.ending); });
+  if (packed == kPacked.end()) return "";
+  return "is compressed (" + std::string(packed->ending.substr(1)) + "); unpack it with `" +
+         std::string(packed->command) + " " + name + "` and pass the result";
+}
+
 }  // namespace
 
+namespace detail {
+
+void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold) {
+  std::error_code error;
+  if (std::filesystem::is_directory(folder, error)) return;
+  refuse(folder, 0,
+         std::filesystem::exists(folder, error)
+             ? std::string("is not a directory; a directory with ") + what_it_should_hold +
+                   " is expected"
+             : std::string("does not exist; a directory with ") + what_it_should_hold +
+                   " is expected");
+}
+
+}  // namespace detail
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                              const SequenceOptions& options) {
   if (!is_bag(format)) detail::require_folder(folder, "a drive");
@@ -131,23 +179,6 @@ std::optional<SequenceFormat> bag_format(const std::filesystem::path& file) {
   // rosbag uses the second ending while recording, and after a power failure.
   if (name.ends_with(".bag") || name.ends_with(".bag.active")) return SequenceFormat::rosbag;
   return std::nullopt;
-}
-
-std::string unpack_advice(const std::filesystem::path& file) {
-  struct Packed {
-    std::string_view ending, command;
-  };
-  constexpr std::array kPacked{Packed{".zstd", "zstd -d"},   Packed{".zst", "zstd -d"},
-                               Packed{".lz4", "lz4 -d"},     Packed{".gz", "gunzip -k"},
-                               Packed{".bz2", "bunzip2 -k"}, Packed{".xz", "unxz -k"},
-                               Packed{".zip", "unzip"},      Packed{".7z", "7z x"},
-                               Packed{".tar", "tar -xf"},    Packed{".tgz", "tar -xf"}};
-  const std::string name = file.filename().string();
-  const auto packed =
-      std::ranges::find_if(kPacked, [&](const Packed& p) { return name.ends_with(p.ending); });
-  if (packed == kPacked.end()) return "";
-  return "is compressed (" + std::string(packed->ending.substr(1)) + "); unpack it with `" +
-         std::string(packed->command) + " " + name + "` and pass the result";
 }
 
 std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
@@ -188,6 +219,18 @@ ImageFileStatus image_size(const StereoSequence& sequence, const std::string& na
                         : read_image_size(sequence.root / name, size);
 }
 
+ImageFileStatus decode_image(const StereoSequence& sequence, const std::string& name,
+                             ImageSize size, std::uint8_t* out, std::size_t stride, int deep_bits,
+                             std::vector<std::uint8_t>* work) try {
+  if (name.empty()) return ImageFileStatus::missing;
+  if (sequence.store) return sequence.store->decode(name, size, out, stride, deep_bits, work);
+  const auto status = read_image_file(sequence.root / name, work);
+  return status == ImageFileStatus::ok ? decode_grey(*work, size, out, stride, deep_bits) : status;
+} catch (const std::bad_alloc&) {
+  // The file does not fit this machine's memory.
+  return ImageFileStatus::unreadable;
+}
+
 ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
   ImageSize size;
   for (const StereoPair& pair : sequence.pairs)
@@ -199,18 +242,154 @@ ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
              (camera == 0 ? "left" : "right") + " camera");
 }
 
-namespace detail {
-
-void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold) {
-  std::error_code error;
-  if (std::filesystem::is_directory(folder, error)) return;
-  refuse(folder, 0,
-         std::filesystem::exists(folder, error)
-             ? std::string("is not a directory; a directory with ") + what_it_should_hold +
-                   " is expected"
-             : std::string("does not exist; a directory with ") + what_it_should_hold +
-                   " is expected");
+void check_times(const StereoSequence& sequence) {
+  // Half of the 64-bit range in ns, 1823 to 2116, so that differences of two stamps do not
+  // overflow.
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
+  const std::filesystem::path file = sequence.times.empty() ? sequence.root : sequence.times;
+  for (const StereoPair& pair : sequence.pairs)
+    if (pair.stamp.ns() > kFarthest || pair.stamp.ns() < -kFarthest)
+      refuse(file, 0,
+             "has the stamp {} ns, {} s from 1970, outside the years 1824 to 2116; check its unit "
+             "and that the line is complete",
+             pair.stamp.ns(), format_seconds(pair.stamp.ns()));
+  if (sequence.pairs.size() < 3) return;
+  // Forward steps in s.
+  std::vector<double> steps;
+  std::size_t backward = 0;
+  for (std::size_t i = 1; i < sequence.pairs.size(); ++i) {
+    const double step = (static_cast<double>(sequence.pairs[i].stamp.ns()) -
+                         static_cast<double>(sequence.pairs[i - 1].stamp.ns())) *
+                        1e-9;
+    if (sequence.pairs[i].stamp > sequence.pairs[i - 1].stamp)
+      steps.push_back(step);
+    else if (sequence.pairs[i].stamp < sequence.pairs[i - 1].stamp)
+      ++backward;
+  }
+  const std::size_t all = sequence.pairs.size() - 1, still = all - backward - steps.size();
+  if (2 * steps.size() < all && still > backward)
+    refuse(file, 0,
+           "has times of which {} of {} repeat the one before; write them with more digits", still,
+           all);
+  if (2 * steps.size() < all)
+    refuse(file, 0,
+           "has times that do not increase: of {} steps from pair to pair {} go back and {} are "
+           "zero; sort the lines like the images, oldest first",
+           all, backward, still);
+  // The lower middle is used, because a gap does not indicate the unit.
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  if (*middle >= kShortestStep && *middle <= kLongestStep) return;
+  if (*middle == 1e-9 && backward + still == 0)
+    refuse(file, 0,
+           "has frame numbers (1, 2, 3 …) instead of times; write times, or remove the file so "
+           "that pairs are assumed 0.1 s apart");
+  refuse(file, 0,
+         "has a median interval of {:.4g} s between pairs, outside 1 ms to 10 s; check the unit of "
+         "its times.{}",
+         *middle,
+         // Other formats have a fixed unit.
+         file.extension() == ".txt"
+             ? " Whole numbers are read as nanoseconds, numbers with a point as seconds"
+             : "");
 }
 
-}  // namespace detail
+void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
+  const std::size_t end =
+      first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
+  std::size_t good = 0, bad = 0;
+  std::string message;
+  for (std::size_t i = first; i < end; ++i)
+    for (std::size_t k = 0; k < 2; ++k) {
+      const std::string& name = sequence.pairs[i].file[k];
+      if (name.empty()) continue;
+      ImageSize size;
+      if (image_size(sequence, name, &size) != ImageFileStatus::ok) continue;
+      const Intrinsics& camera = sequence.calibration.intrinsics[k];
+      const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
+      ++(size == requested ? good : bad);
+      if (size == requested || !message.empty()) continue;
+      message = (sequence.root / name).string() + ": is " + text(size) +
+                " pixels, but the calibration of this camera (" + sequence.calibration_source +
+                ") is for " + text(requested) +
+                (sequence.side_by_side ? " (twice its width, side by side)" : "") +
+                "; use the calibration that belongs to these images";
+    }
+  // Single images of another size are skipped as frames.
+  if (bad > good) throw InputError(message);
+}
+
+void find_deep_bits(StereoSequence* sequence) {
+  if (sequence->pairs.empty()) return;
+  std::vector<std::uint8_t> whole, low, work;
+  // Maximum of the upper 8 bits; −1 before the first image that is not black.
+  int peak = -1;
+  for (std::size_t i = 0; i < kSampledPairs; ++i)
+    for (const std::string& name :
+         sequence->pairs[i * (sequence->pairs.size() - 1) / (kSampledPairs - 1)].file) {
+      ImageSize size;
+      if (name.empty() || image_size(*sequence, name, &size) != ImageFileStatus::ok) continue;
+      const auto width = static_cast<std::size_t>(size.width);
+      whole.resize(width * static_cast<std::size_t>(size.height));
+      low.resize(whole.size());
+      if (decode_image(*sequence, name, size, whole.data(), width, 16, &work) !=
+              ImageFileStatus::ok ||
+          decode_image(*sequence, name, size, low.data(), width, kFewestBits, &work) !=
+              ImageFileStatus::ok ||
+          std::ranges::all_of(low, [](std::uint8_t v) { return v == 0; }))
+        continue;
+      // The number of bits makes no difference to samples of 8 bits.
+      if (whole == low) return;
+      peak = std::max<int>(peak, *std::ranges::max_element(whole));
+    }
+  if (peak < 0) return;
+  for (const int bits : {kFewestBits, 12, 14})
+    if (peak < 1 << (bits - 8)) {
+      sequence->deep_bits = bits;
+      sequence->remarks.push_back(
+          fmt::format("the images have 16 bits per sample, of which {0} are used: they are read as "
+                      "images of {0} bits",
+                      bits));
+      return;
+    }
+}
+
+SequenceFormat sequence_format(const std::string& word, const std::filesystem::path& folder) {
+  constexpr const char* kLayouts =
+      "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt "
+      "in the parent directory), EuRoC (mav0), a folder with left/ and right/ (or other usual "
+      "names), times.txt and calibration.yaml, UQ St Lucia, bags of ROS 2 (.mcap, .db3) and ROS 1 "
+      "(.bag), sessions with a recording (drive.mcap)";
+  const std::vector<std::string> words{"kitti", "kitti-raw", "euroc", "folder", "st-lucia",
+                                       "mcap",  "rosbag",    "db3",   "session"};
+  if (const auto at = std::ranges::find(words, word); at != words.end())
+    return static_cast<SequenceFormat>(at - words.begin());
+  if (word != "auto")
+    throw InputError(fmt::format("--format \"{}\": unknown format; use auto, {}{}", word,
+                                 fmt::join(words, ", "), did_you_mean(word, words)));
+  std::error_code ignored;
+  if (const auto bag = bag_format(folder); bag && !std::filesystem::is_directory(folder, ignored))
+    return *bag;
+  if (!std::filesystem::is_directory(folder, ignored))
+    if (const std::string advice = unpack_advice(folder); !advice.empty())
+      refuse(folder, 0, advice);
+  if (!std::filesystem::is_directory(folder, ignored))
+    refuse(folder, 0, "{}; pass a data-set directory, or a .mcap, .db3 or .bag file",
+           std::filesystem::exists(folder, ignored) ? "is a file that is not a bag"
+                                                    : "no such directory");
+  if (const auto found = find_format(folder)) return *found;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored))
+    if (const std::string advice = unpack_advice(it->path()); !advice.empty())
+      refuse(it->path(), 0, advice);
+  refuse(folder, 0, "not a known data-set format; expected is one of: {}", kLayouts);
+}
+
+void check_topics(SequenceFormat format, const BagTopics& topics) {
+  if (!is_bag(format) && !topics.empty())
+    throw InputError(
+        "--left-topic, --right-topic, --ins-topic and --imu-topic select topics of a bag, and DATA "
+        "is not a bag; remove them");
+}
+
 }  // namespace vergence::app

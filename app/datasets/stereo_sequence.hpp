@@ -107,12 +107,15 @@ struct BagTopics {
 /// Returns the bag format by the file name's ending; nullopt if it is none.
 [[nodiscard]] std::optional<SequenceFormat> bag_format(const std::filesystem::path& file);
 
-/// Phrase about how to unpack a bag that was compressed as a whole (`drive.mcap.zstd`); empty if it
-/// was not.
-[[nodiscard]] std::string unpack_advice(const std::filesystem::path& file);
-
 /// Format of a directory (or a bag's file) by its content; empty if unknown.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
+
+/// Format by a value of --format or, with `auto`, by the content of `folder`. Throws InputError if
+/// unknown.
+[[nodiscard]] SequenceFormat sequence_format(const std::string& word,
+                                             const std::filesystem::path& folder);
+/// Throws InputError if topics are named but the format is not a bag.
+void check_topics(SequenceFormat format, const BagTopics& topics);
 
 /// Part of a sequence to open, and its calibration.
 struct SequenceOptions {
@@ -162,6 +165,12 @@ struct SequenceOptions {
 /// Size of an image of the sequence, from its header. → as read_image_size()
 [[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,
                                          ImageSize* size);
+
+/// Decodes an image of the sequence; *work is reused memory. Thread-safe. → as decode_grey(), and
+/// missing, unreadable, too_many_files
+[[nodiscard]] ImageFileStatus decode_image(const StereoSequence& sequence, const std::string& name,
+                                           ImageSize size, std::uint8_t* out, std::size_t stride,
+                                           int deep_bits, std::vector<std::uint8_t>* work);
 
 /// Size of the first readable image of camera `camera`. Throws InputError if there is none.
 [[nodiscard]] ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera);

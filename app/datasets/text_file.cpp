@@ -1,14 +1,18 @@
 #include "app/datasets/text_file.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
+#include <limits>
 #include <system_error>
 
-#include "app/datasets/decimal.hpp"
+#include <fmt/format.h>
+
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -27,6 +31,19 @@ std::string narrowed(const std::string& wide, bool min_first) {
     text.push_back(high == 0 && static_cast<signed char>(low) >= 0 ? low : '?');
   }
   return text;
+}
+
+// A second has this many decimals in nanoseconds.
+constexpr int kDecimals = 9;
+// A larger exponent means 0 or a time far outside of 64 bits.
+constexpr int kMaxExponent = 100;
+// Longer text is not a number.
+constexpr std::size_t kMaxText = 64;
+
+template <class Integer>
+bool parse_whole(std::string_view text, Integer* value) noexcept {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc{} && end == text.data() + text.size() && !text.empty();
 }
 
 }  // namespace
@@ -69,7 +86,7 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   return min_first || text.starts_with("\xFE\xFF") ? narrowed(text, min_first) : text;
 }
 
-Lines::Lines(std::string_view text) noexcept : rest_(text) {
+Lines::Lines(std::string_view text, Comments comments) noexcept : rest_(text), comments_(comments) {
   if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
 }
 
@@ -77,10 +94,11 @@ bool Lines::next(std::string_view* line) noexcept {
   while (!rest_.empty()) {
     const std::size_t end = rest_.find('\n');
     const std::string_view raw = rest_.substr(0, end);
-    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    unfinished_ = end == std::string_view::npos;
+    rest_.remove_prefix(unfinished_ ? rest_.size() : end + 1);
     ++number_;
     const std::string_view content = trimmed(raw);
-    if (content.empty() || content.front() == '#') continue;
+    if (content.empty() || (content.front() == '#' && comments_ == Comments::skip)) continue;
     *line = content;
     return true;
   }
@@ -121,6 +139,65 @@ bool parse_number(std::string_view field, double* value) noexcept {
   if (error != std::errc{} || end != field.data() + field.size() || !std::isfinite(v)) return false;
   *value = v;
   return true;
+}
+
+std::optional<std::int64_t> parse_decimal(std::string_view text, int decimals) noexcept {
+  if (text.empty() || text.size() >= kMaxText) return std::nullopt;
+  const bool negative = text.front() == '-';
+  if (negative || text.front() == '+') text.remove_prefix(1);
+  const std::size_t e = std::min(text.find_first_of("eE"), text.size());
+  int exponent = 0;
+  if (e < text.size()) {
+    std::string_view power = text.substr(e + 1);
+    if (power.starts_with('+') && !power.starts_with("+-")) power.remove_prefix(1);
+    if (!parse_whole(power, &exponent) || exponent > kMaxExponent || exponent < -kMaxExponent)
+      return std::nullopt;
+  }
+  std::string digits(text.substr(0, e));
+  const std::size_t point = std::min(digits.find('.'), digits.size());
+  digits.erase(point, 1);
+  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string::npos)
+    return std::nullopt;
+  // Number of digits before the point of the result.
+  const int whole = static_cast<int>(point) + exponent + decimals;
+  const auto kept = static_cast<std::size_t>(std::max(whole, 0));
+  const bool up = whole >= 0 && kept < digits.size() && digits[kept] >= '5';
+  digits.resize(kept, '0');
+  std::int64_t value = 0;
+  if (kept > 0 && !parse_whole(std::string_view(digits), &value)) return std::nullopt;
+  if (up && value < std::numeric_limits<std::int64_t>::max()) ++value;
+  return negative ? -value : value;
+}
+
+std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
+  return parse_decimal(text, kDecimals);
+}
+
+std::optional<std::int64_t> parse_integer(std::string_view text) noexcept {
+  std::int64_t value = 0;
+  return parse_whole(text, &value) ? std::optional(value) : std::nullopt;
+}
+
+std::string format_seconds(std::int64_t ns) {
+  std::string text;
+  append_seconds(&text, ns);
+  return text;
+}
+
+void append_seconds(std::string* line, std::int64_t ns) {
+  constexpr std::uint64_t kSecond = 1'000'000'000;
+  // The magnitude is unsigned, because that of the minimum does not fit a signed integer.
+  const std::uint64_t magnitude =
+      ns < 0 ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
+  fmt::format_to(std::back_inserter(*line), "{}{}.{:09}", ns < 0 ? "-" : "", magnitude / kSecond,
+                 magnitude % kSecond);
+}
+
+std::string_view trimmed(std::string_view text) noexcept {
+  constexpr std::string_view kBlanks = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
 }  // namespace vergence::app

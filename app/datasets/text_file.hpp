@@ -1,6 +1,8 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -8,7 +10,7 @@
 
 #include <fmt/format.h>
 
-/// External text: lines and numbers, with errors as file:line.
+/// External text: lines and numbers, with errors as file:line, and numbers as text.
 namespace vergence::app {
 
 /// Throws InputError "FILE:LINE: WHAT"; without the line if `line` is 0.
@@ -30,15 +32,20 @@ template <class First, class... Rest>
 /// `text`, which must outlive it.
 class Lines {
  public:
-  explicit Lines(std::string_view text) noexcept;
-  /// Returns false at the end. Empty, blank and `#` lines are skipped but counted.
+  enum class Comments : std::uint8_t { skip, keep };
+  explicit Lines(std::string_view text, Comments comments = Comments::skip) noexcept;
+  /// Returns false at the end. Empty and blank lines, and those with `#`, are skipped but counted.
   [[nodiscard]] bool next(std::string_view* line) noexcept;
+  /// True if the last line ends the text without an end of line, so that it may be incomplete.
+  [[nodiscard]] bool unfinished() const noexcept { return unfinished_; }
   /// Number of the last returned line, from 1.
   [[nodiscard]] std::size_t number() const noexcept { return number_; }
 
  private:
   std::string_view rest_;
+  Comments comments_;
   std::size_t number_ = 0;
+  bool unfinished_ = false;
 };
 
 /// Splits at the separator (' ' stands for any run of blanks and tabs). Returns the number of
@@ -48,5 +55,23 @@ class Lines {
 
 /// Parses a field that is one finite number. If false, *value is unchanged.
 [[nodiscard]] bool parse_number(std::string_view field, double* value) noexcept;
+
+/// Parses a decimal number times 10^decimals exactly, without a double. Further digits round half
+/// away from zero. Empty if it is not a number (including blanks) or exceeds 64 bits.
+[[nodiscard]] std::optional<std::int64_t> parse_decimal(std::string_view text,
+                                                        int decimals) noexcept;
+/// Parses seconds and returns nanoseconds (`12`, `-0.5`, `1.044989e-01`).
+[[nodiscard]] std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept;
+
+/// Parses the whole text as a decimal integer; empty otherwise.
+[[nodiscard]] std::optional<std::int64_t> parse_integer(std::string_view text) noexcept;
+
+/// Nanoseconds as seconds with nine decimals, such as `-0.000000001`, without rounding.
+[[nodiscard]] std::string format_seconds(std::int64_t ns);
+/// Appends to *line without allocating if the line has room.
+void append_seconds(std::string* line, std::int64_t ns);
+
+/// Removes blanks, tabs and carriage returns at both ends.
+[[nodiscard]] std::string_view trimmed(std::string_view text) noexcept;
 
 }  // namespace vergence::app

@@ -2,16 +2,13 @@
 
 #include <algorithm>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/image_file.hpp"
-#include "app/datasets/stamp_text.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/datasets/times_file.hpp"
 
 namespace vergence::app {
 namespace {
-
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 /// Returns a comment without its marker; nullopt if the line is none.
 std::size_t comment_mark(std::string_view line) noexcept {
@@ -33,16 +30,12 @@ bool begins_row(std::string_view field) {
 
 }  // namespace
 
-TextTable::TextTable(std::string_view text) : rest_(text) {
+TextTable::TextTable(std::string_view text) : lines_(text, Lines::Comments::keep) {
   // In lines.
   constexpr std::size_t kMaxHeadings = 50;
-  if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
-  std::string_view headings;
-  for (std::size_t others = 0;;) {
-    const std::string_view before = rest_;
-    const std::size_t number = number_;
-    std::string_view line;
-    if (!next_line(&line)) break;
+  std::string_view headings, line;
+  Lines before = lines_;
+  for (std::size_t others = 0; lines_.next(&line); before = lines_) {
     if (const std::size_t mark = comment_mark(line); mark > 0) {
       headings = trimmed(line.substr(mark));
       continue;
@@ -51,15 +44,13 @@ TextTable::TextTable(std::string_view text) : rest_(text) {
                  : line.find(',') != std::string_view::npos ? ','
                                                             : ' ';
     split_into(line, &fields_);
-    if (!fields_.empty() && begins_row(fields_.front())) {
-      rest_ = before;
-      number_ = number;
-      break;
-    }
+    if (!fields_.empty() && begins_row(fields_.front())) break;
     headings = line;
     // The text is no table.
-    if (++others > kMaxHeadings) rest_ = {};
+    if (++others > kMaxHeadings) lines_ = Lines("");
   }
+  // The first row is read again.
+  lines_ = before;
   const char of_rows = separator_;
   if (headings.find(',') != std::string_view::npos) separator_ = ',';
   if (headings.find(';') != std::string_view::npos) separator_ = ';';
@@ -68,20 +59,8 @@ TextTable::TextTable(std::string_view text) : rest_(text) {
   fields_.clear();
 }
 
-bool TextTable::next_line(std::string_view* line) {
-  while (!rest_.empty()) {
-    const std::size_t end = rest_.find('\n');
-    *line = trimmed(rest_.substr(0, end));
-    unfinished_ = end == std::string_view::npos;
-    rest_.remove_prefix(unfinished_ ? rest_.size() : end + 1);
-    ++number_;
-    if (!line->empty()) return true;
-  }
-  return false;
-}
-
 bool TextTable::next() {
-  for (std::string_view line; next_line(&line);) {
+  for (std::string_view line; lines_.next(&line);) {
     if (comment_mark(line) > 0) continue;
     split_into(line, &fields_);
     return true;
@@ -103,12 +82,12 @@ void TextTable::split_into(std::string_view line, std::vector<std::string_view>*
 void put_decimal_points(std::string* text) {
   TextTable table(*text);
   if (table.separator() != ';' || !table.next()) return;
-  const auto has = [](char sign) {
-    return [sign](std::string_view field) { return field.find(sign) != std::string_view::npos; };
+  const auto any_has = [&table](char sign) {
+    return std::ranges::any_of(table.fields(), [sign](std::string_view field) {
+      return field.find(sign) != std::string_view::npos;
+    });
   };
-  const auto& fields = table.fields();
-  if (std::ranges::any_of(fields, has(',')) && std::ranges::none_of(fields, has('.')))
-    std::ranges::replace(*text, ',', '.');
+  if (any_has(',') && !any_has('.')) std::ranges::replace(*text, ',', '.');
 }
 
 }  // namespace vergence::app

@@ -4,6 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "app/datasets/text_file.hpp"
+
 /// Tables of numbers as programs write them.
 namespace vergence::app {
 
@@ -18,9 +20,9 @@ class TextTable {
   [[nodiscard]] bool next();
   [[nodiscard]] const std::vector<std::string_view>& fields() const noexcept { return fields_; }
   /// Number of the last row, from 1.
-  [[nodiscard]] std::size_t line() const noexcept { return number_; }
-  /// True if the last row ends the text without an end of line, so that it may be incomplete.
-  [[nodiscard]] bool unfinished() const noexcept { return unfinished_; }
+  [[nodiscard]] std::size_t line() const noexcept { return lines_.number(); }
+  /// True if the last row may be incomplete (Lines::unfinished()).
+  [[nodiscard]] bool unfinished() const noexcept { return lines_.unfinished(); }
 
   /// One of ',', ';' and ' '.
   [[nodiscard]] char separator() const noexcept { return separator_; }
@@ -28,12 +30,9 @@ class TextTable {
   [[nodiscard]] const std::vector<std::string_view>& names() const noexcept { return names_; }
 
  private:
-  [[nodiscard]] bool next_line(std::string_view* line);
   void split_into(std::string_view line, std::vector<std::string_view>* fields) const;
 
-  std::string_view rest_;
-  std::size_t number_ = 0;
-  bool unfinished_ = false;
+  Lines lines_;
   char separator_ = ' ';
   std::vector<std::string_view> names_, fields_;
 };

@@ -1,8 +1,15 @@
 #include "app/datasets/times_file.hpp"
 
-#include "app/datasets/decimal.hpp"
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <ranges>
+#include <vector>
+
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/text_table.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app {
 namespace {
@@ -20,6 +27,75 @@ std::string name_in(const std::filesystem::path& file, std::size_t line, std::st
   if (name.empty() || field.find("..") != std::string_view::npos || name == ".")
     refuse(file, line, "`{}` is not the name of an image in its directory", field.substr(0, 40));
   return std::string(name);
+}
+
+// In ns.
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+/// Unit of times since 1970, which share their leading digits; empty if they do not. Times since
+/// boot may have as many digits in a smaller unit. Then only `relative` gives plausible steps.
+std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> times,
+                                          TimeUnit relative) {
+  // Times are in s.
+  constexpr double kSpread = 0.05, kYear1973 = 1e8, kYear2286 = 1e10;
+  // Shortest and longest step of a sequence in s.
+  constexpr double kShortest = 1e-4, kLongest = 10;
+  std::vector<double> values, steps;
+  for (const std::string_view text : times) {
+    double v = 0;
+    if (!parse_number(text, &v)) continue;
+    if (!values.empty()) steps.push_back(std::abs(v - values.back()));
+    values.push_back(std::abs(v));
+  }
+  if (values.empty()) return std::nullopt;
+  std::ranges::sort(values);
+  const std::size_t n = values.size();
+  const double middle = values[n / 2];
+  if (values[3 * n / 4] - values[n / 4] > kSpread * middle) return std::nullopt;
+  for (const TimeUnit unit :
+       {TimeUnit::seconds, TimeUnit::milliseconds, TimeUnit::microseconds, TimeUnit::nanoseconds}) {
+    const auto of_a_drive = [&](TimeUnit u) {
+      const double step = median(std::span(steps)) * std::pow(10.0, static_cast<int>(u) - 9);
+      return step >= kShortest && step <= kLongest;
+    };
+    const double seconds = middle * std::pow(10.0, static_cast<int>(unit) - 9);
+    if (seconds < kYear1973 || seconds >= kYear2286) continue;
+    if (!steps.empty() && unit != relative && !of_a_drive(unit) && of_a_drive(relative))
+      return std::nullopt;
+    return unit;
+  }
+  return std::nullopt;
+}
+
+/// Parses seconds before the point and whole nanoseconds after it.
+std::optional<Stamp> read_parts(std::string_view text) noexcept {
+  // Maximum that 64 bits of nanoseconds hold.
+  constexpr std::int64_t kMaxSeconds = 9'000'000'000;
+  const std::size_t point = std::min(text.find('.'), text.size());
+  const auto s = parse_integer(text.substr(0, point));
+  const auto ns = parse_integer(text.substr(std::min(point + 1, text.size())));
+  if (!s || !ns || *s < 0 || *s > kMaxSeconds || *ns < 0 || *ns >= kSecond) return std::nullopt;
+  return Stamp(*s * kSecond + *ns);
+}
+
+/// True if the numbers of decimals differ and the maximum is that of nanoseconds.
+bool may_be_parts(std::span<const std::string_view> times) {
+  const auto [least, most] =
+      std::ranges::minmax(times | std::views::transform([](std::string_view text) {
+                            const std::size_t point = std::min(text.find('.'), text.size());
+                            return text.substr(point).size();
+                          }));
+  return least > 0 && least < most && most == std::string_view(".000000000").size();
+}
+
+bool ascend(std::span<const std::string_view> times, const TimeForm& form) {
+  std::optional<Stamp> before;
+  for (const std::string_view text : times) {
+    const auto time = read_time(text, form);
+    if (!time || (before && *time < *before)) return false;
+    before = time;
+  }
+  return true;
 }
 
 }  // namespace
@@ -126,6 +202,87 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
     out.lines.push_back(std::move(entry));
   }
   return out;
+}
+
+const char* to_string(TimeUnit unit) noexcept {
+  constexpr std::array kNames{"nanoseconds", "microseconds", "milliseconds", "seconds"};
+  return kNames[static_cast<std::size_t>(unit) / 3];
+}
+
+std::optional<TimeUnit> parse_time_unit(std::string_view word) noexcept {
+  if (word == "s") return TimeUnit::seconds;
+  if (word == "ms") return TimeUnit::milliseconds;
+  if (word == "us") return TimeUnit::microseconds;
+  if (word == "ns") return TimeUnit::nanoseconds;
+  return std::nullopt;
+}
+
+std::optional<Stamp> parse_iso_time(std::string_view text) noexcept {
+  constexpr std::string_view kForm = "0000-00-00 00:00:00";
+  constexpr std::size_t kBetween = 10;
+  if (text.size() < kForm.size() || text.size() > 45 || text[4] != '-') return std::nullopt;
+  std::array<char, kForm.size() + 1> form{};
+  text.copy(form.data(), kForm.size());
+  if (form[kBetween] == 'T' || form[kBetween] == 't' || form[kBetween] == '_') form[kBetween] = ' ';
+  // File names cannot contain colons.
+  for (const std::size_t i : {kBetween + 3, kBetween + 6})
+    if (form[i] == '-') form[i] = ':';
+  std::tm parts{};
+  const char* end = ::strptime(form.data(), "%Y-%m-%d %H:%M:%S", &parts);
+  if (end != &form.back() || parts.tm_year < 70) return std::nullopt;
+  const int day = parts.tm_mday;
+  const std::int64_t seconds = ::timegm(&parts);
+  // February 31 becomes a day in March.
+  if (parts.tm_mday != day) return std::nullopt;
+  std::string_view rest = text.substr(kForm.size());
+  std::int64_t ns = 0;
+  if (rest.starts_with('.')) {
+    const std::string_view fraction = rest.substr(0, rest.find_first_not_of(".0123456789"));
+    const auto parsed = parse_seconds_ns(fraction);
+    if (!parsed || fraction.size() < 2) return std::nullopt;
+    ns = *parsed;
+    rest.remove_prefix(fraction.size());
+  }
+  if (!rest.empty()) {
+    std::array<char, 46> zone{};
+    rest.copy(zone.data(), zone.size() - 1);
+    end = ::strptime(zone.data(), "%z", &parts);
+    if (end == nullptr || *end != 0) return std::nullopt;
+  }
+  return Stamp((seconds - parts.tm_gmtoff) * kSecond + ns);
+}
+
+TimeForm find_time_form(std::span<const std::string_view> times, std::optional<TimeUnit> given,
+                        TimeUnit relative) {
+  TimeForm form;
+  form.unit = given.value_or(relative);
+  if (times.empty()) return form;
+  if (parse_iso_time(times.front())) {
+    form.iso = form.absolute = true;
+    return form;
+  }
+  const auto unit = unit_by_magnitude(times, relative);
+  form.absolute = unit.has_value();
+  if (unit && !given) form.unit = *unit;
+  if (form.unit == TimeUnit::seconds && may_be_parts(times) && !ascend(times, form)) {
+    form.nanoseconds_after_point = true;
+    form.nanoseconds_after_point = ascend(times, form);
+  }
+  return form;
+}
+
+std::optional<Stamp> read_time(std::string_view text, const TimeForm& form) noexcept {
+  if (form.iso) return parse_iso_time(text);
+  if (form.nanoseconds_after_point) return read_parts(text);
+  const auto ns = parse_decimal(text, static_cast<int>(form.unit));
+  return ns ? std::optional(Stamp(*ns)) : std::nullopt;
+}
+
+std::string describe(const TimeForm& form) {
+  if (form.nanoseconds_after_point)
+    return "times are seconds with nanoseconds behind the point, without their leading zeros";
+  if (form.iso || !form.absolute || form.unit == TimeUnit::seconds) return "";
+  return std::string("times are ") + to_string(form.unit) + " by their magnitude";
 }
 
 }  // namespace vergence::app

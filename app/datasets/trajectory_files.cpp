@@ -7,12 +7,10 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/text_table.hpp"
-#include "app/datasets/times_file.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::app {
@@ -528,7 +526,10 @@ TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options)
   put_decimal_points(&text);
   Reader reader(path, text, options);
   TrajectoryFile out = reader.read();
-  if (!out.timed) set_times_beside(path, &out);
+  if (!out.timed && !options.times.empty())
+    set_times(path, options.times, "the drive", &out);
+  else if (!out.timed)
+    set_times_beside(path, &out);
   if (!reader.euroc()) return out;
   const fs::path folder = parent_folder(path);
   if (const auto sensor =
@@ -549,29 +550,18 @@ Trajectory read_tum(const fs::path& file) {
   return Reader(file, text, options).read().poses;
 }
 
-Trajectory read_kitti(const fs::path& poses_file, std::span<const Stamp> times) {
-  const std::string text = read_text(poses_file);
-  const TrajectoryOptions options;
-  TrajectoryFile out = Reader(poses_file, text, options).read();
-  set_times(poses_file, times, "the drive", &out);
-  return std::move(out.poses);
-}
-
-std::optional<TruthFiles> find_truth(const fs::path& folder) {
+std::optional<fs::path> find_truth(const fs::path& folder) {
   // `sequences/06/` with a trailing slash has no file name.
   const fs::path sequence = (folder.has_filename() ? folder : folder.parent_path()).filename();
   for (const fs::path& poses :
        {folder / "poses.txt", folder / ".." / ".." / "poses" / (sequence.string() + ".txt")})
-    if (present(poses)) return TruthFiles{TruthFiles::Kind::kitti, poses};
+    if (present(poses)) return poses;
   for (const fs::path& mav : {folder / "mav0", folder}) {
     const fs::path csv = mav / "state_groundtruth_estimate0" / "data.csv";
-    if (present(csv) && present(mav / "cam0" / "sensor.yaml"))
-      return TruthFiles{TruthFiles::Kind::euroc, csv};
+    if (present(csv) && present(mav / "cam0" / "sensor.yaml")) return csv;
   }
   return std::nullopt;
 }
-
-Trajectory read_truth(const TruthFiles& files) { return read_file(files.poses, {}).poses; }
 
 TrajectoryFile read_trajectory_file(const fs::path& path, const TrajectoryOptions& options) {
   std::error_code ignored;
@@ -582,7 +572,7 @@ TrajectoryFile read_trajectory_file(const fs::path& path, const TrajectoryOption
     refuse(path, 0,
            "has no trajectory.tum, no poses.txt (KITTI) and no "
            "mav0/state_groundtruth_estimate0/data.csv with cam0/sensor.yaml (EuRoC)");
-  return read_file(truth->poses, options);
+  return read_file(*truth, options);
 }
 
 Trajectory in_other_order(Trajectory poses, QuaternionOrder read) {

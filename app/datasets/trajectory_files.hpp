@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/datasets/stamp_text.hpp"
+#include "app/datasets/times_file.hpp"
 #include "core/types/stamped_pose.hpp"
 
 /// Trajectories from text files of any program, as body-to-world poses with absolute integer
@@ -33,6 +33,8 @@ struct TrajectoryOptions {
   std::optional<QuaternionOrder> quaternion{};
   /// Option of the user that sets the unit; empty: any interval is accepted.
   std::string_view unit_option{};
+  /// Times of the rows of a file without times; if empty, they are read from files next to it.
+  std::span<const Stamp> times{};
 };
 
 struct TrajectoryFile {
@@ -62,23 +64,10 @@ struct TrajectoryFile {
 /// Reads one file without files next to it.
 [[nodiscard]] Trajectory read_tum(const std::filesystem::path& file);
 
-/// Reads KITTI's twelve numbers per line, T_world_left row-major; line k belongs to times[k].
-[[nodiscard]] Trajectory read_kitti(const std::filesystem::path& poses_file,
-                                    std::span<const Stamp> times);
-
-/// Files with the ground truth of a data set.
-struct TruthFiles {
-  enum class Kind { kitti, euroc } kind = Kind::kitti;
-  /// Path of poses.txt or data.csv.
-  std::filesystem::path poses;
-};
-
-/// KITTI: `poses.txt` and `times.txt` in the directory, or the benchmark's tree (sequences/NN with
-/// poses/NN.txt above); times.txt may be missing if images are counted. EuRoC: the directory with
-/// mav0, or mav0. Empty without ground truth.
-[[nodiscard]] std::optional<TruthFiles> find_truth(const std::filesystem::path& folder);
-
-[[nodiscard]] Trajectory read_truth(const TruthFiles& files);
+/// Ground truth of a data set. KITTI: `poses.txt` in the directory, or the benchmark's tree
+/// (sequences/NN with poses/NN.txt above). EuRoC: data.csv in the directory with mav0, or in mav0.
+/// Empty without ground truth.
+[[nodiscard]] std::optional<std::filesystem::path> find_truth(const std::filesystem::path& folder);
 
 /// Rotations as if their quaternions had been written in the other order than they were read in.
 [[nodiscard]] Trajectory in_other_order(Trajectory poses, QuaternionOrder read);

@@ -27,7 +27,7 @@ std::filesystem::path find_beside(const std::filesystem::path& folder, const std
 ImageFileStatus read_pixels(Bytes b, ImageSize requested, ImageSize* size,
                             std::uint8_t* out) noexcept {
   if (b.empty() || (b[0] != 0x89 && b[0] != 'P')) return ImageFileStatus::not_an_image;
-  if (const auto status = check_image(b, size); status != ImageFileStatus::ok) return status;
+  if (const auto status = read_image_size(b, size); status != ImageFileStatus::ok) return status;
   return decode_grey(b, requested, out, static_cast<std::size_t>(requested.width));
 }
 

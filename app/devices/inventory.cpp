@@ -28,7 +28,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/datasets/decimal.hpp"
+#include "app/datasets/text_file.hpp"
 #include "app/devices/camera_drivers.hpp"
 
 namespace vergence::app {

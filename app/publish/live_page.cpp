@@ -19,7 +19,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/datasets/jpeg_writer.hpp"
+#include "app/datasets/image_writer.hpp"
 #include "app/publish/frame_images.hpp"
 #include "app/publish/live_state.hpp"
 // CMake generates this header from app/publish/page/.

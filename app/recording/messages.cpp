@@ -44,39 +44,6 @@ void put_crc(CdrWriter* out) noexcept {
   out->put(crc32_of(bytes));
 }
 
-/// Rectification of a pair: x along the baseline, z between the optical axes. R maps from a camera
-/// to the common axes.
-struct Rectification {
-  Mat3 R = Mat3::Identity();
-  // In px.
-  double focal = 0, cx = 0, cy = 0;
-  // In m: 0 for the left camera, −|baseline| for the other one.
-  double baseline_x = 0;
-};
-
-/// Rectification of `camera` in the pair with camera 0; for camera 0 in the pair with camera 1.
-Rectification rectification(const RigCalibration& rig, int camera, bool calibrated) noexcept {
-  const auto& lenses = rig.intrinsics;
-  const Intrinsics& lens = lenses[static_cast<std::size_t>(camera)];
-  Rectification r{Mat3::Identity(), lens.fx, lens.cx, lens.cy, 0};
-  if (!calibrated || rig.cameras < 2) return r;
-  const auto other = static_cast<std::size_t>(std::max(camera, 1));
-  const Transform& T_other_left = rig.T_camera_left[other];
-  const Vec3 centre = T_other_left.centre();
-  const Vec3 x = centre.normalized();
-  const Vec3 axes = Vec3::UnitZ() + T_other_left.R.transpose() * Vec3::UnitZ();
-  const Vec3 z = (axes - axes.dot(x) * x).normalized();
-  Mat3 R_common_left;
-  R_common_left << x.transpose(), z.cross(x).transpose(), z.transpose();
-  if (!(centre.norm() > 0) || !R_common_left.allFinite()) return r;
-  r.focal = (lenses[0].fx + lenses[0].fy + lenses[other].fx + lenses[other].fy) / 4;
-  r.cx = lenses[0].cx;
-  r.cy = lenses[0].cy;
-  r.R = camera == 0 ? R_common_left : Mat3(R_common_left * T_other_left.R.transpose());
-  r.baseline_x = camera == 0 ? 0 : -centre.norm();
-  return r;
-}
-
 /// Fields of the packages common_interfaces and geometry2 as of ROS 2 Humble, without their
 /// comments and constants.
 struct Definition {
@@ -186,6 +153,28 @@ std::uint32_t crc32_of(std::span<const std::uint8_t> bytes) noexcept {
   return libdeflate_crc32(0, bytes.data(), bytes.size());
 }
 
+Rectification rectification(const RigCalibration& rig, int camera, bool calibrated) noexcept {
+  const auto& lenses = rig.intrinsics;
+  const Intrinsics& lens = lenses[static_cast<std::size_t>(camera)];
+  Rectification r;
+  r.P << lens.fx, 0, lens.cx, 0, 0, lens.fy, lens.cy, 0, 0, 0, 1, 0;
+  if (!calibrated || rig.cameras < 2) return r;
+  const auto other = static_cast<std::size_t>(std::max(camera, 1));
+  const Transform& T_other_left = rig.T_camera_left[other];
+  const Vec3 centre = T_other_left.centre();
+  const Vec3 x = centre.normalized();
+  const Vec3 axes = Vec3::UnitZ() + T_other_left.R.transpose() * Vec3::UnitZ();
+  const Vec3 z = (axes - axes.dot(x) * x).normalized();
+  Mat3 R_common_left;
+  R_common_left << x.transpose(), z.cross(x).transpose(), z.transpose();
+  if (!(centre.norm() > 0) || !R_common_left.allFinite()) return r;
+  const double focal = (lenses[0].fx + lenses[0].fy + lenses[other].fx + lenses[other].fy) / 4;
+  r.R = camera == 0 ? R_common_left : Mat3(R_common_left * T_other_left.R.transpose());
+  const double offset = camera == 0 ? 0 : -focal * centre.norm();
+  r.P << focal, 0, lenses[0].cx, offset, 0, focal, lenses[0].cy, 0, 0, 0, 1, 0;
+  return r;
+}
+
 void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
                  const ImageView& image) noexcept {
   const auto width = static_cast<std::uint32_t>(image.width);
@@ -208,9 +197,7 @@ void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,
   out->items(std::array{lens.fx, 0.0, lens.cx, 0.0, lens.fy, lens.cy, 0.0, 0.0, 1.0});
   const Rectification r = rectification(rig, camera, calibrated);
   put_matrix(out, r.R);
-  const double fy = calibrated ? r.focal : lens.fy;
-  out->items(std::array{r.focal, 0.0, r.cx, r.focal * r.baseline_x, 0.0, fy, r.cy, 0.0, 0.0, 0.0,
-                        1.0, 0.0});
+  for (int i = 0; i < 12; ++i) out->put(r.P(i / 4, i % 4));
   // Binning and region of interest are 0 for the full sensor.
   for (int i = 0; i < 6; ++i) out->put(std::uint32_t{0});
   out->boolean(false);

@@ -37,6 +37,19 @@ void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
   return 64 + frame + static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
 
+/// Rectification of a pair as in sensor_msgs/CameraInfo: x along the baseline, z between the
+/// optical axes.
+struct Rectification {
+  /// From the camera to the common axes.
+  Mat3 R = Mat3::Identity();
+  /// Projection of rectified images, in px and px·m.
+  Mat34 P;
+};
+/// Rectification of `camera` in the pair with camera 0; for camera 0 in the pair with camera 1.
+/// Without a calibration R is the identity and P has the camera's own intrinsics.
+[[nodiscard]] Rectification rectification(const RigCalibration& rig, int camera,
+                                          bool calibrated) noexcept;
+
 /// Writes a sensor_msgs/CameraInfo: k and d of the intrinsics. With a calibration r and p rectify
 /// the camera with camera 0; otherwise r is the identity and p is k.
 void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,

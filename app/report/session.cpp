@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 #include <Eigen/Geometry>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 

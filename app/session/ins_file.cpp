@@ -11,7 +11,6 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/text_file.hpp"
 #include "core/math/angle.hpp"
 

@@ -9,7 +9,7 @@
 #include <iterator>
 #include <numbers>
 
-#include "app/datasets/decimal.hpp"
+#include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "core/math/so3.hpp"

@@ -20,20 +20,17 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
   if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
       is_bag(request.format) || request.format == SequenceFormat::session)
     return {};
-  const bool plain = request.format == SequenceFormat::folder;
+  const std::filesystem::path truth = request.data / "truth.tum";
   std::error_code ignored;
-  if (plain && std::filesystem::exists(request.data / "truth.tum", ignored))
-    return read_tum(request.data / "truth.tum");
-  if (plain && !std::filesystem::exists(request.data / "poses.txt", ignored)) return {};
-  const auto files =
-      plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt"})
-            : find_truth(request.data);
-  if (!files) return {};
-  if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
+  const auto file =
+      request.format == SequenceFormat::folder && std::filesystem::exists(truth, ignored)
+          ? std::optional(truth)
+          : find_truth(request.data);
+  if (!file) return {};
   std::vector<Stamp> times;
   times.reserve(sequence.pairs.size());
   for (const StereoPair& pair : sequence.pairs) times.push_back(pair.stamp);
-  return read_kitti(files->poses, times);
+  return read_trajectory_file(*file, {.times = times}).poses;
 }
 
 /// Replaces the initial calibration by one from the sequence itself; where nothing is found

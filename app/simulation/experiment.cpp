@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/progress.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app {
 namespace {
@@ -26,16 +27,13 @@ class Statistic {
  public:
   void add(double v) { values_.push_back(v); }
   [[nodiscard]] double mean() const {
-    double sum = 0;
-    for (const double v : values_) sum += v;
-    return values_.empty() ? 0 : sum / static_cast<double>(values_.size());
+    return values_.empty()
+               ? 0
+               : Eigen::Map<const Eigen::ArrayXd>(values_.data(), std::ssize(values_)).mean();
   }
   [[nodiscard]] double median() const {
-    if (values_.empty()) return 0;
-    std::vector<double> v = values_;
-    const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-    std::nth_element(v.begin(), middle, v.end());
-    return *middle;
+    std::vector<double> values = values_;
+    return values.empty() ? 0 : vergence::median(std::span(values));
   }
 
  private:

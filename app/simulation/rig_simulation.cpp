@@ -122,64 +122,7 @@ Vec3 triangulate(const SimulatedRig& rig, const BundleObservation* first,
   return A.ldlt().solve(b);
 }
 
-}  // namespace
-
-BundleProblem SimulatedRig::problem() noexcept {
-  BundleProblem p;
-  p.cameras = cameras;
-  p.T_camera_left = T_camera_left;
-  p.T_left_world = T_left_world;
-  p.points = points;
-  p.observations = observations;
-  return p;
-}
-
-BundleProblem SimulatedRig::monocular_problem(std::vector<Transform>* images,
-                                              std::vector<BundleObservation>* per_image,
-                                              std::vector<std::uint8_t>* constant) {
-  images->clear();
-  for (const Transform& T : T_left_world)
-    for (const Transform& camera : T_camera_left) images->push_back(camera * T);
-  *per_image = observations;
-  for (BundleObservation& o : *per_image)
-    o.pose = static_cast<std::uint16_t>(o.pose * cameras.size() + o.camera);
-  constant->assign(images->size(), 0);
-  (*constant)[0] = 1;
-  BundleProblem p = problem();
-  p.T_left_world = *images;
-  p.observations = *per_image;
-  p.pose_constant = *constant;
-  p.T_camera_left = {};
-  return p;
-}
-
-SimulatedRig simulate_rig(const SimulationOptions& o, Random& random) {
-  SimulatedRig rig;
-  rig.cameras.assign(static_cast<std::size_t>(o.cameras), pinhole());
-  rig.true_cameras = draw_cameras(o, random);
-  for (int i = 0; i < o.points; ++i) {
-    const Vec3 d = direction(random);
-    const double r = o.shape == SimulationShape::shell ? 1.0 : std::cbrt(random.uniform());
-    rig.true_points.push_back(d * r * o.radius);
-  }
-  for (int i = 0; i < o.poses; ++i) rig.true_poses.push_back(draw_pose(rig, o, random));
-  for (std::uint32_t j = 0; j < rig.true_points.size(); ++j)
-    for (std::size_t i = 0; i < rig.true_poses.size(); ++i)
-      for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
-        Vec2 pixel;
-        if (rig.cameras[k].project(rig.true_cameras[k] * (rig.true_poses[i] * rig.true_points[j]),
-                                   &pixel, nullptr) != ProjectStatus::ok)
-          continue;
-        const double dx = random.normal(), dy = random.normal();
-        const float inverse_sigma = o.noise > 0 ? static_cast<float>(1.0 / o.noise) : 1.0F;
-        rig.observations.push_back({j, static_cast<std::uint16_t>(i), static_cast<std::uint8_t>(k),
-                                    inverse_sigma, pixel.x() + o.noise * dx,
-                                    pixel.y() + o.noise * dy});
-      }
-  perturb_start(rig, o, random);
-  return rig;
-}
-
+/// Perturbs the start values by the options.
 void perturb_start(SimulatedRig& rig, const SimulationOptions& o, Random& random) {
   rig.T_camera_left = rig.true_cameras;
   rig.T_left_world = rig.true_poses;
@@ -208,6 +151,45 @@ void perturb_start(SimulatedRig& rig, const SimulationOptions& o, Random& random
         triangulate(rig, rig.observations.data() + first, rig.observations.data() + last);
     first = last;
   }
+}
+
+}  // namespace
+
+BundleProblem SimulatedRig::problem() noexcept {
+  BundleProblem p;
+  p.cameras = cameras;
+  p.T_camera_left = T_camera_left;
+  p.T_left_world = T_left_world;
+  p.points = points;
+  p.observations = observations;
+  return p;
+}
+
+SimulatedRig simulate_rig(const SimulationOptions& o, Random& random) {
+  SimulatedRig rig;
+  rig.cameras.assign(static_cast<std::size_t>(o.cameras), pinhole());
+  rig.true_cameras = draw_cameras(o, random);
+  for (int i = 0; i < o.points; ++i) {
+    const Vec3 d = direction(random);
+    const double r = o.shape == SimulationShape::shell ? 1.0 : std::cbrt(random.uniform());
+    rig.true_points.push_back(d * r * o.radius);
+  }
+  for (int i = 0; i < o.poses; ++i) rig.true_poses.push_back(draw_pose(rig, o, random));
+  for (std::uint32_t j = 0; j < rig.true_points.size(); ++j)
+    for (std::size_t i = 0; i < rig.true_poses.size(); ++i)
+      for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
+        Vec2 pixel;
+        if (rig.cameras[k].project(rig.true_cameras[k] * (rig.true_poses[i] * rig.true_points[j]),
+                                   &pixel, nullptr) != ProjectStatus::ok)
+          continue;
+        const double dx = random.normal(), dy = random.normal();
+        const float inverse_sigma = o.noise > 0 ? static_cast<float>(1.0 / o.noise) : 1.0F;
+        rig.observations.push_back({j, static_cast<std::uint16_t>(i), static_cast<std::uint8_t>(k),
+                                    inverse_sigma, pixel.x() + o.noise * dx,
+                                    pixel.y() + o.noise * dy});
+      }
+  perturb_start(rig, o, random);
+  return rig;
 }
 
 BundleCapacities capacities_for(const SimulationOptions& o) {

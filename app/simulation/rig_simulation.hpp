@@ -55,18 +55,10 @@ struct SimulatedRig {
 
   /// Problem with the start values in these arrays; the first pose is constant.
   [[nodiscard]] BundleProblem problem() noexcept;
-  /// Variant like parallel_monocular with a pose per image: image = pose · cameras + camera.
-  /// `images` receives the poses.
-  [[nodiscard]] BundleProblem monocular_problem(std::vector<Transform>* images,
-                                                std::vector<BundleObservation>* per_image,
-                                                std::vector<std::uint8_t>* constant);
 };
 
 /// Draws a problem. Throws std::runtime_error if no view of the whole cloud exists.
 [[nodiscard]] SimulatedRig simulate_rig(const SimulationOptions& options, Random& random);
-
-/// Perturbs the start values by the options; called by simulate_rig.
-void perturb_start(SimulatedRig& rig, const SimulationOptions& options, Random& random);
 
 /// Capacities for such a problem.
 [[nodiscard]] BundleCapacities capacities_for(const SimulationOptions& options);

@@ -14,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // The exact size lets ASan find a read beyond the last byte.
   const std::vector<std::uint8_t> bytes(data, data + size);
   ImageSize declared;
-  if (check_image(bytes, &declared) != ImageFileStatus::ok) return 0;
+  if (read_image_size(bytes, &declared) != ImageFileStatus::ok) return 0;
   const auto width = static_cast<std::size_t>(declared.width),
              height = static_cast<std::size_t>(declared.height);
   if (width * height > kMaxPixels) return 0;

@@ -8,11 +8,12 @@
 
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/sqlite_bag.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace vergence::test {
 
-/// The drive of a bag of one file that is not on a disk; `bytes` outlive it. `given`: without a
-/// calibration.
+/// The drive of a bag of one file that is not on a disk, except for SQLite's; `bytes` outlive it.
+/// `given`: without a calibration.
 [[nodiscard]] inline app::StereoSequence bag_in_memory(app::detail::BagFormat format,
                                                        std::span<const char> bytes,
                                                        bool given = true,
@@ -21,11 +22,13 @@ namespace vergence::test {
   const std::string name = "a.bag";
   const std::span view(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   std::vector<BagFile> files;
-  if (format == BagFormat::sqlite)
-    files.push_back(
-        {name, std::make_unique<SqliteBag>(std::vector<std::uint8_t>(view.begin(), view.end()))});
-  else
+  if (format == BagFormat::sqlite) {
+    const TemporaryFolder folder;
+    folder.write(name, {bytes.data(), bytes.size()});
+    files.push_back({name, std::make_unique<SqliteBag>(folder / name)});
+  } else {
     files.push_back({name, std::make_unique<MemoryBytes>(view)});
+  }
   return make_sequence(name, index_bag(format, name, std::move(files)), given, topics);
 }
 

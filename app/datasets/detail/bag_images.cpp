@@ -111,26 +111,6 @@ bool BagImages::load(const BagImage& entry, std::vector<std::uint8_t>* data) con
   return records && MemoryBytes(*records).read(offset, *data);
 }
 
-std::optional<std::uint16_t> BagImages::peak(const std::string& name,
-                                             std::vector<std::uint8_t>* work) const {
-  std::size_t camera = 0;
-  const BagImage* entry = find(name, &camera);
-  if (entry == nullptr) return std::uint16_t{0};
-  const RosImage& image = entry->image;
-  const bool encoded =
-      image.layout == PixelLayout::encoded || image.layout == PixelLayout::encoded_bayer;
-  if (!encoded && image.layout != PixelLayout::grey16 && image.layout != PixelLayout::bayer16)
-    return std::nullopt;
-  if (!load(*entry, work)) return std::uint16_t{0};
-  if (encoded) return peak_of_deep_image(*work);
-  std::uint16_t peak = 0;
-  const std::uint8_t* row = work->data();
-  for (int y = 0; y < image.size.height; ++y, row += image.step)
-    for (int x = 0; x < image.size.width; ++x)
-      peak = std::max(peak, sample_at(row, x, image.big_endian));
-  return peak;
-}
-
 ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out,
                                   std::size_t stride, int deep_bits,
                                   std::vector<std::uint8_t>* work) const {

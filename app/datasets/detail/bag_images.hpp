@@ -25,10 +25,6 @@ class BagImages {
   [[nodiscard]] std::string name(std::size_t camera, std::size_t index) const;
   /// → ok, missing
   [[nodiscard]] ImageFileStatus size(const std::string& name, ImageSize* size) const;
-  /// Maximum of its 16-bit samples; empty for other images. 0 if it is missing, truncated or black.
-  /// *work is reused memory.
-  [[nodiscard]] std::optional<std::uint16_t> peak(const std::string& name,
-                                                  std::vector<std::uint8_t>* work) const;
   /// Same contract as decode_grey(); *work is reused memory.
   [[nodiscard]] ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out,
                                        std::size_t stride, int deep_bits,

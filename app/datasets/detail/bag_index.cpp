@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <span>
 #include <system_error>
-#include <type_traits>
 
 #include <fmt/format.h>
 
@@ -13,7 +12,6 @@
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/detail/sqlite_bag.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/text_file.hpp"
 #include "core/math/robust.hpp"
@@ -23,12 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Files of a minute each: ten weeks.
-constexpr std::size_t kMaxFiles = 100'000;
-// Images of all topics: a day and a half at 30 Hz, 320 MB of index.
-constexpr std::size_t kMaxImages = 4'000'000;
-// Samples of all topics: five hours at 400 Hz, 460 MB.
-constexpr std::size_t kMaxAttitudes = 8'000'000;
+// Images and samples of all topics: a day and a half at 30 Hz, some 300 MB of index.
+constexpr std::size_t kMaxMessages = 8'000'000;
 // Size of a CameraInfo and of an INS sample.
 constexpr std::size_t kMaxBytes = 65536;
 
@@ -65,20 +59,11 @@ std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
     if (bag_format(it->path()) == container.sequence) files.push_back(it->path());
   if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "); check its permissions");
   if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
-  if (files.size() > kMaxFiles)
-    refuse(bag, 0, "holds {} {} files; at most {} are supported", files.size(), ending, kMaxFiles);
   // Recorders count without leading zeros: drive_2.mcap precedes drive_10.mcap.
   std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
     return in_name_order(a.filename().string(), b.filename().string());
   });
   return files;
-}
-
-/// Removes from `list` all entries that are not in `kept`, an ascending list of indices.
-template <typename T>
-void keep(const std::vector<std::size_t>& kept, std::vector<T>* list) {
-  for (std::size_t i = 0; i < kept.size(); ++i) (*list)[i] = (*list)[kept[i]];
-  list->resize(kept.size());
 }
 
 class Indexer {
@@ -87,18 +72,14 @@ class Indexer {
     bag_.format = format;
     bag_.files = std::move(files);
     for (; file_ < bag_.files.size(); ++file_) scan();
-    for (auto& [topic, of_topic] : bag_.images) put_in_order(&of_topic);
-    const auto order = [](auto& topics, const auto& stamp) {
-      for (auto& [name, topic] : topics) {
-        std::vector<Stamp> stamps;
-        for (const auto& reading : topic.readings) stamps.push_back(stamp(reading));
-        const std::vector<std::size_t> kept = ascending(stamps);
-        topic.backwards = stamps.size() - kept.size();
-        keep(kept, &topic.readings);
-      }
-    };
-    order(bag_.fixes, [](const InsRecord& fix) { return fix.sample.stamp; });
-    order(bag_.attitudes, [](const RosAttitude& attitude) { return attitude.stamp; });
+    for (auto& [name, topic] : bag_.images) {
+      replace_zero_stamps(&topic);
+      put_in_order(&topic, [](const BagImage& m) { return m.image.stamp; });
+    }
+    for (auto& [name, topic] : bag_.fixes)
+      put_in_order(&topic, [](const InsRecord& m) { return m.sample.stamp; });
+    for (auto& [name, topic] : bag_.attitudes)
+      put_in_order(&topic, [](const RosAttitude& m) { return m.stamp; });
   }
   BagIndex release_index() { return std::move(bag_); }
 
@@ -139,17 +120,16 @@ class Indexer {
     std::string encoding;
     const auto image = read(head, message.place.size, message.channel->encoding, &encoding);
     const bool other_size =
-        image && !topic.images.empty() && image->size != topic.images.front().image.size;
+        image && !topic.messages.empty() && image->size != topic.messages.front().image.size;
     if (image && !other_size) {
-      if (++images_ > kMaxImages)
-        refuse(path_, 0, "has more than {} images; split the bag", kMaxImages);
-      topic.images.push_back(
+      count();
+      topic.messages.push_back(
           {*image, message.log_time, message.place, static_cast<std::uint32_t>(file_)});
       return;
     }
-    if (topic.left_out.first.empty()) topic.left_out.first = where(message.place, file_);
-    if (!image && topic.left_out.unreadable == 0) topic.left_out.encoding = encoding;
-    ++(image ? topic.left_out.other_size : topic.left_out.unreadable);
+    if (topic.first_omitted.empty()) topic.first_omitted = where(message.place, file_);
+    if (!image && topic.unreadable == 0) topic.encoding = encoding;
+    ++(image ? topic.other_size : topic.unreadable);
   }
 
   /// Refuses recordings that are compressed message by message, because the heads of their messages
@@ -172,25 +152,26 @@ class Indexer {
   }
 
   template <typename Read, typename Reading>
-  void read_ins(const BagMessage& message, Read read, ReadingTopic<Reading>* topic) {
+  void read_ins(const BagMessage& message, Read read, BagTopic<Reading>* topic) {
     const auto reading = read(first_bytes(message, kMaxBytes), message.channel->encoding);
     if (!reading) {
       ++topic->unreadable;
       return;
     }
-    constexpr bool kAttitude = std::is_same_v<Reading, RosAttitude>;
-    constexpr std::size_t kMax = kAttitude ? kMaxAttitudes : kMaxReadings;
-    if (++(kAttitude ? attitudes_ : readings_) > kMax)
-      refuse(path_, 0, "has more than {} {}; split the bag", kMax,
-             kAttitude ? "orientations" : "INS samples");
-    topic->readings.push_back(*reading);
+    count();
+    topic->messages.push_back(*reading);
+  }
+
+  void count() {
+    if (++messages_ > kMaxMessages)
+      refuse(path_, 0, "has more than {} images and INS samples; split the bag", kMaxMessages);
   }
 
   /// Replaces stamps of 0, which some drivers write, by the recording time minus the topic's usual
   /// delay.
   static void replace_zero_stamps(ImageTopic* topic) {
     std::vector<std::int64_t> delays;
-    for (const BagImage& image : topic->images)
+    for (const BagImage& image : topic->messages)
       if (image.image.stamp.ns() != 0)
         if (std::int64_t delay = 0;
             !__builtin_sub_overflow(image.log_time, image.image.stamp.ns(), &delay))
@@ -200,26 +181,22 @@ class Indexer {
     constexpr std::int64_t kLongestDelay = 10'000'000'000;
     if (!delays.empty()) usual = median(std::span(delays));
     if (std::abs(usual) >= kLongestDelay) usual = 0;
-    for (BagImage& image : topic->images) {
+    for (BagImage& image : topic->messages) {
       if (image.image.stamp.ns() != 0 || image.log_time <= kLongestDelay) continue;
       image.image.stamp = Stamp(image.log_time - usual);
       ++topic->unstamped;
     }
   }
 
-  /// Drops the images whose stamps do not increase.
-  void put_in_order(ImageTopic* topic) {
-    replace_zero_stamps(topic);
+  /// Drops the messages whose stamps do not increase.
+  template <typename Message, typename StampOf>
+  void put_in_order(BagTopic<Message>* topic, const StampOf& stamp_of) {
     std::vector<Stamp> stamps;
-    for (const BagImage& image : topic->images) stamps.push_back(image.image.stamp);
+    for (const Message& message : topic->messages) stamps.push_back(stamp_of(message));
     const std::vector<std::size_t> kept = ascending(stamps);
-    topic->left_out.backwards = stamps.size() - kept.size();
-    if (kept.size() == stamps.size()) return;
-    std::size_t first = 0;
-    while (first < kept.size() && kept[first] == first) ++first;
-    if (topic->left_out.first.empty())
-      topic->left_out.first = where(topic->images[first].place, topic->images[first].file);
-    keep(kept, &topic->images);
+    topic->backwards = stamps.size() - kept.size();
+    for (std::size_t i = 0; i < kept.size(); ++i) topic->messages[i] = topic->messages[kept[i]];
+    topic->messages.resize(kept.size());
   }
 
   [[nodiscard]] std::string where(const BagPlace& place, std::size_t file) const {
@@ -232,7 +209,7 @@ class Indexer {
   BagIndex bag_{};
   // Index of the file that is being scanned.
   std::size_t file_ = 0;
-  std::size_t images_ = 0, readings_ = 0, attitudes_ = 0;
+  std::size_t messages_ = 0;
 };
 
 }  // namespace

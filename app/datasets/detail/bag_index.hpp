@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "app/datasets/detail/bag_scan.hpp"
-#include "app/datasets/detail/ros_ins_messages.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 
 /// Content of a ROS recording by topic.
@@ -24,32 +23,19 @@ struct BagImage {
   std::uint32_t file = 0;
 };
 
-/// Messages of a topic that are omitted, and the first position.
-struct LeftOut {
+/// Messages of a topic with strictly increasing stamps; images are of one size.
+template <typename Message>
+struct BagTopic {
+  std::vector<Message> messages{};
+  /// Numbers of omitted messages, and the first position: file and offset.
   std::size_t unreadable = 0, other_size = 0, backwards = 0;
-  /// File and offset.
-  std::string first{};
-  /// Encoding of the first unreadable message, as named in it.
+  std::string first_omitted{};
+  /// Encoding of the first unreadable image, as named in it.
   std::string encoding{};
-};
-
-/// Images of one size with strictly increasing stamps.
-struct ImageTopic {
-  std::vector<BagImage> images{};
-  LeftOut left_out{};
   /// Number of images with stamp 0, which have the recording time instead.
   std::size_t unstamped = 0;
 };
-
-/// Samples with strictly increasing stamps.
-template <typename Reading>
-struct ReadingTopic {
-  std::vector<Reading> readings{};
-  /// Number of invalid messages.
-  std::size_t unreadable = 0;
-  /// Number of dropped samples, whose stamps decrease or repeat.
-  std::size_t backwards = 0;
-};
+using ImageTopic = BagTopic<BagImage>;
 
 /// File of a bag.
 struct BagFile {
@@ -63,9 +49,9 @@ struct BagIndex {
   /// By topic, as the next ones.
   std::map<std::string, ImageTopic> images{};
   std::map<std::string, RosCameraInfo> infos{};
-  std::map<std::string, ReadingTopic<InsRecord>> fixes{};
+  std::map<std::string, BagTopic<InsRecord>> fixes{};
   /// Messages without orientation count as unreadable.
-  std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};
+  std::map<std::string, BagTopic<RosAttitude>> attitudes{};
   /// Some topics that are not read, each with its type.
   std::vector<std::string> others{};
   /// Messages.

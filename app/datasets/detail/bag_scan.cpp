@@ -22,8 +22,8 @@ std::vector<std::uint8_t> first_bytes(const BagMessage& message, std::size_t mos
   return bytes;
 }
 
-void BagScan::broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why) {
-  ++(this->*counter);
+void BagScan::skip(std::uint64_t offset, std::string_view why) {
+  ++skipped;
   if (first_broken) return;
   first_broken = offset;
   why_broken = why;
@@ -36,8 +36,8 @@ void BagScan::remark(const std::string& name, std::vector<std::string>* remarks)
         end));
   if (first_broken)
     remarks->push_back(
-        fmt::format("{}: {} chunks and {} records are skipped; the first at offset {} is {}", name,
-                    broken_chunks, broken_records, *first_broken, why_broken));
+        fmt::format("{}: {} chunks or records are skipped; the first at offset {} is {}", name,
+                    skipped, *first_broken, why_broken));
   if (orphans > 0)
     remarks->push_back(
         fmt::format("{}: {} messages of unknown channels are skipped", name, orphans));

@@ -68,10 +68,9 @@ struct BagScan {
   std::uint64_t messages = 0;
   /// Messages of a channel that was not described before.
   std::uint64_t orphans = 0;
-  /// Skipped chunks: not unpackable, wrong checksum, or larger than kMaxChunk.
-  std::uint64_t broken_chunks = 0;
-  /// Skipped records: contradicting descriptions, messages shorter than their header.
-  std::uint64_t broken_records = 0;
+  /// Skipped chunks and records: not unpackable, wrong checksum, larger than kMaxChunk,
+  /// contradicting descriptions.
+  std::uint64_t skipped = 0;
   /// Offset of the first of these in the file.
   std::optional<std::uint64_t> first_broken{};
   /// Phrase about its problem.
@@ -81,8 +80,8 @@ struct BagScan {
   /// Offset after the last complete record.
   std::uint64_t end = 0;
 
-  /// Increments `counter`, which is broken_chunks or broken_records.
-  void broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why);
+  /// Counts a skipped chunk or record.
+  void skip(std::uint64_t offset, std::string_view why);
   /// Adds a remark about missing data of the file with this name.
   void remark(const std::string& name, std::vector<std::string>* remarks) const;
 };

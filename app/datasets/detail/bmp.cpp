@@ -61,30 +61,20 @@ ImageFileStatus bmp_size(ImageBytes b, ImageSize* size) noexcept {
   return accept_size(width, height, size);
 }
 
-ImageFileStatus check_bmp(ImageBytes b) noexcept {
-  ImageSize size;
-  if (const auto status = bmp_size(b, &size); status != ImageFileStatus::ok) return status;
-  if (b.size() < kWholeHead) return ImageFileStatus::truncated;
-  // The decoder refuses these kinds.
-  if (!is_plain(b) || u16(b, kBits) > 32) return ImageFileStatus::ok;
-  const std::size_t pixels = u32(b, kPixelsAt);
-  const std::size_t needed = row_bytes(static_cast<std::uint32_t>(size.width), u16(b, kBits)) *
-                             static_cast<std::size_t>(size.height);
-  return pixels <= b.size() && needed <= b.size() - pixels ? ImageFileStatus::ok
-                                                           : ImageFileStatus::truncated;
-}
-
 ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std::size_t stride,
-                           DeepSamples* /*deep*/) noexcept {
+                           int /*deep_bits*/) noexcept {
+  if (b.size() < kWholeHead) return ImageFileStatus::truncated;
   const std::uint32_t bits = u16(b, kBits);
   if (!is_plain(b) || (bits != 8 && bits != 24 && bits != 32)) return ImageFileStatus::undecodable;
-  const std::array<std::uint8_t, 256> grey =
-      bits == 8 ? read_palette(b) : std::array<std::uint8_t, 256>{};
   const std::size_t width = static_cast<std::size_t>(size.width),
                     height = static_cast<std::size_t>(size.height);
-  const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), bits);
+  const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), bits),
+                    pixels = u32(b, kPixelsAt);
+  if (pixels > b.size() || row * height > b.size() - pixels) return ImageFileStatus::truncated;
+  const std::array<std::uint8_t, 256> grey =
+      bits == 8 ? read_palette(b) : std::array<std::uint8_t, 256>{};
   for (std::size_t y = 0; y < height; ++y, out += stride) {
-    const std::uint8_t* from = &b[u32(b, kPixelsAt) + (top_down(b) ? y : height - 1 - y) * row];
+    const std::uint8_t* from = &b[pixels + (top_down(b) ? y : height - 1 - y) * row];
     for (std::size_t x = 0; x < width; ++x)
       out[x] = bits == 8 ? grey[from[x]] : to_grey(from + bits / 8 * x);
   }
@@ -93,7 +83,6 @@ ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std:
 
 }  // namespace
 
-const ImageKind kBmp{
-    kBmpHead, is_bmp, bmp_size, check_bmp, [](ImageBytes) noexcept { return false; }, decode_bmp};
+const ImageKind kBmp{kBmpHead, is_bmp, bmp_size, decode_bmp};
 
 }  // namespace vergence::app::detail

@@ -4,6 +4,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <memory>
 
@@ -46,26 +47,27 @@ bool decompress_bz2(std::span<const std::uint8_t> packed, std::span<std::uint8_t
          got == out.size();
 }
 
-bool decompress(std::string_view name, std::span<const std::uint8_t> packed,
-                std::span<std::uint8_t> records) noexcept {
-  if (name == "zstd") return decompress_zstd(packed, records);
-  if (name == "bz2") return decompress_bz2(packed, records);
-  return name == "lz4" && decompress_lz4(packed, records);
-}
+struct Compression {
+  std::string_view name;
+  bool (*decompress)(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept;
+};
+constexpr std::array kCompressions{Compression{"zstd", decompress_zstd},
+                                   Compression{"lz4", decompress_lz4},
+                                   Compression{"bz2", decompress_bz2}};
 
 }  // namespace
 
-std::string unpack(const ByteSource& file, const Chunk& chunk, const Compressions& supported,
-                   std::vector<std::uint8_t>* records) {
+std::string unpack(const ByteSource& file, const Chunk& chunk, std::vector<std::uint8_t>* records) {
   if (chunk.size > kMaxChunk || chunk.unpacked > kMaxChunk)
     return "a chunk larger than 64 MiB; write the bag with smaller chunks";
-  if (std::ranges::find(supported, chunk.compression) == supported.end())
-    return fmt::format("a chunk of the compression \"{}\"; {}, {} and none can be read",
-                       chunk.compression.substr(0, 60), supported[0], supported[1]);
+  const auto known = std::ranges::find(kCompressions, chunk.compression, &Compression::name);
+  if (known == kCompressions.end())
+    return fmt::format("a chunk of the compression \"{}\"; zstd, lz4, bz2 and none can be read",
+                       chunk.compression.substr(0, 60));
   std::vector<std::uint8_t> packed(static_cast<std::size_t>(chunk.size));
   if (!file.read(chunk.offset, packed)) return "a chunk that cannot be read";
   records->resize(static_cast<std::size_t>(chunk.unpacked));
-  if (!decompress(chunk.compression, packed, *records))
+  if (!known->decompress(packed, *records))
     return "a chunk whose " + chunk.compression + " data do not unpack";
   if (chunk.crc != 0 && libdeflate_crc32(0, records->data(), records->size()) != chunk.crc)
     return "a chunk whose check sum fails";

@@ -36,10 +36,10 @@ namespace vergence::app::detail {
 [[nodiscard]] bool holds_stereo_images(const std::filesystem::path& root);
 
 /// Reads the INS log in a St Lucia directory (docs/datasets.md). Lines without twelve numbers are
-/// skipped and counted, samples sorted by stamp; the log has no sigmas. Axes that the drive cannot
-/// determine (never fast or steep enough) are the MTi-G's: x forward, y left, z up, yaw from north
-/// counter-clockwise. Without a log there are no samples, with a remark. Throws InputError for
-/// several logs, more than 1 % damaged lines, or invalid positions.
+/// skipped and counted, like samples whose stamps do not increase; the log has no sigmas. Axes that
+/// the drive cannot determine (never fast or steep enough) are the MTi-G's: x forward, y left, z
+/// up, yaw from north counter-clockwise. Without a log there are no samples, with a remark. Throws
+/// InputError for several logs, more than 1 % damaged lines, or invalid positions.
 [[nodiscard]] RecordedIns read_st_lucia_ins(const std::filesystem::path& folder);
 
 /// True if `folder`, its date's directory or one above contains a drive. Throws InputError if

@@ -12,14 +12,6 @@ namespace vergence::app::detail {
 
 using ImageBytes = std::span<const std::uint8_t>;
 
-/// Reduces grey 16-bit samples to 8 bits; colours keep their upper 8 bits.
-struct DeepSamples {
-  /// Parameter of narrowed().
-  int bits = 16;
-  /// Set to the maximum sample; 0 if the file has other samples.
-  std::uint16_t peak = 0;
-};
-
 /// Upper 8 of the lower `bits` (8 to 16) of a grey sample; larger values are white.
 [[nodiscard]] inline std::uint8_t narrowed(std::uint16_t sample, int bits) noexcept {
   return static_cast<std::uint8_t>(std::min(sample >> static_cast<unsigned>(bits - 8), 255));
@@ -45,23 +37,19 @@ struct DeepSamples {
   return ImageFileStatus::ok;
 }
 
-/// Kind of image files. Each function requires the success of those before it; none throws.
+/// Kind of image files. size() requires that is() is true, decode() that size() is ok; none throws.
 ///
 /// is      Detects the kind by the first bytes.
 /// size    Reads the size from the first `head` bytes. → ok, truncated, not_an_image
-/// check   Checks completeness (image_file.hpp). → ok, truncated, not_an_image
-/// deep    True for grey samples of 16 bits.
 /// decode  Writes rows of `stride` bytes, colours as 0.299 R + 0.587 G + 0.114 B (or the file's own
-///         luminance), 8 of 16 bits as the samples require. → ok, truncated (damaged inside),
-///         undecodable
+///         luminance). Grey samples of 16 bits are narrowed() from `deep_bits`; colours keep their
+///         upper 8 bits. → ok, truncated (incomplete or damaged), undecodable
 struct ImageKind {
   std::size_t head;
   bool (*is)(ImageBytes) noexcept;
   ImageFileStatus (*size)(ImageBytes, ImageSize*) noexcept;
-  ImageFileStatus (*check)(ImageBytes) noexcept;
-  bool (*deep)(ImageBytes) noexcept;
   ImageFileStatus (*decode)(ImageBytes, ImageSize, std::uint8_t* out, std::size_t stride,
-                            DeepSamples*) noexcept;
+                            int deep_bits) noexcept;
 };
 /// PNG of every kind by libpng; JPEG of 8-bit grey or three colours by libjpeg-turbo; uncompressed
 /// BMP of 8, 24 and 32 bits; PGM and PPM of bytes (P5, P6).
@@ -69,8 +57,5 @@ extern const ImageKind kPng, kJpeg, kBmp, kNetpbm;
 
 /// In bytes: a JPEG's size follows its metadata of up to four segments of 64 KiB.
 inline constexpr std::size_t kJpegHead = std::size_t{256} << 10U;
-
-/// True for so few bytes that they may begin a PNG.
-[[nodiscard]] bool may_become_png(ImageBytes bytes) noexcept;
 
 }  // namespace vergence::app::detail

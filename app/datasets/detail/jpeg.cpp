@@ -98,15 +98,15 @@ ImageFileStatus jpeg_size(ImageBytes b, ImageSize* size) noexcept {
   return ImageFileStatus::truncated;
 }
 
-ImageFileStatus check_jpeg(ImageBytes b) noexcept {
+bool has_end_marker(ImageBytes b) noexcept {
   std::size_t end = b.size();
   while (end > 2 && b[end - 1] == 0) --end;
-  return b[end - 2] == 0xff && b[end - 1] == 0xd9 ? ImageFileStatus::ok
-                                                  : ImageFileStatus::truncated;
+  return b[end - 2] == 0xff && b[end - 1] == 0xd9;
 }
 
 ImageFileStatus decode_jpeg(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
-                            DeepSamples* /*deep*/) noexcept {
+                            int /*deep_bits*/) noexcept {
+  if (!has_end_marker(bytes)) return ImageFileStatus::truncated;
   Decoder decoder;
   decoder.jpeg.err = jpeg_std_error(&decoder.errors);
   // jpeg_create_decompress() keeps this pointer.
@@ -123,8 +123,6 @@ ImageFileStatus decode_jpeg(ImageBytes bytes, ImageSize size, std::uint8_t* out,
 
 }  // namespace
 
-const ImageKind kJpeg{
-    kJpegHead,  is_jpeg, jpeg_size, check_jpeg, [](ImageBytes) noexcept { return false; },
-    decode_jpeg};
+const ImageKind kJpeg{kJpegHead, is_jpeg, jpeg_size, decode_jpeg};
 
 }  // namespace vergence::app::detail

@@ -20,8 +20,6 @@ constexpr std::uint64_t kChunkHead = 32;
 // Maximum length of a compression's name, in bytes.
 constexpr std::uint64_t kMaxCompression = 16;
 
-constexpr Compressions kCompressions{"lz4", "zstd"};
-
 enum class Opcode : std::uint8_t {
   footer = 2,
   schema = 3,
@@ -80,7 +78,7 @@ MessageEncoding to_encoding(const std::string& name) {
 class McapScanner final : RecordScanner<Record> {
  public:
   McapScanner(const ByteSource& file, const BagVisitor& each)
-      : RecordScanner(file, each, record_at, kCompressions) {}
+      : RecordScanner(file, each, record_at) {}
 
   BagScan scan() {
     std::uint64_t at = kMagic.size();
@@ -106,30 +104,30 @@ class McapScanner final : RecordScanner<Record> {
     if (const auto chunk = find_chunk(file_, record))
       RecordScanner::read_chunk(*chunk, here);
     else
-      scan_.broken(&BagScan::broken_chunks, here, "a chunk whose head contradicts its length");
+      scan_.skip(here, "a chunk whose head contradicts its length");
   }
 
   void read_record(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                    std::uint64_t here) override {
     if (record.opcode == Opcode::message) return read_message(bytes, record, chunk, here);
     if (record.opcode != Opcode::schema && record.opcode != Opcode::channel) return;
-    if (record.size > kMaxDescription) return skip(here, "a description longer than 1 MiB");
+    if (record.size > kMaxDescription) return scan_.skip(here, "a description longer than 1 MiB");
     std::vector<std::uint8_t> content(static_cast<std::size_t>(record.size));
     if (!bytes.read(record.content, content))
-      return skip(here, "a description that cannot be read");
+      return scan_.skip(here, "a description that cannot be read");
     RosReader in = little_endian(content);
     const std::uint16_t id = in.get<std::uint16_t>();
     if (record.opcode == Opcode::schema) {
       std::string name = in.text();
       if (!in.ok() || name.size() > kMaxName)
-        return skip(here, "a schema whose lengths contradict each other");
+        return scan_.skip(here, "a schema whose lengths contradict each other");
       types_.try_emplace(id, plain_type(name));
       return;
     }
     const std::uint16_t schema = in.get<std::uint16_t>();
     BagChannel channel{in.text(), "", to_encoding(in.text())};
     if (!in.ok() || channel.topic.size() > kMaxName)
-      return skip(here, "a channel whose lengths contradict each other");
+      return scan_.skip(here, "a channel whose lengths contradict each other");
     if (const auto type = types_.find(schema); type != types_.end()) channel.type = type->second;
     channels_.try_emplace(id, std::move(channel));
   }
@@ -138,7 +136,7 @@ class McapScanner final : RecordScanner<Record> {
                     std::uint64_t here) {
     std::array<std::uint8_t, kMessageHead> head{};
     if (record.size < kMessageHead || record.size > kMaxChunk || !bytes.read(record.content, head))
-      return skip(here, "a message shorter than its head or longer than 64 MiB");
+      return scan_.skip(here, "a message shorter than its head or longer than 64 MiB");
     RosReader in = little_endian(head);
     const auto channel = in.get<std::uint16_t>();
     // The sequence number is skipped.
@@ -167,7 +165,7 @@ bool unpack_mcap_chunk(const ByteSource& file, std::uint64_t offset,
   const auto record = record_at(file, offset);
   if (!record || record->opcode != Opcode::chunk) return false;
   const auto chunk = find_chunk(file, *record);
-  return chunk && unpack(file, *chunk, kCompressions, records).empty();
+  return chunk && unpack(file, *chunk, records).empty();
 }
 
 }  // namespace vergence::app::detail

@@ -62,24 +62,13 @@ ImageFileStatus netpbm_size(ImageBytes head, ImageSize* size) noexcept {
   return status;
 }
 
-ImageFileStatus check_netpbm(ImageBytes bytes) noexcept {
-  Header header;
-  if (const auto status = read_header(bytes, &header); status != ImageFileStatus::ok) return status;
-  const std::size_t needed = header.row() * static_cast<std::size_t>(header.size.height);
-  return bytes.size() - std::min(header.begin, bytes.size()) >= needed ? ImageFileStatus::ok
-                                                                       : ImageFileStatus::truncated;
-}
-
-bool is_deep_netpbm(ImageBytes bytes) noexcept {
-  Header header;
-  (void)read_header(bytes, &header);
-  return header.samples == 1 && header.bytes_a_sample() == 2;
-}
-
 ImageFileStatus decode_netpbm(ImageBytes bytes, ImageSize /*size*/, std::uint8_t* out,
-                              std::size_t stride, DeepSamples* deep) noexcept {
+                              std::size_t stride, int deep_bits) noexcept {
   Header header;
-  (void)read_header(bytes, &header);
+  if (read_header(bytes, &header) != ImageFileStatus::ok ||
+      bytes.size() - std::min(header.begin, bytes.size()) <
+          header.row() * static_cast<std::size_t>(header.size.height))
+    return ImageFileStatus::truncated;
   const std::uint8_t* in = bytes.data() + header.begin;
   const std::size_t width = static_cast<std::size_t>(header.size.width),
                     step = header.bytes_a_sample();
@@ -90,9 +79,7 @@ ImageFileStatus decode_netpbm(ImageBytes bytes, ImageSize /*size*/, std::uint8_t
         // The upper 8 bits of deep samples are used.
         out[x] = luminance(pixel[0], pixel[step], pixel[2 * step]);
       } else if (step == 2) {
-        const auto sample = static_cast<std::uint16_t>(pixel[0] << 8U | pixel[1]);
-        deep->peak = std::max(deep->peak, sample);
-        out[x] = narrowed(sample, deep->bits);
+        out[x] = narrowed(static_cast<std::uint16_t>(pixel[0] << 8U | pixel[1]), deep_bits);
       } else {
         out[x] = pixel[0];
       }
@@ -102,7 +89,6 @@ ImageFileStatus decode_netpbm(ImageBytes bytes, ImageSize /*size*/, std::uint8_t
 
 }  // namespace
 
-const ImageKind kNetpbm{kNetpbmHead,  is_netpbm,      netpbm_size,
-                        check_netpbm, is_deep_netpbm, decode_netpbm};
+const ImageKind kNetpbm{kNetpbmHead, is_netpbm, netpbm_size, decode_netpbm};
 
 }  // namespace vergence::app::detail

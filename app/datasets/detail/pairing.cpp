@@ -98,20 +98,21 @@ std::string describe(const PairOffset& offset) {
                      1e3 * offset.farthest.to_seconds());
 }
 
-bool is_suspicious(const PairOffset& offset, Duration interval) {
+void remark_pairs(const std::string& left, const std::string& right, const PairOffset& offset,
+                  Duration interval, std::size_t alone, std::vector<std::string>* remarks) {
   constexpr Duration kSuspicious = Duration::milliseconds(5);
   // Share of the interval.
   constexpr double kSuspiciousShare = 0.1;
   const Duration far = std::max({offset.median, -offset.median, offset.farthest});
-  return far > kSuspicious || far.to_seconds() > kSuspiciousShare * interval.to_seconds();
-}
-
-std::string pairing_warning(const std::string& left, const std::string& right,
-                            const PairOffset& offset, Duration interval) {
-  return fmt::format(
-      "the stamps of {} and {} differ by {} at an interval of {:.3g} ms: if the cameras do not "
-      "expose together, poses are less accurate in turns; if they do, correct the stamps of one",
-      left, right, describe(offset), 1e3 * interval.to_seconds());
+  if (far > kSuspicious || far.to_seconds() > kSuspiciousShare * interval.to_seconds())
+    remarks->push_back(fmt::format(
+        "the stamps of {} and {} differ by {} at an interval of {:.3g} ms: if the cameras do not "
+        "expose together, poses are less accurate in turns; if they do, correct the stamps of one",
+        left, right, describe(offset), 1e3 * interval.to_seconds()));
+  if (alone > 0)
+    remarks->push_back(
+        fmt::format("{} images have no partner within {:.0f} % of the interval and are skipped",
+                    alone, 100 * kMaxApart));
 }
 
 std::vector<std::size_t> ascending(std::span<const Stamp> stamps) {

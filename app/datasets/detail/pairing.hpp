@@ -39,10 +39,9 @@ struct PairOffset {
 /// Text such as "0.312 ms (median; 95 % within 0.4 ms)".
 [[nodiscard]] std::string describe(const PairOffset& offset);
 
-/// True if the stamps of pairs differ by more than 5 ms or 10 % of the interval.
-[[nodiscard]] bool is_suspicious(const PairOffset& offset, Duration interval);
-/// Returns the warning about the two cameras.
-[[nodiscard]] std::string pairing_warning(const std::string& left, const std::string& right,
-                                          const PairOffset& offset, Duration interval);
+/// Adds warnings if the stamps of pairs differ by more than 5 ms or 10 % of the interval, and if
+/// images are alone.
+void remark_pairs(const std::string& left, const std::string& right, const PairOffset& offset,
+                  Duration interval, std::size_t alone, std::vector<std::string>* remarks);
 
 }  // namespace vergence::app::detail

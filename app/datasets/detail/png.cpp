@@ -50,22 +50,21 @@ struct Reader {
 /// Converts a row of big-endian 16-bit grey to 8 bits in place.
 void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
   if (row->bit_depth != 16) return;
-  auto* deep = static_cast<DeepSamples*>(png_get_user_transform_ptr(png));
+  const int bits = *static_cast<const int*>(png_get_user_transform_ptr(png));
   for (std::size_t i = 0; i < row->width; ++i) {
     const auto sample = static_cast<std::uint16_t>(data[2 * i] << 8U | data[2 * i + 1]);
-    deep->peak = std::max(deep->peak, sample);
-    data[i] = narrowed(sample, deep->bits);
+    data[i] = narrowed(sample, bits);
   }
 }
 
 /// Requests the conversion to 8-bit grey.
-void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
+void ask_for_grey(png_structp png, png_infop info, int* deep_bits) {
   const int colours = png_get_color_type(png, info), depth = png_get_bit_depth(png, info);
   if (depth == 16 && (colours & PNG_COLOR_MASK_COLOR) != 0) {
     png_set_strip_16(png);
   } else if (depth == 16) {
     png_set_read_user_transform_fn(png, narrow_row);
-    png_set_user_transform_info(png, deep, 8, 1);
+    png_set_user_transform_info(png, deep_bits, 8, 1);
   }
   png_set_strip_alpha(png);
   if (colours == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
@@ -78,7 +77,7 @@ void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
 /// No object with a destructor may be created between setjmp and libpng's longjmp, so all of them
 /// are the caller's.
 bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_t* out,
-               std::size_t stride, DeepSamples* deep) noexcept {
+               std::size_t stride, int* deep_bits) noexcept {
   png_structp png = reader.png;
   png_infop info = reader.info;
   if (setjmp(png_jmpbuf(png)) != 0) return false;
@@ -87,7 +86,7 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
                                             't', 0,   'i', 'T', 'X', 't', 0};
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, kTexts.data(), 3);
   png_read_info(png, info);
-  ask_for_grey(png, info, deep);
+  ask_for_grey(png, info, deep_bits);
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
   const auto width = static_cast<std::uint32_t>(size.width),
@@ -113,30 +112,18 @@ ImageFileStatus png_size(ImageBytes b, ImageSize* size) noexcept {
   return accept_size(u32(b, 16), u32(b, 20), size);
 }
 
-bool is_deep_png(ImageBytes b) noexcept {
-  // Offset of the bit depth in the header.
-  constexpr std::size_t kDepthAt = 24;
-  return b.size() > kDepthAt && b[kDepthAt] == 16;
-}
-
 ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
-                           DeepSamples* deep) noexcept {
+                           int deep_bits) noexcept {
   const Reader reader;
   // libpng had no memory.
   if (reader.info == nullptr) return ImageFileStatus::undecodable;
   Source source{bytes};
-  return read_rows(reader, &source, size, out, stride, deep) ? ImageFileStatus::ok
-                                                             : ImageFileStatus::truncated;
+  return read_rows(reader, &source, size, out, stride, &deep_bits) ? ImageFileStatus::ok
+                                                                   : ImageFileStatus::truncated;
 }
 
 }  // namespace
 
-bool may_become_png(ImageBytes b) noexcept {
-  return b.size() < kSignature.size() && std::equal(b.begin(), b.end(), kSignature.begin());
-}
-
-const ImageKind kPng{kPngHead,    is_png,
-                     png_size,    [](ImageBytes) noexcept { return ImageFileStatus::ok; },
-                     is_deep_png, decode_png};
+const ImageKind kPng{kPngHead, is_png, png_size, decode_png};
 
 }  // namespace vergence::app::detail

@@ -1,5 +1,4 @@
 #pragma once
-#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -22,12 +21,9 @@ struct Chunk {
   std::uint32_t crc = 0;
 };
 
-/// Names of a container's compressions.
-using Compressions = std::array<std::string_view, 2>;
-
 /// Unpacks a compressed chunk into *records. Returns a phrase about the problem; empty on success.
 [[nodiscard]] std::string unpack(const ByteSource& file, const Chunk& chunk,
-                                 const Compressions& supported, std::vector<std::uint8_t>* records);
+                                 std::vector<std::uint8_t>* records);
 
 /// Scan of one file. `Record` has the offset `content` and the `size` of a record's content.
 template <class Record>
@@ -36,9 +32,8 @@ class RecordScanner {
   /// Returns the record at an offset; empty if it is incomplete.
   using RecordAt = std::optional<Record> (*)(const ByteSource& bytes, std::uint64_t offset);
 
-  RecordScanner(const ByteSource& file, const BagVisitor& each, RecordAt record_at,
-                const Compressions& supported)
-      : file_(file), each_(each), record_at_(record_at), supported_(supported) {}
+  RecordScanner(const ByteSource& file, const BagVisitor& each, RecordAt record_at)
+      : file_(file), each_(each), record_at_(record_at) {}
   ~RecordScanner() = default;
 
   /// Reads a record that is no chunk. `chunk` is as in BagPlace, `here` the offset for messages.
@@ -48,13 +43,9 @@ class RecordScanner {
   void read_chunk(const Chunk& chunk, std::uint64_t here) {
     if (chunk.compression.empty())
       return read_records(file_, chunk.offset, chunk.offset + chunk.size, BagPlace::kNoChunk, here);
-    if (const std::string why = unpack(file_, chunk, supported_, &records_); !why.empty())
-      return scan_.broken(&BagScan::broken_chunks, here, why);
+    if (const std::string why = unpack(file_, chunk, &records_); !why.empty())
+      return scan_.skip(here, why);
     read_records(MemoryBytes(records_), 0, records_.size(), here, here);
-  }
-
-  void skip(std::uint64_t here, std::string_view why) {
-    scan_.broken(&BagScan::broken_records, here, why);
   }
 
   /// Passes a message on if its channel is described.
@@ -75,7 +66,7 @@ class RecordScanner {
     while (at < end) {
       const auto record = record_at_(bytes, at);
       if (!record || record->content + record->size > end)
-        return skip(here, "a chunk whose records do not fill it");
+        return scan_.skip(here, "a chunk whose records do not fill it");
       read_record(bytes, *record, chunk, here);
       at = record->content + record->size;
     }
@@ -83,7 +74,6 @@ class RecordScanner {
 
   const BagVisitor& each_;
   RecordAt record_at_;
-  Compressions supported_;
   // Unpacked records of the current chunk.
   std::vector<std::uint8_t> records_;
 };

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,10 +10,11 @@
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "core/types/time.hpp"
+#include "drivers/ins.hpp"
 
-/// Messages with a sequence's images and cameras, of ROS 2 (CDR) and ROS 1. Lengths are checked
-/// against the available bytes before allocation; pixels are not read. Readers return nothing for
-/// invalid messages.
+/// Messages with a sequence's images, cameras and INS, of ROS 2 (CDR) and ROS 1. By REP 103 the
+/// world is east, north, up and a body forward, left, up. Lengths are checked against the available
+/// bytes before allocation; pixels are not read. Readers return nothing for invalid messages.
 namespace vergence::app::detail {
 
 enum class PixelLayout : std::uint8_t {
@@ -75,5 +77,21 @@ struct RosCameraInfo {
     std::span<const std::uint8_t> message, MessageEncoding encoding);
 /// Returns the camera of the rectified images.
 [[nodiscard]] RosCamera rectified(RosCamera camera) noexcept;
+
+/// Content of sensor_msgs/NavSatFix, without an attitude. With fix_2d there is no height; sigmas
+/// are 0 if unknown. The status is that of the message, as an unsigned byte.
+[[nodiscard]] std::optional<InsRecord> read_ros_fix(std::span<const std::uint8_t> message,
+                                                    MessageEncoding encoding);
+
+struct RosAttitude {
+  Stamp stamp{};
+  /// Unit quaternion x y z w.
+  std::array<double, 4> q_world_body{0, 0, 0, 1};
+  /// In rad; 0 if unknown.
+  double tilt_sigma = 0, heading_sigma = 0;
+};
+/// Orientation of a sensor_msgs/Imu. Empty also if its covariance or norm marks it as absent.
+[[nodiscard]] std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> message,
+                                                           MessageEncoding encoding);
 
 }  // namespace vergence::app::detail

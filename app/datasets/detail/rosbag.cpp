@@ -18,8 +18,6 @@ constexpr std::uint64_t kUsualHead = 128;
 // Maximum size of a record's header, in bytes.
 constexpr std::uint64_t kMaxHeader = 4096;
 
-constexpr Compressions kCompressions{"bz2", "lz4"};
-
 enum class Opcode : std::uint8_t { message = 2, bag_header = 3, chunk = 5, connection = 7 };
 
 /// Fields of a header that are used; missing ones are empty.
@@ -131,7 +129,7 @@ Chunk to_chunk(const Record& record) {
 class RosbagScanner final : RecordScanner<Record> {
  public:
   RosbagScanner(const ByteSource& file, const BagVisitor& each)
-      : RecordScanner(file, each, record_at, kCompressions) {}
+      : RecordScanner(file, each, record_at) {}
 
   BagScan scan() {
     std::uint64_t at = kMagic.size();
@@ -156,25 +154,25 @@ class RosbagScanner final : RecordScanner<Record> {
     if (record.size == 0 && record.header.size.value_or(0) == 0) return;
     const Chunk chunk = to_chunk(record);
     if (!chunk.compression.empty() && !record.header.size)
-      return scan_.broken(&BagScan::broken_chunks, here, "a chunk without its size");
+      return scan_.skip(here, "a chunk without its size");
     RecordScanner::read_chunk(chunk, here);
   }
 
   void read_record(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                    std::uint64_t here) override {
-    if (!record.sound) return skip(here, "a record whose header contradicts its length");
+    if (!record.sound) return scan_.skip(here, "a record whose header contradicts its length");
     if (is(record, Opcode::connection)) return read_connection(bytes, record, here);
     if (is(record, Opcode::message)) read_message(bytes, record, chunk, here);
   }
 
   void read_connection(const ByteSource& bytes, const Record& record, std::uint64_t here) {
-    if (record.size > kMaxDescription) return skip(here, "a description longer than 1 MiB");
+    if (record.size > kMaxDescription) return scan_.skip(here, "a description longer than 1 MiB");
     std::vector<std::uint8_t> data(record.size);
     Header about;
     if (!bytes.read(record.content, data) || !parse_fields(data, &about) || about.type.empty() ||
         record.header.topic.empty() || !record.header.connection)
-      return skip(here, "a connection without a topic or a type");
-    if (channels_.size() >= kMaxChannels) return skip(here, "one connection too many");
+      return scan_.skip(here, "a connection without a topic or a type");
+    if (channels_.size() >= kMaxChannels) return scan_.skip(here, "one connection too many");
     channels_.try_emplace(
         *record.header.connection,
         BagChannel{record.header.topic, plain_type(about.type), MessageEncoding::ros1});
@@ -183,7 +181,7 @@ class RosbagScanner final : RecordScanner<Record> {
   void read_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                     std::uint64_t here) {
     if (!record.header.connection || record.size > kMaxChunk)
-      return skip(here, "a message without a connection or longer than 64 MiB");
+      return scan_.skip(here, "a message without a connection or longer than 64 MiB");
     pass(*record.header.connection, bytes, {chunk, record.content, record.size},
          record.header.time);
   }
@@ -202,7 +200,7 @@ bool unpack_rosbag_chunk(const ByteSource& file, std::uint64_t offset,
                          std::vector<std::uint8_t>* records) {
   const auto record = record_at(file, offset);
   return record && is(*record, Opcode::chunk) && record->header.size &&
-         unpack(file, to_chunk(*record), kCompressions, records).empty();
+         unpack(file, to_chunk(*record), records).empty();
 }
 
 }  // namespace vergence::app::detail

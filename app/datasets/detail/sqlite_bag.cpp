@@ -6,6 +6,8 @@
 #include <string>
 #include <system_error>
 
+#include <fmt/format.h>
+
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
@@ -16,17 +18,12 @@ constexpr unsigned kRowBits = 32;
 
 /// File name as a URI of SQLite.
 std::string to_uri(const std::filesystem::path& file) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-";
-  constexpr std::string_view kHex = "0123456789ABCDEF";
   std::string uri = "file:";
-  for (const char c : std::filesystem::absolute(file).string()) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (kPlain.find(c) != std::string_view::npos)
-      uri += c;
+  for (const char c : std::filesystem::absolute(file).string())
+    if (c == '%' || c == '?' || c == '#')
+      uri += fmt::format("%{:02X}", c);
     else
-      uri.append({'%', kHex[byte >> 4U], kHex[byte & 15U]});
-  }
+      uri += c;
   // Without a write-ahead log no file next to it is needed, and none is written.
   std::error_code ignored;
   const auto log = std::filesystem::file_size(file.string() + "-wal", ignored);
@@ -76,30 +73,15 @@ SqliteBag::SqliteBag(const std::filesystem::path& file) {
   database_.reset(database);
   if (status != SQLITE_OK)
     refuse(file, 0, std::string("cannot be opened by SQLite: ") + sqlite3_errstr(status));
-  harden();
-}
-
-SqliteBag::SqliteBag(std::vector<std::uint8_t> bytes) : bytes_(std::move(bytes)) {
-  sqlite3* database = nullptr;
-  (void)sqlite3_open_v2(":memory:", &database, SQLITE_OPEN_READWRITE, nullptr);
-  database_.reset(database);
-  harden();
-  const auto size = static_cast<sqlite3_int64>(bytes_.size());
-  (void)sqlite3_deserialize(database, "main", bytes_.data(), size, size,
-                            SQLITE_DESERIALIZE_READONLY);
-}
-
-SqliteBag::~SqliteBag() = default;
-
-/// The file is untrusted: its schema may not call functions, and no row is longer than a message.
-void SqliteBag::harden() const noexcept {
-  sqlite3* database = database_.get();
+  // The file is untrusted: its schema may not call functions, and no row is longer than a message.
   (void)sqlite3_db_config(database, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   (void)sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   (void)sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   (void)sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   (void)sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * kMaxChunk));
 }
+
+SqliteBag::~SqliteBag() = default;
 
 std::uint64_t SqliteBag::size() const noexcept { return std::uint64_t{1} << 63U; }
 
@@ -151,8 +133,7 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
       ++scan.orphans;
     } else if (row <= 0 || row >= kMaxRow || size > static_cast<std::int64_t>(kMaxChunk) ||
                messages.text(4) != "blob") {
-      scan.broken(&BagScan::broken_records, 0,
-                  "a row that is not a message, or is longer than 64 MiB");
+      scan.skip(0, "a row that is not a message, or is longer than 64 MiB");
     } else {
       ++scan.messages;
       each({&channel->second,
@@ -164,8 +145,7 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
   }
   scan.finished = true;
   if (status != SQLITE_DONE)
-    scan.broken(&BagScan::broken_records, 0,
-                std::string("where SQLite reports: ") + sqlite3_errstr(status));
+    scan.skip(0, std::string("where SQLite reports: ") + sqlite3_errstr(status));
   return scan;
 }
 

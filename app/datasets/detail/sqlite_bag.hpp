@@ -3,7 +3,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <vector>
 
 #include "app/datasets/detail/bag_scan.hpp"
 
@@ -19,8 +18,6 @@ class SqliteBag final : public ByteSource {
   /// Throws InputError if the file is missing or SQLite cannot open it. Also reads a write-ahead
   /// log (-wal) next to it.
   explicit SqliteBag(const std::filesystem::path& file);
-  /// Reads the bag from a file's bytes.
-  explicit SqliteBag(std::vector<std::uint8_t> bytes);
   ~SqliteBag() override;
   SqliteBag(const SqliteBag&) = delete;
   SqliteBag& operator=(const SqliteBag&) = delete;
@@ -36,9 +33,7 @@ class SqliteBag final : public ByteSource {
     void operator()(sqlite3* database) const noexcept;
     void operator()(sqlite3_blob* blob) const noexcept;
   };
-  void harden() const noexcept;
 
-  std::vector<std::uint8_t> bytes_;
   std::unique_ptr<sqlite3, Close> database_;
   // Guards the members below and all accesses to the database.
   mutable std::mutex mutex_;

@@ -8,6 +8,7 @@
 #include <yaml-cpp/yaml.h>
 #include <opencv2/calib3d.hpp>
 
+#include "app/runtime/durable_file.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/checkerboard/board_scene.hpp"
@@ -107,6 +108,20 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
+void write_as(CalibrationFormat format, const std::filesystem::path& out,
+              const CalibrationFile& calibration) {
+  Remarks remarks;
+  for (const auto& [file, text] : format_calibration_as(format, out, calibration, &remarks)) {
+    std::filesystem::create_directories(file.parent_path());
+    replace_durably(file, text);
+  }
+}
+
+std::string opencv_file(const CalibrationFile& calibration, Remarks* remarks) {
+  const auto [lenses, place] = format_opencv(calibration, remarks);
+  return "%YAML:1.0\n---\n" + lenses + place;
+}
+
 TEST(Conversion, roundTripKeepsTheRig) {
   const test::TemporaryFolder folder;
   for (const auto kind : kModels) {
@@ -118,11 +133,11 @@ TEST(Conversion, roundTripKeepsTheRig) {
          {CalibrationFormat::opencv, (folder / "stereo.yml").string()}}};
     for (const auto& [first, in] : kOuts) {
       Remarks remarks;
-      write_any_calibration(in, first, c, &remarks);
-      EXPECT_EQ(format_of_name(in), first);
+      write_as(first, in, c);
+      EXPECT_EQ(format_of("", in), first);
       for (const auto& [second, out] : kOuts) {
         if (first == second) continue;
-        (void)convert_calibration({in, out, std::nullopt, std::nullopt});
+        (void)convert_calibration({in, out, second, std::nullopt, true});
         expect_same(c, read_any_calibration(out, std::nullopt, &remarks));
       }
     }
@@ -133,8 +148,9 @@ TEST(Conversion, roundTripKeepsTheRig) {
     Remarks remarks;
     const std::string first = (folder / "a").string(), second = (folder / "b").string(),
                       pair = first + ending + "," + second + ending;
-    write_any_calibration(pair, format, ours(kModels[0]), &remarks);
+    write_as(format, pair, ours(kModels[0]));
     expect_same(ours(kModels[0]), read_any_calibration(pair, std::nullopt, &remarks));
+    EXPECT_THROW(write_as(CalibrationFormat::kalibr, pair, ours(kModels[0])), InputError);
   }
 }
 
@@ -142,8 +158,7 @@ TEST(Conversion, corruptFilesNameFileAndKey) {
   Remarks none;
   const std::string kalibr = format_kalibr(ours(kModels[0]), &none);
   const auto [left, right] = format_ros(ours(kModels[0]), &none);
-  const auto parts = format_opencv(ours(kModels[0]), &none);
-  const std::string opencv = "%YAML:1.0\n---\n" + parts[0] + parts[1];
+  const std::string opencv = opencv_file(ours(kModels[0]), &none);
   const char* kLens = "[520, 521, 322, 238]";
   struct Case {
     std::string text, second, key;
@@ -196,13 +211,13 @@ TEST(Conversion, corruptFilesNameFileAndKey) {
 }
 
 TEST(Conversion, parsesFormatSizeAndFileName) {
-  EXPECT_EQ(parse_format("ros"), CalibrationFormat::ros);
+  EXPECT_EQ(format_of("ros", "a.yaml"), CalibrationFormat::ros);
   EXPECT_EQ(parse_size("640x480"), (ImageSize{640, 480}));
   for (const char* bad : {"", "640", "640x", "x480", "640x-1", "640x480x3", "640*480"})
     EXPECT_THROW((void)parse_size(bad), InputError) << bad;
-  EXPECT_THROW((void)format_of_name("calibration.txt"), InputError);
-  EXPECT_EQ(format_of_name("intrinsics.yml,extrinsics.yml"), CalibrationFormat::opencv);
-  EXPECT_EQ(format_of_name("l.yaml,r.yaml"), CalibrationFormat::ros);
+  EXPECT_THROW((void)format_of("", "calibration.txt"), InputError);
+  EXPECT_EQ(format_of("", "intrinsics.yml,extrinsics.yml"), CalibrationFormat::opencv);
+  EXPECT_EQ(format_of("", "l.yaml,r.yaml"), CalibrationFormat::ros);
 }
 
 /// By Kalibr's own words: X_cn = T_cn_cnm1 X_cn-1, one after the other.
@@ -313,8 +328,7 @@ TEST(OpenCvStereo, writtenFileIsReadByOpenCv) {
   for (const auto kind : kModels) {
     const CalibrationFile c = ours(kind);
     Remarks remarks;
-    const auto parts = format_opencv(c, &remarks);
-    const std::string text = "%YAML:1.0\n---\n" + parts[0] + parts[1];
+    const std::string text = opencv_file(c, &remarks);
     cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
     const bool fisheye = kind == CameraModelKind::pinhole_equidistant;
     Reference left{.fisheye = fisheye}, right{.fisheye = fisheye};
@@ -328,8 +342,7 @@ TEST(OpenCvStereo, writtenFileIsReadByOpenCv) {
 /// of a lens with k1 k2 p1 p2, which is legal, too.
 TEST(OpenCvStereo, fourCoefficientsGiveAWarning) {
   Remarks remarks;
-  const auto parts = format_opencv(ours(CameraModelKind::pinhole_radtan), &remarks);
-  const std::string five = "%YAML:1.0\n---\n" + parts[0] + parts[1];
+  const std::string five = opencv_file(ours(CameraModelKind::pinhole_radtan), &remarks);
   std::string four = five;
   for (int k = 0; k < 2; ++k)
     four = replaced(replaced(four, "cols: 5", "cols: 4"), "-0.0005, 0]", "-0.0005]");

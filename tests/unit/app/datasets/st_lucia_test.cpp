@@ -243,10 +243,10 @@ TEST(StLuciaIns, repairsOrRefusesLogs) {
   using Lines = std::vector<std::string>;
   for (const Log& c : {
            Log{"shows nothing", [](Lines*) {}, 800, "too slow or too short", 0.3},
-           Log{"out of order", [](Lines* l) { std::swap((*l)[100], (*l)[500]); }, 800,
-               "sorted by their stamps"},
+           Log{"out of order", [](Lines* l) { std::swap((*l)[100], (*l)[500]); }, 798,
+               "2 samples of the INS have stamps that do not increase"},
            Log{"a stamp twice", [](Lines* l) { (*l)[200] = (*l)[199]; }, 799,
-               "1 samples of the INS repeat a stamp"},
+               "1 samples of the INS have stamps that do not increase"},
            Log{"a broken line", [](Lines* l) { (*l)[300] = "1292391546 0 -27.5"; }, 799,
                "1 lines that are not twelve numbers"},
            Log{"longitude first",

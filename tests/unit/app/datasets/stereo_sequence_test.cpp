@@ -110,17 +110,16 @@ TEST_F(Sequence, eurocReadsExactStampsAndExtrinsics) {
   }
 }
 
-TEST_F(Sequence, eurocSortsUnpairedImagesByStamp) {
+TEST_F(Sequence, eurocLeavesOutUnpairedImages) {
   test::write_tiny_euroc(folder_, 3);
   const auto line = [](std::int64_t stamp) { return fmt::format("{0},{0}.png\n", stamp); };
   folder_.write("mav0/cam1/data.csv", line(test::kTinyStart) + line(test::kTinyStart + 7) +
                                           line(test::kTinyStart + 2 * test::kTinyStep));
   const auto s = open_sequence(SequenceFormat::euroc, folder_.path());
-  ASSERT_EQ(s.pairs.size(), 4U);
-  EXPECT_EQ(s.pairs[1].stamp.ns(), test::kTinyStart + 7);
-  EXPECT_TRUE(s.pairs[1].file[0].empty());
-  EXPECT_TRUE(s.pairs[2].file[1].empty());
-  EXPECT_FALSE(s.pairs[3].file[1].empty());
+  ASSERT_EQ(s.pairs.size(), 2U);
+  EXPECT_EQ(s.pairs[1].stamp.ns(), test::kTinyStart + 2 * test::kTinyStep);
+  EXPECT_EQ(s.left_out, 2U);
+  EXPECT_TRUE(mentions(s.remarks.at(0), "2 images have no partner"));
 }
 
 TEST_F(Sequence, folderReadsTimesWithImageNames) {

@@ -55,6 +55,7 @@ TEST(Trajectory, readsVariantsOfPrograms) {
               moved,
           1, 5'000'000'000, ""},
       Row{"semicolons", "1.5; 1; 2; 3; 0; 0; 0.70710678; 0.70710678\n", 1, 1'500'000'000, ""},
+      Row{"decimal commas", "1,5;1,0;2;3;0;0;0,70710678;0,70710678\n", 1, 1'500'000'000, ""},
       Row{"columns in another order",
           "# qx qy qz qw x y z timestamp\n0 0 0.70710678 0.70710678 1 2 3 1.5\n", 1, 1'500'000'000,
           ""},
@@ -156,8 +157,9 @@ TEST(Kitti, posesUseAdjacentTimesFile) {
   EXPECT_TRUE(
       mentions(refusal_of([&] { (void)read_trajectory_file(poses); }), "times.txt:2: `soon`"));
   const std::vector<Stamp> times = {Stamp(30), Stamp(20)};
-  EXPECT_EQ(read_kitti(poses, times).front().stamp, Stamp(20)) << "in the order of time";
-  EXPECT_THROW((void)read_kitti(poses, std::span(times).first(1)), InputError);
+  EXPECT_EQ(read_trajectory_file(poses, {.times = times}).poses.front().stamp, Stamp(20))
+      << "in the order of time";
+  EXPECT_THROW((void)read_trajectory_file(poses, {.times = std::span(times).first(1)}), InputError);
 }
 
 TEST(Euroc, convertsBodyToLeftCamera) {

@@ -59,7 +59,7 @@ TEST_F(Images, thumbnailIsASmallJpeg) {
   const std::string jpeg = thumbnail(frame_.images[0]);
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size());
   ImageSize size;
-  ASSERT_EQ(check_image(bytes, &size), ImageFileStatus::ok);
+  ASSERT_EQ(read_image_size(bytes, &size), ImageFileStatus::ok);
   EXPECT_EQ(size.width, 480);
   EXPECT_EQ(size.height, 360);
   std::vector<std::uint8_t> grey(480 * 360);

@@ -182,7 +182,7 @@ TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
     std::vector<BundleObservation> per_image;
     std::vector<std::uint8_t> constant;
     const BundleProblem p = o.configuration == BundleConfiguration::parallel_monocular
-                                ? rig.monocular_problem(&images, &per_image, &constant)
+                                ? monocular_problem(&rig, &images, &per_image, &constant)
                                 : rig.problem();
     const BundleResult r = own.adjuster.solve(p, o);
     EXPECT_GE(r.steps, 0);

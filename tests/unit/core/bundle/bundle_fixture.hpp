@@ -61,4 +61,25 @@ inline double translation_error(const SimulatedRig& rig, std::size_t camera) {
   return (rig.T_camera_left[camera].t - rig.true_cameras[camera].t).norm();
 }
 
+/// Variant like parallel_monocular with a pose per image: image = pose · cameras + camera. `images`
+/// receives the poses; the first one is constant.
+inline BundleProblem monocular_problem(SimulatedRig* rig, std::vector<Transform>* images,
+                                       std::vector<BundleObservation>* per_image,
+                                       std::vector<std::uint8_t>* constant) {
+  images->clear();
+  for (const Transform& T : rig->T_left_world)
+    for (const Transform& camera : rig->T_camera_left) images->push_back(camera * T);
+  *per_image = rig->observations;
+  for (BundleObservation& o : *per_image)
+    o.pose = static_cast<std::uint16_t>(o.pose * rig->cameras.size() + o.camera);
+  constant->assign(images->size(), 0);
+  (*constant)[0] = 1;
+  BundleProblem p = rig->problem();
+  p.T_left_world = *images;
+  p.observations = *per_image;
+  p.pose_constant = *constant;
+  p.T_camera_left = {};
+  return p;
+}
+
 }  // namespace vergence

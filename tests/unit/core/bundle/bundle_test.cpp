@@ -41,7 +41,7 @@ TEST(Bundle, monocularPosesAreExactUpToScale) {
     std::vector<BundleObservation> observations;
     std::vector<std::uint8_t> constant;
     const BundleResult r =
-        own.adjuster.solve(rig.monocular_problem(&images, &observations, &constant), options);
+        own.adjuster.solve(monocular_problem(&rig, &images, &observations, &constant), options);
     ASSERT_TRUE(r.converged());
     EXPECT_LT(r.rms_px, kExactPixel);
     const Transform& newest_left = images[images.size() - 2];

@@ -8,8 +8,15 @@
 
 #include "app/config/yaml_file.hpp"
 
-/// Names of the parts of a calibration in other programs.
+/// Settings files of other programs: their syntax, and the names of the parts of a calibration in
+/// them.
 namespace vergence::app {
+
+/// Parses the documents of a settings file as trees, in any syntax: YAML (OpenCV's header
+/// `%YAML:1.0` and tabs are corrected), JSON, OpenCV's XML, `key = value` with sections, and the
+/// ost.txt of camera_calibration. Skips empty documents. Throws InputError as YamlFile::parse()
+/// does.
+[[nodiscard]] std::vector<YamlFile> settings_trees(std::string text, const std::string& name);
 
 /// Value of a file and its meaning.
 ///
@@ -19,7 +26,7 @@ namespace vergence::app {
 /// `translation` of camera 1 from camera 0, `to_previous` X_camera = T X_previous camera,
 /// `from_body` X_camera = T X_body, `to_body` X_body = T X_camera, `between` X_camera `index` = T
 /// X_other camera, `focal_baseline` the focal length times the baseline. `file` names another file
-/// with a camera's intrinsics. vocabulary.cpp has the table.
+/// with a camera's intrinsics. foreign_settings.cpp has the table.
 struct Fact {
   std::string_view part{};
   /// 0 is left; empty if the key does not tell.
