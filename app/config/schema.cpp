@@ -428,10 +428,19 @@ Group odometry() {
                "Keyframes in the sliding window.")
       .number("extrinsic_rotation_sigma_rad", &O::extrinsic_rotation_sigma_rad, 0, 0.05, "rad",
               "Minimum sigma of the rotation between cameras; 0: exact.")
+      .integer("window_steps", &O::window_steps, 1, 30, "steps",
+               "Maximum solver steps per window adjustment.")
+      .number("keyframe_parallax", &O::keyframe_parallax, 0.005, 0.3, "rad",
+              "Median parallax since the last keyframe that creates a new one.")
+      .number("keyframe_tracked", &O::keyframe_tracked, 0.1, 1, "",
+              "A new keyframe is created when less than this share of the last one's points is "
+              "still tracked.")
       .integer("min_inliers", &O::min_inliers, 6, 200, "points",
                "Minimum inliers of a pose; below, the status is `lost`.")
       .integer("ok_inliers", &O::ok_inliers, 6, 1000, "points",
                "Below this number of inliers the pose is `degraded: few_inliers`.")
+      .integer("mlesac_hypotheses", &O::mlesac_hypotheses, 10, 1000, "",
+               "Maximum MLESAC hypotheses per frame.")
       .integer("seed", &O::seed, 0, kLargestSeed, "",
                "Seed of the random sampling: the same seed gives the same poses.");
   return rows.also(Rows("odometry", "", whole)
@@ -456,12 +465,26 @@ Group calibration_options() {
                {"focal", calibration::IntrinsicsEstimation::focal},
                {"full", calibration::IntrinsicsEstimation::full}},
               "Intrinsics that are estimated with the extrinsics.")
+      .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%",
+              "Prior sigma of a focal length.")
+      .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px",
+              "Assumed error of a fixed principal-point coordinate; with `intrinsics: full` its "
+              "prior sigma.")
+      .number("lens_centre_sigma_px", &C::lens_centre_sigma_px, 0.01, 100, "px",
+              "Prior sigma of an additional camera's principal point with `intrinsics: full`; a "
+              "sigma in calibration.yaml takes precedence.")
+      .number("distortion_sigma", &C::distortion_sigma, 1e-5, 1, "",
+              "Prior sigma of a radial coefficient (k1, k2; equidistant: k1 to k4).")
+      .number("tangential_sigma", &C::tangential_sigma, 1e-6, 0.1, "",
+              "Prior sigma of a tangential coefficient (p1, p2).")
       .number("max_direction_deg", &C::max_direction_deg, 0.1, 180, "°",
               "Maximum angle of the translation to the nominal one.")
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
               "Maximum rotation from the nominal one.")
       .integer("min_near_points", &C::min_near_points, 0, 1000, "points",
                "Minimum near points of the collected frames; below: `needs_near_structure`.")
+      .number("near_baselines", &C::near_baselines, 5, 500, "baselines",
+              "Maximum distance of a near point, in baselines.")
       .number("extrinsic_random_walk_mrad_per_sqrt_h", &C::extrinsic_random_walk_mrad_per_sqrt_h, 0,
               100, "mrad/√h", "Random walk of undisturbed extrinsics.")
       .number("max_depth_error_percent", &C::max_depth_error_percent, 0.1, 50, "%",
@@ -482,10 +505,26 @@ Group monitor() {
   return Rows("monitor", "Monitoring of the calibration in use.", &Configuration::monitor)
       .number("threshold", &M::threshold, 20, 500, "",
               "Test statistic that reports a knock or a drift; higher: fewer alarms.")
+      .number(
+          "bias_px", &M::bias_px, 0, 1, "px",
+          "Minimum slow error that imperfect intrinsics leave in stereo matches without a knock.")
       .number("verified_bias_px", &M::verified_bias_px, 0, 2, "px",
               "Error of stereo matches by imperfect intrinsics, once verified.")
       .number("unverified_bias_px", &M::unverified_bias_px, 0, 5, "px",
-              "The same with an unverified calibration.");
+              "The same with an unverified calibration.")
+      .integer("min_matches", &M::min_matches, 12, 1000, "matches",
+               "Frames with fewer stereo matches are not used.")
+      .integer("short_window", &M::short_window, 1, 10, "frames",
+               "Shortest window of moving frames that is tested: for large knocks.")
+      .integer("long_window", &M::long_window, 60, 1800, "frames",
+               "Longest window of moving frames that is tested: for drift.")
+      .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
+               "Consecutive frames without the expected stereo matches that are a `collapse`, or "
+               "over the threshold that are a knock at standstill.")
+      .number("collapse_share", &M::collapse_share, 0.01, 0.9, "",
+              "Share of the expected matches below which a frame counts towards a collapse.")
+      .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",
+               "Minimum expected matches for a frame to count.");
 }
 
 Group intrinsics_error() {
