@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdio>
+#include <charconv>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -23,15 +23,20 @@ constexpr double kNarrowest = 0.05, kWidest = 2;
 // Limits of the marker's side over the side of a square.
 constexpr double kSmallestMarker = 0.3, kLargestMarker = 0.95;
 
+bool parse_whole(std::string_view text, int* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
 /// A board whose size is a text like `9x6`: `parts` of `option`, `least` to `most` along each side.
 BoardPattern parse_size(BoardKind kind, const char* option, const char* parts,
-                        const std::string& text, int least, int most, const char* example) {
+                        std::string_view text, int least, int most, const char* example) {
   BoardPattern board;
   board.kind = kind;
-  int end = 0;
-  if (std::sscanf(text.c_str(), "%3dx%3d%n", &board.columns, &board.rows, &end) != 2 ||
-      static_cast<std::size_t>(end) != text.size() || std::min(board.columns, board.rows) < least ||
-      std::max(board.columns, board.rows) > most)
+  const std::size_t x = text.find('x');
+  if (x == std::string_view::npos || !parse_whole(text.substr(0, x), &board.columns) ||
+      !parse_whole(text.substr(x + 1), &board.rows) ||
+      std::min(board.columns, board.rows) < least || std::max(board.columns, board.rows) > most)
     throw InputError(
         fmt::format("{} is \"{}\"; write the {}, columns x rows, {} to {} each, like {}", option,
                     text.substr(0, 60), parts, least, most, example));

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
+#include <charconv>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -77,9 +77,11 @@ namespace fs = std::filesystem;
 
 ImageSize parse_size(const std::string& text) {
   ImageSize size;
-  int end = 0;
-  if (std::sscanf(text.c_str(), "%5dx%5d%n", &size.width, &size.height, &end) != 2 ||
-      static_cast<std::size_t>(end) != text.size() || size.width < 1 || size.height < 1)
+  const char *begin = text.data(), *end = begin + text.size();
+  const auto width = std::from_chars(begin, end, size.width);
+  const bool cross = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+  const auto height = cross ? std::from_chars(width.ptr + 1, end, size.height) : width;
+  if (!cross || height.ec != std::errc() || height.ptr != end || size.width < 1 || size.height < 1)
     throw InputError("--size is \"" + text.substr(0, 60) +
                      "\"; write the image's width and height in pixels, like 640x480");
   return size;
