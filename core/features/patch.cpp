@@ -53,7 +53,6 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
   // rows.
   const float last_x = static_cast<float>(image.width - kWindowStride - 2),
               last_y = static_cast<float>(image.height - kWindow - 2);
-  const float inverse_variance = 1.F / w.variance_sum;
   detail::WindowSums s{};
   float image_variance = 0.F;
   // It need not settle to kSettled within the steps; the next finer level or the residual test
@@ -70,23 +69,22 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     image_variance = std::max(s.square - s.sum * s.sum / kPixels, 0.F);
     // A gain near zero or negative means that nothing here resembles the window, so a step would be
     // noise.
-    const float gain = std::max(s.value * inverse_variance,
-                                0.3F * std::sqrt(image_variance * inverse_variance) + 1e-3F);
+    const float gain = std::max(s.value / w.variance_sum,
+                                0.3F * std::sqrt(image_variance / w.variance_sum) + 1e-3F);
     float dx = (ixx * s.steep_x + ixy * s.steep_y) / gain;
     float dy = (ixy * s.steep_x + iyy * s.steep_y) / gain;
-    const float square = dx * dx + dy * dy;
+    const float length = std::sqrt(dx * dx + dy * dy);
     // Maximum step in px of the level, above which the linear model does not hold.
     constexpr float kMaxStep = 3.F;
-    if (square > kMaxStep * kMaxStep) {
-      const float shorter = kMaxStep / std::sqrt(square);
-      dx *= shorter;
-      dy *= shorter;
+    if (length > kMaxStep) {
+      dx *= kMaxStep / length;
+      dy *= kMaxStep / length;
     }
     out.x -= dx;
     out.y -= dy;
     const float moved_x = out.x - start_x, moved_y = out.y - start_y;
     if (!(moved_x * moved_x + moved_y * moved_y <= max_shift * max_shift)) return out;
-    if (square < kSettled * kSettled) break;
+    if (length < kSettled) break;
   }
   out.status = AlignStatus::ok;
   const float norm = w.variance_sum * image_variance;

@@ -26,17 +26,18 @@ double worst_error(const std::vector<app::report::Frame>& frames, const Film& fi
     double worst = 0, way = 0;
     Transform first;
     bool any = false;
-    std::int64_t begin = 0;
+    std::size_t begin = 0;
     Vec3 last = Vec3::Zero(), offset = Vec3::Zero();
-    for (const app::report::Frame& frame : frames) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const app::report::Frame& frame = frames[i];
       if (!frame.posed) continue;
       if (!any) {
-        begin = frame.number;
+        begin = i;
         offset = frame.T_world_left.t;
         if (shift >= film.pairs()) break;
         first = film.T_first_left(shift).inverse();
       }
-      const std::size_t n = shift + static_cast<std::size_t>(frame.number - begin);
+      const std::size_t n = shift + i - begin;
       if (n >= film.pairs()) break;
       const Vec3 truth = (first * film.T_first_left(n)).t;
       if (any) way += (truth - last).norm();

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <functional>
 #include <future>
-#include <thread>
 #include <utility>
 
 #include <nlohmann/json.hpp>

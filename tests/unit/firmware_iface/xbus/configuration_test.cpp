@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "firmware_iface/xbus/line_budget.hpp"
 #include "firmware_iface/xbus/mtdata2.hpp"
 #include "tests/unit/firmware_iface/xbus/hex.hpp"
