@@ -190,7 +190,7 @@ ExitCode report_no_mount(const EvaluationRequest& a, const Reference& from,
   return ExitCode::not_usable;
 }
 
-/// What to check where positions agree and rotations do not; empty: both agree.
+/// Returns the advice where positions agree and rotations do not; empty if both agree.
 std::string rotation_remark(const Files& files, const TrajectoryEvaluation& e) {
   constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
   // Relative to the path length.

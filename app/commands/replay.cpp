@@ -12,7 +12,7 @@
 namespace vergence::app {
 namespace {
 
-// Of --start and --frames.
+// Largest value of --start and --frames.
 constexpr double kMostFrames = 1e9;
 
 /// The words as given; checked when the command runs.

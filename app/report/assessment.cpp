@@ -17,7 +17,7 @@ namespace vergence::app::report {
 
 namespace {
 
-/// What to do about frames with a reason, indexed by Reason.
+/// Advice about frames with a reason, indexed by Reason.
 constexpr std::array kAdvice{
     "",
     "A camera delivered no image: check its cable, its power and the trigger line.",

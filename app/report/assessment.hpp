@@ -8,7 +8,7 @@
 
 namespace vergence::app::report {
 
-/// What to do about frames with that reason; empty for Reason::none.
+/// Returns the advice about frames with that reason; empty for Reason::none.
 [[nodiscard]] const char* advice_for(Reason reason) noexcept;
 
 enum class Grade : std::uint8_t { good, care, bad };

@@ -9,7 +9,7 @@ namespace vergence::calibration {
 inline constexpr double kUnknownTransform = 0.2;
 /// Sigma of the transforms of a calibration that states none, in the same units: twice the yaw of
 /// 26 mrad that a recorded rig has in its principal points instead.
-inline constexpr double kMakersTransform = 0.05;
+inline constexpr double kSuppliedTransform = 0.05;
 /// Usual RigCalibration::inflation: 5 to 45 on recorded drives.
 inline constexpr double kUsualInflation = 20;
 

@@ -47,7 +47,7 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   if (rig_.covariance.empty()) {
     refined_ = rig_;
     refined_->inflation = calibration::kUsualInflation;
-    calibration::assume_transforms(calibration::kMakersTransform, &*refined_);
+    calibration::assume_transforms(calibration::kSuppliedTransform, &*refined_);
   }
   frames_.begin_segment();
   frames_.require(frames_.min_to_solve());

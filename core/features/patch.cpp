@@ -55,7 +55,7 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
               last_y = static_cast<float>(image.height - kWindow - 2);
   detail::WindowSums s{};
   float image_variance = 0.F;
-  // It need not settle to kSettled within the steps; the next finer level or the residual test
+  // A level need not settle within the steps; the next finer one or the residual test
   // decides then.
   for (int step = 0; step < kMaxSteps; ++step) {
     const float left = out.x - kHalfWindow, top = out.y - kHalfWindow;

@@ -76,14 +76,15 @@ HWY_INLINE void by_intrinsic(const KernelCamera& camera, const Residual& r, int 
   }
   const V r2 = hn::MulAdd(r.xn, r.xn, hn::Mul(r.yn, r.yn));
   if (!camera.equidistant && (index == 6 || index == 7)) {
-    // Tangential: 2 x y of one axis and r² + 2 of the other's square.
+    // A tangential coefficient moves its own axis, y for p1 and x for p2, by r² + 2 n² with the
+    // coordinate n of that axis, and the other one by 2 x y.
     const int own = 7 - index;
     const V n = own == 0 ? r.xn : r.yn;
     J[1 - own] = hn::Mul(set(2.0), hn::Mul(r.xn, r.yn));
     J[own] = hn::MulAdd(set(2.0), hn::Mul(n, n), r2);
   } else {
-    // Radial: a power of r², or of θ² with θ/r.
-    const int power = camera.equidistant ? index - 3 : index == 8 ? 3 : index - 3;
+    // A radial coefficient scales the point by a power of r², or of θ² times θ/r.
+    const int power = !camera.equidistant && index == 8 ? 3 : index - 3;
     V factor = set(1.0), base = r2;
     if (camera.equidistant) {
       const V radius = hn::Sqrt(hn::Max(r2, set(1e-18))), theta = hn::Atan(D(), radius);
