@@ -188,6 +188,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kMinAgreeing;
   if (next_rig_ && out.images_good) {
     out.relink_due = true;
+    out.effort.points_percent = effort.points_percent;
   } else if (gaps_.rebuild_due() && out.images_good && fit.confirmed_stereo() && !all_far) {
     out.map_rebuild_due = true;
   } else if (fit.confirmed_stereo() && !images.repeated && needs_keyframe()) {

@@ -127,7 +127,7 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   if (next_rig_ && out->relink_due) {
     const RigCalibration next = *std::exchange(next_rig_, std::nullopt);
     out->relinked = true;
-    if (!reexpress_map(next, &out->points_kept)) {
+    if (!reexpress_map(next, out)) {
       out->status = PoseStatus::degraded;
       out->reason = Reason::no_stereo_matches;
     }
@@ -142,7 +142,7 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   }
 }
 
-bool Odometry::reexpress_map(const RigCalibration& rig, double* points_kept) noexcept {
+bool Odometry::reexpress_map(const RigCalibration& rig, FrameOutcome* out) noexcept {
   const RigCalibration before = rig_;
   const std::array<UndistortedCamera, kMaxCameras> old_lenses = front_end_.lenses();
   const bool was_linked = link_ == Link::linked;
@@ -246,10 +246,14 @@ bool Odometry::reexpress_map(const RigCalibration& rig, double* points_kept) noe
   (void)map_.observe(newest_slot);
   if (window_.adjust(map_, true).usable) rig_.T_camera_left = window_.T_camera_left();
   const PoseFit newest = poses_.fit_linked(map_, map_.keyframe(newest_slot).T_left_world, false);
-  *points_kept =
+  out->points_kept =
       held == 0 ? 1
                 : std::min(1.0, static_cast<double>(newest.inliers) / static_cast<double>(held));
   if (newest.found) map_.move_world(newest.T_left_world.inverse() * motion_.T_left_world());
+  // Unlinked cameras have followed fewer points than linked ones can.
+  (void)new_points(0, out);
+  keyframe_points_ = map_.observe(newest_slot);
+  out->keyframe = true;
   return evidence.fits();
 }
 
