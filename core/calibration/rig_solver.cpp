@@ -23,9 +23,10 @@ constexpr double kLossThreshold = 2.5;
 // Maximum number of steps of the last adjustment; a focal length with an error of a quarter takes
 // more than a hundred.
 constexpr int kMaxSteps = 200;
-// Distances of the shared parameters from the optimum, in standard deviations: before outliers are
-// removed, and of the result, whose error it is not to increase.
-constexpr double kRough = 1, kPrecise = 0.05;
+// Last steps of the shared parameters, in standard deviations by white noise, which are a fifth of
+// the stated ones: before outliers are removed; of the result, whose error it is not to increase;
+// and of a focal length, whose error lies along a flat valley with small steps.
+constexpr double kRough = 1, kPrecise = 0.2, kFlat = 0.1;
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -162,13 +163,13 @@ void RigSolver::drop_outliers(double limit) noexcept {
   observations_.truncate(kept);
 }
 
-BundleResult RigSolver::readjust(BundleOptions how, bool last) noexcept {
+BundleResult RigSolver::readjust(BundleOptions how, bool last, double tolerance_sigmas) noexcept {
   const double scale = residual_scale();
   drop_outliers(kOutlierSigmas * scale);
   how.loss = BundleLoss::cauchy;
   how.loss_threshold = kLossThreshold * scale;
   how.max_steps = last ? kMaxSteps : 8;
-  how.tolerance_sigmas = last ? kPrecise : kRough;
+  how.tolerance_sigmas = tolerance_sigmas;
   how.covariance = how.pose_covariance = last;
   return adjust(how);
 }
@@ -182,7 +183,7 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how) noexcept {
   BundleResult r = adjust(how);
   for (const bool last : {false, true}) {
     if (!r.usable()) return r;
-    r = readjust(how, last);
+    r = readjust(how, last, last ? kPrecise : kRough);
   }
   return r;
 }
@@ -232,7 +233,7 @@ RigSolution RigSolver::free_focal_lengths(RigSolveRequest request) noexcept {
   const auto start = std::chrono::steady_clock::now();
   RigSolution s{.rig = request.rig};
   request.known = nullptr;
-  (void)finish(readjust(bundle_options(request, true), true), &s);
+  (void)finish(readjust(bundle_options(request, true), true, kFlat), &s);
   s.solve_ms = milliseconds_since(start);
   return s;
 }

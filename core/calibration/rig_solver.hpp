@@ -112,7 +112,8 @@ class RigSolver {
   [[nodiscard]] BundleResult adjust_robustly(BundleOptions how) noexcept;
   /// Removes the outliers of the last adjustment and adjusts again with Cauchy's loss. `last`: to
   /// the end, with covariances.
-  [[nodiscard]] BundleResult readjust(BundleOptions how, bool last) noexcept;
+  [[nodiscard]] BundleResult readjust(BundleOptions how, bool last,
+                                      double tolerance_sigmas) noexcept;
   /// Sets status, rig and sigmas. Returns true if they can be used.
   bool finish(const BundleResult& r, RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
