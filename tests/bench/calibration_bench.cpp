@@ -7,7 +7,7 @@
 //   solves [--only NAME]       a solve of so many frames against the one of the whole drive: the
 //                              difference of their depths (root mean over the image, at the depth
 //                              that calibrations are judged at) over the sigma that the solve
-//                              states
+//                              states, and the inflation of that sigma's square
 //
 // All take --set KEY=VALUE.
 #include <algorithm>
@@ -223,7 +223,7 @@ void print_solves(const RecordedSequence& d, const app::Configuration& c) {
   if (!whole.rig) return;
   const auto solved = solve_stretches(d, c, given);
   for (std::size_t i = 0; i < kStretches.size(); ++i) {
-    double squares = 0, largest = 0, sigma = 0, percent = 0;
+    double squares = 0, largest = 0, sigma = 0, percent = 0, inflation = 0;
     for (const RigSolution& s : solved[i]) {
       const double depth =
           calibration::reference_depth_m(s.rig, 1, c.calibration, c.odometry.pixel_sigma);
@@ -233,12 +233,13 @@ void print_solves(const RecordedSequence& d, const app::Configuration& c) {
       largest = std::max(largest, z);
       sigma += own;
       percent += off * off;
+      inflation += s.rig.inflation;
     }
     const auto n = static_cast<double>(solved[i].size());
     if (solved[i].empty()) continue;
-    fmt::print("| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", d.name, kStretches[i],
-               solved[i].size(), sigma / n, std::sqrt(percent / n), std::sqrt(squares / n),
-               largest);
+    fmt::print("| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.0f} |\n", d.name,
+               kStretches[i], solved[i].size(), sigma / n, std::sqrt(percent / n),
+               std::sqrt(squares / n), largest, inflation / n);
     std::fflush(stdout);
   }
 }
@@ -288,8 +289,8 @@ int main(int argc, char** argv) {
     if (what == "stretches") return run_stretches(set, only);
     if (what == "solves") {
       fmt::print(
-          "| drive | frames | solves | sigma % | off % | off over sigma, rms | largest "
-          "|\n|---|---|---|---|---|---|---|\n");
+          "| drive | frames | solves | sigma % | off % | off over sigma, rms | largest | "
+          "inflation |\n|---|---|---|---|---|---|---|---|\n");
       return for_drives(set, only, print_solves, vergence::test::kRecordedDrives);
     }
   } catch (const std::exception& e) {
