@@ -70,31 +70,20 @@ class Rows {
     return *this;
   }
 
-  /// A number that is chosen by its word: the first stands for 0.
-  Rows& choice(const char* name, int Settings::*field, const std::vector<std::string>& words,
+  /// A number or an enumerator that is chosen by its word: the first stands for 0.
+  template <class Value>
+  Rows& choice(const char* name, Value Settings::*field, const std::vector<std::string>& words,
                const char* meaning) {
-    std::vector<std::pair<std::string, int>> choices;
-    for (const std::string& word : words)
-      choices.emplace_back(word, static_cast<int>(choices.size()));
-    return choice<int>(name, field, choices, meaning);
-  }
-
-  /// One of the values of an enumeration, by its word.
-  template <class Enum>
-  Rows& choice(const char* name, Enum Settings::*field,
-               const std::vector<std::pair<std::string, Enum>>& choices, const char* meaning) {
     add(
         name, KeyType::text, 0, 0, "", meaning,
-        [field, choices](Settings& s, const KeyValue& v) {
-          for (const auto& [word, value] : choices)
-            if (word == std::get<std::string>(v)) s.*field = value;
+        [field, words](Settings& s, const KeyValue& v) {
+          const auto at = std::ranges::find(words, std::get<std::string>(v)) - words.begin();
+          s.*field = static_cast<Value>(at);
         },
-        [field, choices](const Settings& s) -> KeyValue {
-          for (const auto& [word, value] : choices)
-            if (value == s.*field) return word;
-          return std::string();
+        [field, words](const Settings& s) -> KeyValue {
+          return words.at(static_cast<std::size_t>(s.*field));
         });
-    for (const auto& [word, value] : choices) group_.keys.back().words.push_back(word);
+    group_.keys.back().words = words;
     return *this;
   }
 
@@ -151,6 +140,8 @@ class Rows {
   Part part_;
   Group group_;
 };
+
+constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
 
 /// The part that is the configuration itself.
 constexpr auto whole = [](auto& c) -> auto& { return c; };
@@ -223,20 +214,6 @@ Group realtime() {
               "Time budget per live frame; 0: the frame interval.");
 }
 
-std::vector<std::pair<std::string, trigger_board::Edge>> edges() {
-  using trigger_board::Edge;
-  return {{"none", Edge::none}, {"rising", Edge::rising}, {"falling", Edge::falling}};
-}
-
-std::vector<std::pair<std::string, SyncMode>> sync_modes() {
-  std::vector<std::pair<std::string, SyncMode>> modes;
-  for (const SyncMode mode : {SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe,
-                              SyncMode::ieee1394_cycle_time, SyncMode::ptp, SyncMode::side_by_side,
-                              SyncMode::frame_counter, SyncMode::approximate_time})
-    modes.emplace_back(to_string(mode), mode);
-  return modes;
-}
-
 Group rig() {
   using R = RigSettings;
   return Rows("rig", "The rig as a whole.", &Configuration::rig)
@@ -264,12 +241,8 @@ Group cameras() {
             .text("name", &C::name, 32, "Name in messages and in calibration.yaml.")
             .text("serial", &C::serial, 64,
                   "Serial number, or address of a GigE camera; empty: the next found.")
-            .choice<ImageHalf>(
-                "image_half", &C::half,
-                {{"whole", ImageHalf::whole},
-                 {"left", ImageHalf::left},
-                 {"right", ImageHalf::right}},
-                "Half of a frame that has both images side by side (docs/cameras.md).")
+            .choice("image_half", &C::half, {"whole", "left", "right"},
+                    "Half of a frame that has both images side by side (docs/cameras.md).")
             .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
             .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
             .integer("offset.0", &C::offset_x, 0, 16384, "px",
@@ -277,12 +250,8 @@ Group cameras() {
             .integer("offset.1", &C::offset_y, 0, 16384, "px", "Upper edge of that region.")
             .text("pixel_format", &C::pixel_format, 32,
                   "The device's name, e.g. `Mono8`; empty: the cheapest with grey values.")
-            .choice<CameraTrigger>(
-                "trigger", &C::trigger,
-                {{"hardware", CameraTrigger::hardware},
-                 {"software", CameraTrigger::software},
-                 {"free", CameraTrigger::free}},
-                "Trigger source, equal for all cameras (docs/synchronisation.md).")
+            .choice("trigger", &C::trigger, {"hardware", "software", "free"},
+                    "Trigger source, equal for all cameras (docs/synchronisation.md).")
             .options("options", 400,
                      "Options of this driver (drivers/*/README.md), a group or `NAME=VALUE …`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
@@ -294,11 +263,8 @@ Group cameras() {
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
             .text("mask", &C::mask, 400,
                   "PNG or PGM; pixels of value 0 are not used (docs/cameras.md).")
-            .choice<CameraModelKind>(
-                "model", &C::model,
-                {{"pinhole-radtan", CameraModelKind::pinhole_radtan},
-                 {"pinhole-equidistant", CameraModelKind::pinhole_equidistant}},
-                "Lens model; `pinhole-equidistant` is a fisheye lens.")
+            .choice("model", &C::model, {"pinhole-radtan", "pinhole-equidistant"},
+                    "Lens model; `pinhole-equidistant` is a fisheye lens.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
                      "fx, fy, cx, cy; all four 0: those of `rig.nominal`.")
             .numbers("distortion", &C::distortion, -2, 2, "",
@@ -333,6 +299,7 @@ Group exposure() {
 
 Group trigger() {
   using T = TriggerSettings;
+  const std::vector<std::string> edges{"none", "rising", "falling"};
   return Rows("trigger", "Trigger of the cameras.", &Configuration::trigger)
       .word("driver", &T::driver, {"none", "mock", "board"},
             "Source of the pulses (docs/synchronisation.md).")
@@ -351,16 +318,18 @@ Group trigger() {
                "Bit mask of the inputs wired to exposure-active outputs.")
       .integer("feedback_active_low", &T::feedback_active_low, 0, 15, "",
                "Bit mask of the feedback inputs that are low during exposure.")
-      .choice("pps", &T::pps, edges(),
+      .choice("pps", &T::pps, edges,
               "Edge of the GNSS receiver's pulse per second at the trigger board.")
-      .choice("ins", &T::ins, edges(), "Edge of the INS's SyncOut at the trigger board.");
+      .choice("ins", &T::ins, edges, "Edge of the INS's SyncOut at the trigger board.");
 }
 
 Group sync() {
   using S = SyncSettings;
   return Rows("sync", "How images are paired.", &Configuration::sync)
-      .choice<SyncMode>("mode", &S::mode, sync_modes(),
-                        "How images are paired and verified (docs/synchronisation.md).")
+      .choice("mode", &S::mode,
+              {"frame_counter", "approximate_time", "board", "ins_syncout", "master_strobe",
+               "ieee1394_cycle_time", "ptp", "side_by_side"},
+              "How images are paired and verified (docs/synchronisation.md).")
       .number("timeout_ms", &S::timeout_ms, 1, 10000, "ms",
               "Maximum wait for a late image of a pulse.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
@@ -408,7 +377,6 @@ Group comparison() {
 
 Group odometry() {
   using O = OdometryOptions;
-  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   Rows rows("odometry",
             "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one "
             "at a time.",
@@ -460,10 +428,7 @@ Group calibration_options() {
                "Frames after its snapshot within which a result is adopted.")
       .integer("max_observations", &C::max_observations, 10'000, 1'000'000, "",
                "Maximum observations per solve; beyond it frames are subsampled.")
-      .choice("intrinsics", &C::intrinsics,
-              {{"fixed", calibration::IntrinsicsEstimation::fixed},
-               {"focal", calibration::IntrinsicsEstimation::focal},
-               {"full", calibration::IntrinsicsEstimation::full}},
+      .choice("intrinsics", &C::intrinsics, {"fixed", "focal", "full"},
               "Intrinsics that are estimated with the extrinsics.")
       .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%",
               "Prior sigma of a focal length.")
@@ -529,7 +494,6 @@ Group monitor() {
 
 Group intrinsics_error() {
   using E = IntrinsicsErrorSettings;
-  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows(
              "mock.intrinsics_error", "", [](auto& c) -> auto& { return c.mock.intrinsics_error; })
       .number("principal_point_px", &E::principal_point_px, 0, 50, "px",
@@ -557,24 +521,15 @@ Group calibration_error() {
 
 Group mock() {
   using M = MockSettings;
-  using Kind = vergence::mock::DriveKind;
-  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows("mock", "World and vehicle of the simulated rig (docs/simulated_rig.md).",
               &Configuration::mock)
       .word("world", &M::world, {"suburb"}, "Rendered world.")
-      .choice("drive", &M::drive,
-              {{"loop", Kind::loop},
-               {"figure-eight", Kind::figure_eight},
-               {"straight", Kind::straight},
-               {"brief", Kind::brief},
-               {"still", Kind::still}},
+      .choice("drive", &M::drive, {"loop", "figure-eight", "straight", "brief", "still"},
               "Route: `loop` is 1 km, `brief` 120 m.")
       .integer("seed", &M::seed, 0, kLargestSeed, "",
                "Seed of world, motion and noise: same seed, same run.")
-      .choice("pattern", &M::pattern,
-              {{"grey", vergence::mock::Pattern::grey}, {"gbrg", vergence::mock::Pattern::gbrg}},
-              "Sensors: `grey`, or `gbrg` (Bayer).")
-      .choice("ins", &M::ins, {{"noisy", M::Ins::noisy}, {"ideal", M::Ins::ideal}},
+      .choice("pattern", &M::pattern, {"grey", "gbrg"}, "Sensors: `grey`, or `gbrg` (Bayer).")
+      .choice("ins", &M::ins, {"noisy", "ideal"},
               "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
       .integer("texture_detail", &M::texture_detail, 0, 2, "",
                "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel.")
