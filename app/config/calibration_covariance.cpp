@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <span>
 #include <vector>
 
 #include <fmt/format.h>
@@ -28,27 +30,21 @@ struct NamedRow {
   int row = 0;
 };
 
-template <std::size_t N>
-void append_rows(const std::string& camera, const std::array<const char*, N>& names, int first,
-                 std::vector<NamedRow>* rows) {
-  for (std::size_t i = 0; i < N; ++i)
-    rows->push_back({camera + "." + names[i], first + static_cast<int>(i)});
-}
-
 /// Every parameter of the rig, in the order of the rows.
 std::vector<NamedRow> make_rows(const CalibrationFile& c) {
   const std::vector<std::string> cameras =
       distinct_names({c.names.begin(), c.names.begin() + c.rig.cameras});
   std::vector<NamedRow> rows;
+  const auto append = [&](std::size_t k, std::span<const char* const> names, int row) {
+    for (const char* name : names) rows.push_back({cameras[k] + "." + name, row++});
+  };
   for (std::size_t k = 1; k < cameras.size(); ++k)
-    append_rows(cameras[k], kPlaceNames, extrinsic_row(static_cast<int>(k)), &rows);
-  for (std::size_t k = 0; k < cameras.size(); ++k) {
-    const int first = intrinsic_row(static_cast<int>(k));
+    append(k, kPlaceNames, extrinsic_row(static_cast<int>(k)));
+  for (std::size_t k = 0; k < cameras.size(); ++k)
     if (c.rig.intrinsics[k].kind == CameraModelKind::pinhole_radtan)
-      append_rows(cameras[k], kRadtanNames, first, &rows);
+      append(k, kRadtanNames, intrinsic_row(static_cast<int>(k)));
     else
-      append_rows(cameras[k], kEquidistantNames, first, &rows);
-  }
+      append(k, kEquidistantNames, intrinsic_row(static_cast<int>(k)));
   return rows;
 }
 
@@ -57,32 +53,22 @@ std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
                                 const CalibrationFile& calibration) {
   const std::string field = "covariance.parameters";
   const std::vector<NamedRow> known = make_rows(calibration);
-  std::vector<std::string> names;
-  names.reserve(known.size());
-  for (const NamedRow& row : known) names.push_back(row.name);
-
   if (!list.IsSequence() || list.size() == 0)
     file.fail(list, field + " is not a list of parameters, like right.rx or left.k1");
   std::vector<NamedRow> rows;
   for (const auto& item : list) {
     const std::string name = file.text(item, field);
-    const auto found = std::ranges::find(names, name);
-    if (found == names.end())
-      file.fail(item, fmt::format("{} has \"{}\", which is not a parameter of this rig{}", field,
-                                  name.substr(0, 60), did_you_mean(name, names)));
-    const int row = known[static_cast<std::size_t>(found - names.begin())].row;
-    if (std::ranges::any_of(rows, [row](const NamedRow& r) { return r.row == row; }))
-      file.fail(item, fmt::format("{} has {} twice; remove one", field, name));
-    rows.push_back({name, row});
+    const auto found = std::ranges::find(known, name, &NamedRow::name);
+    if (found == known.end()) {
+      std::vector<std::string> names;
+      for (const NamedRow& row : known) names.push_back(row.name);
+      file.fail(item, "{} has \"{}\", which is not a parameter of this rig{}", field,
+                name.substr(0, 60), did_you_mean(name, names));
+    }
+    if (std::ranges::find(rows, found->row, &NamedRow::row) != rows.end())
+      file.fail(item, "{} has {} twice; remove one", field, name);
+    rows.push_back(*found);
   }
-  return rows;
-}
-
-/// Rows with a variance, in their order.
-std::vector<int> known_rows(const RigCovariance& covariance) {
-  std::vector<int> rows;
-  for (int row = 0; row < kRigSize; ++row)
-    if (covariance.known(row)) rows.push_back(row);
   return rows;
 }
 
@@ -112,18 +98,17 @@ void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationF
   file.check_keys(group, "covariance", {"parameters", "upper"});
   for (const char* key : {"parameters", "upper"})
     if (!group[key])
-      file.fail(
-          group,
-          fmt::format("covariance.{} is missing; add it, or remove the block `covariance`", key));
+      file.fail(group, "covariance.{} is missing; add it, or remove the block `covariance`", key);
   const std::vector<NamedRow> rows = read_rows(file, group["parameters"], *calibration);
   const std::size_t n = rows.size(), count = n * (n + 1) / 2;
   const std::vector<double> upper = file.numbers(group["upper"], "covariance.upper", count, count);
   auto next = upper.begin();
   for (std::size_t i = 0; i < n; ++i) {
     if (!(*next > 0))
-      file.fail(group["upper"], fmt::format("covariance.upper has {:g} as the variance of {}; it "
-                                            "must be positive (upper triangle, row by row)",
-                                            *next, rows[i].name));
+      file.fail(group["upper"],
+                "covariance.upper has {:g} as the variance of {}; it "
+                "must be positive (upper triangle, row by row)",
+                *next, rows[i].name);
     for (std::size_t j = i; j < n; ++j)
       calibration->rig.covariance.set(rows[i].row, rows[j].row, *next++);
   }
@@ -138,19 +123,17 @@ std::optional<std::string> find_flaw(const RigCovariance& covariance) {
       if (value != 0 && !(covariance.known(i) && covariance.known(j)))
         return "correlates a parameter with one that has no variance";
     }
-  const std::vector<int> rows = known_rows(covariance);
-  const auto n = static_cast<Eigen::Index>(rows.size());
+  std::vector<int> rows(kRigSize);
+  std::iota(rows.begin(), rows.end(), 0);
+  std::erase_if(rows, [&](int row) { return !covariance.known(row); });
+  const auto n = std::ssize(rows);
   if (n == 0) return std::nullopt;
   // Correlations: rad, m and px in one matrix would hide what the small ones do.
-  Eigen::MatrixXd correlation(n, n);
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const int a = rows[static_cast<std::size_t>(i)], b = rows[static_cast<std::size_t>(j)];
-      correlation(i, j) =
-          i == j ? 1.0
-                 : covariance(a, b) / std::sqrt(covariance(a, a)) / std::sqrt(covariance(b, b));
-      if (!(std::abs(correlation(i, j)) <= 1 + kRounding)) return "has a correlation beyond 1";
-    }
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::NullaryExpr(n, n, [&](auto i, auto j) {
+    const int a = rows[static_cast<std::size_t>(i)], b = rows[static_cast<std::size_t>(j)];
+    return covariance(a, b) / std::sqrt(covariance(a, a)) / std::sqrt(covariance(b, b));
+  });
+  if (!(correlation.cwiseAbs().maxCoeff() <= 1 + kRounding)) return "has a correlation beyond 1";
   // No eigenvalue is below −kRounding.
   correlation.diagonal().array() += kRounding;
   if (!positive_definite(correlation))

@@ -34,11 +34,6 @@ class Section {
   }
 
   [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
-  /// False: the key is not there, or stands for no values: nothing behind it, or `[]`.
-  [[nodiscard]] bool gives(const char* key) const {
-    const YAML::Node node = node_[key];
-    return node && !node.IsNull() && !(node.IsSequence() && node.size() == 0);
-  }
   [[nodiscard]] std::string field(const char* key) const {
     return name_.empty() ? key : name_ + "." + key;
   }
@@ -61,12 +56,13 @@ class Section {
                                             std::size_t most) const {
     return file_.numbers(need(key), field(key), least, most);
   }
-  /// A list that may be left out, then zeros.
+  /// A list that may be left out or empty; *values is then unchanged.
   template <std::size_t N>
-  void optional_numbers(const char* key, std::array<double, N>* values) const {
-    if (!has(key)) return;
-    const auto given = numbers(key, N, N);
-    std::ranges::copy(given, values->begin());
+  void optional_numbers(const char* key, std::array<double, N>* values, std::size_t least = N,
+                        std::size_t most = N) const {
+    const YAML::Node node = node_[key];
+    if (node && !node.IsNull() && !(node.IsSequence() && node.size() == 0))
+      std::ranges::copy(numbers(key, least, most), values->begin());
   }
 
  private:
@@ -74,10 +70,6 @@ class Section {
   YAML::Node node_;
   std::string name_;
 };
-
-std::size_t max_coefficients(const Intrinsics& k) {
-  return k.kind == CameraModelKind::pinhole_radtan ? 5 : 4;
-}
 
 Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   // The allowed range of a size is checked with the other values.
@@ -94,39 +86,16 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   if (word == kEquidistant)
     k.kind = CameraModelKind::pinhole_equidistant;
   else if (word != kRadtan)
-    file.fail(model, fmt::format("{} is \"{}\"; use {} or {}", camera.field("model"),
-                                 word.substr(0, 60), kRadtan, kEquidistant));
+    file.fail(model, "{} is \"{}\"; use {} or {}", camera.field("model"), word.substr(0, 60),
+              kRadtan, kEquidistant);
 
   const auto f = camera.numbers("intrinsics", 4, 4);
   k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
-  if (camera.gives("distortion")) {
-    const auto d = camera.numbers("distortion", 4, max_coefficients(k));
-    std::ranges::copy(d, k.distortion.begin());
-  }
+  const std::size_t most = k.kind == CameraModelKind::pinhole_radtan ? 5 : 4;
+  camera.optional_numbers("distortion", &k.distortion, 4, most);
   camera.optional_numbers("intrinsics_sigma", &k.sigma);
-  if (camera.has("distortion_sigma")) {
-    const auto sigma = camera.numbers("distortion_sigma", 4, max_coefficients(k));
-    std::ranges::copy(sigma, k.distortion_sigma.begin());
-  }
+  camera.optional_numbers("distortion_sigma", &k.distortion_sigma, 4, most);
   return k;
-}
-
-Transform read_transform(const Section& camera) {
-  const auto n = camera.numbers("T_camera_left", 12, 12);
-  Transform T;
-  T.R << n[0], n[1], n[2], n[4], n[5], n[6], n[8], n[9], n[10];
-  T.t << n[3], n[7], n[11];
-  return T;
-}
-
-Mat6 read_wide_covariance(const Section& camera) {
-  Mat6 covariance = Mat6::Zero();
-  if (!camera.has("covariance_total")) return covariance;
-  const auto n = camera.numbers("covariance_total", kTriangle, kTriangle);
-  auto next = n.begin();
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) covariance(i, j) = covariance(j, i) = *next++;
-  return covariance;
 }
 
 void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
@@ -145,9 +114,9 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
   for (const char* inverse : {"T_left_camera", "T_left_right"})
     if (node.IsMap() && node[inverse])
       file.fail(node[inverse],
-                fmt::format("cameras.{}.{} is the inverse of T_camera_left; invert it to [R^T, "
-                            "-R^T t], so that X_camera = R X_left + t",
-                            k, inverse));
+                "cameras.{}.{} is the inverse of T_camera_left; invert it to [R^T, "
+                "-R^T t], so that X_camera = R X_left + t",
+                k, inverse);
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
   calibration->names[k] = camera.text("name", calibration->names[k]);
@@ -157,10 +126,17 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
   if (!camera.has("T_camera_left"))
     file.fail(node, camera.field("T_camera_left") +
                         " is missing; add it, or use --from-scratch to estimate it");
-  rig.T_camera_left[k] = read_transform(camera);
+  const auto T = camera.numbers("T_camera_left", 12, 12);
+  rig.T_camera_left[k].R << T[0], T[1], T[2], T[4], T[5], T[6], T[8], T[9], T[10];
+  rig.T_camera_left[k].t << T[3], T[7], T[11];
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_total", &rig.sigma_total[k]);
-  rig.covariance_total[k] = read_wide_covariance(camera);
+  std::array<double, kTriangle> upper{};
+  camera.optional_numbers("covariance_total", &upper);
+  auto next = upper.begin();
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j)
+      rig.covariance_total[k](i, j) = rig.covariance_total[k](j, i) = *next++;
 }
 
 void read_found(const YamlFile& file, const YAML::Node& node, CalibrationFile* calibration) {
@@ -197,11 +173,9 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
                     {"version", "rig", "cameras", "covariance", "found", "configured"});
   if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000);
       version != kVersion)
-    file.fail(
-        top.need("version"),
-        fmt::format(
-            "version is {}; this program reads version {}; use the program that wrote the file",
-            version, kVersion));
+    file.fail(top.need("version"),
+              "version is {}; this program reads version {}; use the program that wrote the file",
+              version, kVersion);
 
   CalibrationFile calibration;
   RigCalibration& rig = calibration.rig;
@@ -209,8 +183,7 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (!cameras.IsSequence())
     file.fail(cameras, "cameras is not a list; begin each camera with `- `");
   if (cameras.size() < 2 || cameras.size() > kMaxCameras)
-    file.fail(cameras, fmt::format("cameras lists {} cameras; a rig has 2 to {}", cameras.size(),
-                                   kMaxCameras));
+    file.fail(cameras, "cameras lists {} cameras; a rig has 2 to {}", cameras.size(), kMaxCameras);
   rig.cameras = static_cast<int>(cameras.size());
   for (std::size_t k = 0; k < cameras.size(); ++k)
     read_camera(file, cameras[k], k, use, &calibration);

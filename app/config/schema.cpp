@@ -608,20 +608,19 @@ std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
 std::string find_contradiction(const Configuration& c) {
   for (std::size_t k = 0; k < c.cameras.size(); ++k)
     if (std::string unread = find_unread_lens(c.cameras[k], k); !unread.empty()) return unread;
-  struct Order {
-    const char *larger, *smaller;
-    double high, low;
-  };
-  for (const Order& o :
-       {Order{"odometry.ok_inliers", "odometry.min_inliers", double(c.odometry.ok_inliers),
-              double(c.odometry.min_inliers)},
-        Order{"calibration.max_frames", "calibration.min_frames", double(c.calibration.max_frames),
-              double(c.calibration.min_frames)},
-        Order{"calibration.usable_depth_percent", "calibration.good_depth_percent",
-              c.calibration.usable_depth_percent, c.calibration.good_depth_percent}})
-    if (o.high < o.low)
-      return fmt::format("{} ({}) is below {} ({}); raise the first or lower the second", o.larger,
-                         o.high, o.smaller, o.low);
+  const auto& odometry = c.odometry;
+  const auto& calibration = c.calibration;
+  for (const auto& [larger, high, smaller, low] :
+       {std::tuple<const char*, double, const char*, double>{
+            "odometry.ok_inliers", odometry.ok_inliers, "odometry.min_inliers",
+            odometry.min_inliers},
+        {"calibration.max_frames", calibration.max_frames, "calibration.min_frames",
+         calibration.min_frames},
+        {"calibration.usable_depth_percent", calibration.usable_depth_percent,
+         "calibration.good_depth_percent", calibration.good_depth_percent}})
+    if (high < low)
+      return fmt::format("{} ({}) is below {} ({}); raise the first or lower the second", larger,
+                         high, smaller, low);
   for (const auto& [key, list] :
        {std::pair<const char*, const std::string&>{"affinity", c.realtime.affinity},
         {"solver_affinity", c.realtime.solver_affinity}})
@@ -648,18 +647,6 @@ std::string range_text(const Key& key) {
 
 namespace {
 
-std::string cell(const std::string& text) { return text.empty() ? "–" : text; }
-
-std::string default_text(const Key& key) {
-  const std::string text = to_text(key.get(Configuration{}));
-  return text.empty() ? "empty" : "`" + text + "`";
-}
-
-std::string_view type_text(KeyType type) {
-  constexpr std::array kTexts{"integer", "number", "text"};
-  return kTexts.at(static_cast<std::size_t>(type));
-}
-
 /// The items of a list have the same keys: item 0 stands for all, as N.
 std::string documented_name(const Group& group, const Key& key) {
   if (group.list.empty()) return key.name;
@@ -678,10 +665,14 @@ std::string configuration_tables() {
     page += group.meaning + "\n\n";
     page += "| key | default | type | unit | range | meaning |\n|---|---|---|---|---|---|\n";
     for (const Key& key : group.keys) {
-      const std::string name = documented_name(group, key);
+      constexpr std::array kTypes{"integer", "number", "text"};
+      const std::string name = documented_name(group, key),
+                        value = to_text(key.get(Configuration{}));
       if (name.empty()) continue;
-      page += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, default_text(key),
-                          type_text(key.type), cell(key.unit), range_text(key), key.meaning);
+      page += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name,
+                          value.empty() ? "empty" : "`" + value + "`",
+                          kTypes.at(static_cast<std::size_t>(key.type)),
+                          key.unit.empty() ? "–" : key.unit, range_text(key), key.meaning);
     }
   }
   return page;
