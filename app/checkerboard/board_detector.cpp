@@ -5,9 +5,6 @@
 
 #include <opencv2/core.hpp>
 
-#include "app/checkerboard/aprilgrid.hpp"
-#include "app/checkerboard/charuco.hpp"
-
 namespace vergence::app {
 bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board) {
   constexpr std::size_t kMinCorners = 6;

@@ -1,4 +1,4 @@
-#include "app/checkerboard/charuco.hpp"
+#include "app/checkerboard/board_detector.hpp"
 
 #include <algorithm>
 #include <limits>

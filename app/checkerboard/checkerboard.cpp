@@ -1,4 +1,4 @@
-#include "app/checkerboard/checkerboard.hpp"
+#include "app/checkerboard/board_detector.hpp"
 
 #include <algorithm>
 #include <cmath>
