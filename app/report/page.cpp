@@ -10,8 +10,8 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "app/report/page_css.hpp"
 #include "app/report/plots.hpp"
-#include "app/report/style.hpp"
 #include "app/report/svg.hpp"
 #include "core/math/angle.hpp"
 
@@ -29,6 +29,9 @@ std::string grouped(std::size_t count) {
   }
   return text;
 }
+
+/// Length such as `0.004 m` or `54.34 m`, in millimetres below a decimetre.
+std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
 
 /// Table rows "name value" under group headings. Names and values are escaped here.
 class MetricTable {
@@ -82,32 +85,29 @@ std::string event_time(const Session& s, Stamp stamp) {
                           : "−" + time_label(before, 0.1);
 }
 
-struct EventRun {
-  const Event* first = nullptr;
-  Stamp last{};
-  std::size_t count = 0;
-};
+/// Successive events of one kind and message.
+using EventRun = std::span<const Event>;
 
-std::vector<EventRun> condensed(const std::vector<Event>& events) {
+std::vector<EventRun> condensed(std::span<const Event> events) {
   std::vector<EventRun> runs;
-  for (const Event& e : events) {
-    if (!runs.empty() && runs.back().first->kind == e.kind &&
-        runs.back().first->message == e.message) {
-      ++runs.back().count;
-      runs.back().last = e.stamp;
-    } else {
-      runs.push_back({&e, e.stamp, 1});
-    }
+  while (!events.empty()) {
+    const auto other = std::ranges::find_if(events, [&](const Event& e) {
+      return e.kind != events[0].kind || e.message != events[0].message;
+    });
+    runs.push_back(events.first(static_cast<std::size_t>(other - events.begin())));
+    events = events.subspan(runs.back().size());
   }
   return runs;
 }
 
-std::string event_row(const Session& s, const EventRun& run) {
-  std::string when = event_time(s, run.first->stamp);
-  if (run.count > 1) when += " … " + event_time(s, run.last);
-  const std::string many = run.count > 1 ? " (" + grouped(run.count) + " times)" : "";
+std::string event_row(const Session& s, EventRun run) {
+  std::string when = event_time(s, run.front().stamp), many;
+  if (run.size() > 1) {
+    when += " … " + event_time(s, run.back().stamp);
+    many = " (" + grouped(run.size()) + " times)";
+  }
   return fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}{}</td></tr>\n", when,
-                     escape(run.first->kind, 60), escape(run.first->message), many);
+                     escape(run.front().kind, 60), escape(run.front().message), many);
 }
 
 /// Counts, errors, times, calibration, memory, drops; a figure that does not exist has no row.
@@ -143,13 +143,11 @@ std::string events_table(const Session& session) {
   std::string out =
       "<table class=\"stack\"><tr><th>time, s</th><th>kind</th><th>message</th></tr>\n";
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const bool many = runs.size() > 2 * kEachEnd;
-    if (many && i == kEachEnd) {
-      const std::size_t left_out = runs.size() - 2 * kEachEnd;
+    if (i == kEachEnd && runs.size() > 2 * kEachEnd) {
+      i = runs.size() - kEachEnd;
       out += fmt::format(
           "<tr><td></td><td></td><td>… {} rows omitted; all are in events.jsonl …</td></tr>\n",
-          grouped(left_out));
-      i += left_out;
+          grouped(i - kEachEnd));
     }
     out += event_row(session, runs[i]);
   }
@@ -157,11 +155,9 @@ std::string events_table(const Session& session) {
 }
 
 /// A plot with its title and, below it, one sentence that says how to read it.
-std::string figure(std::string_view caption, const std::string& drawing,
-                   std::string_view note = "") {
-  const std::string below = note.empty() ? "" : fmt::format("<p class=\"soft\">{}</p>", note);
-  return fmt::format("<section><figure><h3>{}</h3>{}{}</figure></section>\n", caption, drawing,
-                     below);
+std::string figure(std::string_view caption, const std::string& drawing, std::string_view note) {
+  return fmt::format("<section><figure><h3>{}</h3>{}<p class=\"soft\">{}</p></figure></section>\n",
+                     caption, drawing, note);
 }
 
 std::string section(std::string_view css, std::string_view head, const std::string& body) {
@@ -201,20 +197,14 @@ std::string number_card(const std::string& value, const std::string& name,
       escape(value), escape(note));
 }
 
-std::string drift_card(const Analysis& a) {
-  const char* name = a.source == ErrorSource::ins         ? "Drift against the INS"
-                     : a.source == ErrorSource::reference ? "Drift against the reference"
-                                                          : "Drift";
-  if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), name, a.drift_message);
-  if (a.source == ErrorSource::none) return number_card("unknown", name, "no reference");
-  return number_card("unknown", name, "path too short");
-}
-
-std::string error_card(const Analysis& a) {
-  const std::string name =
-      a.source == ErrorSource::ins ? "Error against the INS" : "Error against the reference";
-  if (a.source == ErrorSource::none) return number_card("unknown", name, "no reference");
-  return number_card(metres(a.horizontal.rms), name,
+std::string error_cards(const Analysis& a) {
+  if (a.source == ErrorSource::none)
+    return number_card("unknown", "Drift", "no reference") +
+           number_card("unknown", "Error against the reference", "no reference");
+  const std::string reference = a.source == ErrorSource::ins ? "the INS" : "the reference";
+  return number_card(a.drift ? fmt::format("{:.2f} %", *a.drift * 100) : "unknown",
+                     "Drift against " + reference, a.drift ? a.drift_message : "path too short") +
+         number_card(metres(a.horizontal.rms), "Error against " + reference,
                      "horizontal RMS; maximum " + metres(a.horizontal.max));
 }
 
@@ -239,9 +229,8 @@ std::string assessment_section(const Session& s, const Analysis& a, const Assess
   const auto i = static_cast<std::size_t>(v.grade);
   return fmt::format(
       "<section class=\"assessment {}\"><p class=\"word\">{} {}</p><p>{}</p><div "
-      "class=\"numbers\">{}{}{}</div></section>\n",
-      kTones[i], kMarks[i], spaced(v.grade), escape(v.message, 600), drift_card(a), error_card(a),
-      ok_card(s, a));
+      "class=\"numbers\">{}{}</div></section>\n",
+      kTones[i], kMarks[i], spaced(v.grade), escape(v.message, 600), error_cards(a), ok_card(s, a));
 }
 
 std::string map_section(const Session& s, const Analysis& a) {
@@ -309,20 +298,17 @@ std::string running_plots(const Session& s, const Analysis& a) {
                       s, a);
 }
 
-/// A single one that the drive began with is no curve.
-bool changed(const Session& s, int camera) {
-  return std::ranges::any_of(s.calibrations, [camera](const CalibrationRow& c) {
-    return c.camera == camera && c.decided;
-  });
-}
-
-void calibration_sections(const Session& s, const Analysis& a, std::string* out) {
+std::string calibration_sections(const Session& s, const Analysis& a) {
   constexpr std::array<const char*, 6> kNames{"rotation x, degrees", "rotation y, degrees",
                                               "rotation z, degrees", "translation x, mm",
                                               "translation y, mm",   "translation z, mm"};
   std::string plots;
   for (int camera = 1; camera < kMaxCameras; ++camera) {
-    if (!changed(s, camera)) continue;
+    // A single one that the drive began with is no curve.
+    if (std::ranges::none_of(s.calibrations, [camera](const CalibrationRow& c) {
+          return c.camera == camera && c.decided;
+        }))
+      continue;
     const std::string whose = camera == 1 ? "Right camera" : fmt::format("Camera {}", camera);
     // Rotation and translation are shown side by side.
     for (const int component : {0, 3, 1, 4, 2, 5})
@@ -344,22 +330,21 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
         "marks "
         "are online estimates that left the calibration unchanged; calibrations.csv has them all.";
   body += "</p>";
-  *out += section("wide long", "Calibration", body) + plots;
+  return section("wide long", "Calibration", body) + plots;
 }
 
 std::string footer(const Session& s) {
   const std::string version = text_at(s.summary, "version"),
                     hash = text_at(s.summary, "configuration_hash");
-  std::string line =
-      "<code>vergence report SESSION</code> regenerates this page from the session's files.";
-  if (!version.empty()) line += " Recorded with version " + escape(version, 60) + ".";
-  if (!hash.empty()) line += " Configuration " + escape(hash, 60) + ".";
-  return "<p class=\"soft\" style=\"margin-top:12px\">" + line + "</p>\n";
+  return fmt::format(
+      "<p class=\"soft\" style=\"margin-top:12px\"><code>vergence report SESSION</code> "
+      "regenerates "
+      "this page from the session's files.{}{}</p>\n",
+      version.empty() ? "" : " Recorded with version " + escape(version, 60) + ".",
+      hash.empty() ? "" : " Configuration " + escape(hash, 60) + ".");
 }
 
 }  // namespace
-
-std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
 
 std::string page_html(const Session& session, const Analysis& analysis,
                       const Assessment& assessment) {
@@ -368,7 +353,7 @@ std::string page_html(const Session& session, const Analysis& analysis,
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" "
       "content=\"width=device-width,initial-scale=1\"/><link rel=\"icon\" "
       "href=\"data:,\"/><title>" +
-      title + "</title><style>" + style_sheet() + "</style></head><body><main>\n";
+      title + "</title><style>" + kPalette + kPageCss + "</style></head><body><main>\n";
   out += "<h1>" + title + "</h1>\n" + assessment_section(session, analysis, assessment) +
          "<div class=\"grid\">\n";
   if (!assessment.advice.empty())
@@ -378,8 +363,8 @@ std::string page_html(const Session& session, const Analysis& analysis,
   out += map_section(session, analysis);
   out += running_plots(session, analysis) + errors_head(analysis);
   if (analysis.source != ErrorSource::none) out += error_plots(session, analysis);
-  calibration_sections(session, analysis, &out);
-  out += section("wide long", "Events",
+  out += calibration_sections(session, analysis) +
+         section("wide long", "Events",
                  session.events.empty() ? "<p>No events.</p>" : events_table(session));
   out += section("wide long", "Metrics",
                  "<div class=\"two\">" + metrics_table(session, analysis) +

@@ -7,9 +7,6 @@
 
 namespace vergence::app::report {
 
-/// Length such as `0.004 m` or `54.34 m`, in millimetres below a decimetre.
-[[nodiscard]] std::string metres(double value);
-
 /// Complete report.html: one document, also well-formed XML, without scripts or external content.
 [[nodiscard]] std::string page_html(const Session& session, const Analysis& analysis,
                                     const Assessment& assessment);

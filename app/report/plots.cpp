@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -27,12 +28,6 @@ struct PlotBox {
   }
   [[nodiscard]] double y(double v) const noexcept {
     return bottom - (v - y0) / (y1 - y0) * (bottom - top);
-  }
-  [[nodiscard]] Line line(const Line& data) const {
-    Line placed;
-    placed.reserve(data.size());
-    for (const Point& p : data) placed.push_back({x(p.x), y(p.y)});
-    return placed;
   }
   void draw_time_axis(Svg* svg) const {
     constexpr int kMax = 6;
@@ -74,13 +69,6 @@ struct PlotBox {
 // Number of columns of a curve, two per unit of the drawing, which is sharp on high-resolution
 // screens.
 constexpr int kColumns = 740;
-
-std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
-  std::vector<Line> placed;
-  placed.reserve(lines.size());
-  for (const Line& line : lines) placed.push_back(box.line(line));
-  return placed;
-}
 
 constexpr double kLaneHeight = 21, kBandLeft = 148;
 
@@ -126,17 +114,15 @@ std::vector<Lane> make_lanes(std::span<const Frame> frames) {
   constexpr std::array<const char*, 5> kStateCss{"f-care", "f-third", "f-theirs", "f-ours",
                                                  "f-fourth"};
   std::vector<Lane> lanes;
-  for (std::size_t k = 0; k < kStatusCss.size(); ++k) {
-    const auto status = static_cast<PoseStatus>(k);
-    lanes.push_back({to_string(status), kStatusCss[k],
-                     [=](std::size_t i) { return frames[i].status == status; }});
-  }
-  for (std::size_t k = 0; k < kStateCss.size(); ++k) {
-    const auto state = static_cast<State>(k);
-    if (std::ranges::find(frames, state, &Frame::state) != frames.end())
+  for (std::size_t k = 0; k < kStatusCss.size(); ++k)
+    lanes.push_back({to_string(static_cast<PoseStatus>(k)), kStatusCss[k], [=](std::size_t i) {
+                       return frames[i].status == static_cast<PoseStatus>(k);
+                     }});
+  for (std::size_t k = 0; k < kStateCss.size(); ++k)
+    if (const auto state = static_cast<State>(k);
+        std::ranges::find(frames, state, &Frame::state) != frames.end())
       lanes.push_back({to_string(state), kStateCss[k],
                        [=](std::size_t i) { return frames[i].state == state; }});
-  }
   return lanes;
 }
 
@@ -207,14 +193,6 @@ void draw_calibration(const std::vector<CalibrationValue>& values, const PlotBox
                 box.x(v.from), box.y(v.value), 2.8);
 }
 
-void draw_verification(double at_s, const PlotBox& box, Svg* svg) {
-  const double x = box.x(at_s);
-  svg->line("confirmed", x, box.top, x, box.bottom);
-  const bool near_the_end = x > box.right - 60;
-  svg->text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5),
-            box.top + 11, "verified");
-}
-
 // Sizes in the drawing. kFoot is the room for the scale bar.
 constexpr double kMargin = 16, kFoot = 38, kMin = 190, kMax = 420;
 // Distance in the drawing that is smaller than the line width.
@@ -249,14 +227,6 @@ void draw_path(const char* css, std::vector<double> x, std::vector<double> y,
   svg->lines(css, thin(x, y, breaks, kThin, kMaxPoints));
 }
 
-/// Degraded stretches lie over the path in their own colour.
-void draw_degraded(const Analysis& a, std::span<const Frame> frames, const MapScale& s, Svg* svg) {
-  std::vector<double> x = a.estimate_x;
-  for (std::size_t i = 0; i < x.size(); ++i)
-    if (frames[i].status != PoseStatus::degraded) x[i] = kNone;
-  draw_path("curve map-care s-care", x, a.estimate_y, a.map_breaks, s, svg);
-}
-
 void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
   const auto there = [&a](std::size_t i) { return std::isfinite(a.estimate_x[i]); };
   std::size_t first = 0, last = a.estimate_x.size();
@@ -279,34 +249,23 @@ void draw_scale_bar(const MapScale& s, Svg* svg) {
   svg->text("strong", Anchor::start, kMargin + length + 8, y + 1, words);
 }
 
-void draw_north(const MapScale& s, Svg* svg) {
-  const double x = kPlotWidth - kMargin - 8, y = s.height - 12;
-  svg->polygon("f-ink", {{x, y - 22}, {x + 6, y}, {x, y - 5}, {x - 6, y}});
-  svg->text("strong", Anchor::end, x - 12, y - 2, "north");
-}
-
-}  // namespace
-
 /// From the first frame to the last along x.
-[[nodiscard]] static PlotBox time_box(const Analysis& a) {
+PlotBox time_box(const Analysis& a) {
   PlotBox box;
   // The range is never empty.
   box.x1 = a.duration_s > 0 ? a.duration_s : 1;
   return box;
 }
 
+}  // namespace
+
 std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
                        std::span<const Frame> frames) {
   PlotBox box = time_box(analysis);
-  double low = 0, high = 0;
-  bool any = false;
-  for (const double v : plot.y) {
-    if (!std::isfinite(v)) continue;
-    low = any ? std::min(low, v) : v;
-    high = any ? std::max(high, v) : v;
-    any = true;
-  }
-  if (!any) return {};
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double v : plot.y)
+    if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+  if (low > high) return {};
   box.fit_y(low, high, plot.from_zero);
   Svg svg(kPlotWidth, kPlotHeight, plot.description);
   draw_runs(
@@ -314,8 +273,11 @@ std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
       [&](std::size_t i) { return !frames[i].posed; }, &svg);
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
-  svg.lines(plot.css, on_paper(box, decimate(analysis.time_s, plot.y, analysis.breaks, box.x0,
-                                             box.x1, kColumns)));
+  std::vector<Line> lines =
+      decimate(analysis.time_s, plot.y, analysis.breaks, box.x0, box.x1, kColumns);
+  for (Line& line : lines)
+    for (Point& p : line) p = {box.x(p.x), box.y(p.y)};
+  svg.lines(plot.css, lines);
   return std::move(svg).finish();
 }
 
@@ -360,7 +322,13 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
   Svg svg(kPlotWidth, kPlotHeight, "A calibration parameter over time with its 2 sigma band");
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
-  if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
+  if (analysis.verified_s) {
+    const double x = box.x(*analysis.verified_s);
+    const bool near_the_end = x > box.right - 60;
+    svg.line("confirmed", x, box.top, x, box.bottom);
+    svg.text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5),
+             box.top + 11, "verified");
+  }
   draw_calibration(values, box, &svg);
   return std::move(svg).finish();
 }
@@ -381,10 +349,19 @@ std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
             analysis.breaks, scale, &svg);
   draw_path("curve map-ours s-ours", analysis.estimate_x, analysis.estimate_y, analysis.map_breaks,
             scale, &svg);
-  draw_degraded(analysis, frames, scale, &svg);
+  // Degraded stretches lie over the path in their own colour.
+  std::vector<double> degraded = analysis.estimate_x;
+  for (std::size_t i = 0; i < degraded.size(); ++i)
+    if (frames[i].status != PoseStatus::degraded) degraded[i] = kNone;
+  draw_path("curve map-care s-care", degraded, analysis.estimate_y, analysis.map_breaks, scale,
+            &svg);
   draw_ends(analysis, scale, &svg);
   draw_scale_bar(scale, &svg);
-  if (analysis.map_is_enu) draw_north(scale, &svg);
+  if (analysis.map_is_enu) {
+    const double x = kPlotWidth - kMargin - 8, y = scale.height - 12;
+    svg.polygon("f-ink", {{x, y - 22}, {x + 6, y}, {x, y - 5}, {x - 6, y}});
+    svg.text("strong", Anchor::end, x - 12, y - 2, "north");
+  }
   return std::move(svg).finish();
 }
 
