@@ -40,30 +40,27 @@ bool present(const fs::path& path) {
 
 // ---- where the images are
 
-std::vector<std::string> list_entries(const fs::path& folder, bool folders) {
+std::vector<std::string> list_names(const fs::path& folder, bool folders) {
   std::vector<std::string> names;
-  std::error_code ignored;
-  for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored)) {
-    const std::string name = it->path().filename().string();
-    std::error_code other;
-    if (folders ? it->is_directory(other) && !name.starts_with('.') : is_image_name(name))
+  for (const fs::path& entry : entries_in(folder)) {
+    const std::string name = entry.filename().string();
+    std::error_code ignored;
+    if (folders ? fs::is_directory(entry, ignored) && !name.starts_with('.') : is_image_name(name))
       names.push_back(name);
   }
-  std::ranges::sort(names, in_name_order);
   return names;
 }
 
 /// Two directories with the usual names that contain images, directly or in a subdirectory of the
 /// same name.
 std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& above) {
-  for (const auto& [left, right] : stereo_names(list_entries(root / above, true))) {
-    std::vector<std::string> inner = list_entries(root / above / left, true);
+  for (const auto& [left, right] : stereo_names(list_names(root / above, true))) {
+    std::vector<std::string> inner = list_names(root / above / left, true);
     inner.insert(inner.begin(), "");
     for (const std::string& name : inner) {
       const std::string below = name.empty() ? "" : "/" + name;
-      if (!list_entries(root / (above + left + below), false).empty() &&
-          !list_entries(root / (above + right + below), false).empty())
+      if (!list_names(root / (above + left + below), false).empty() &&
+          !list_names(root / (above + right + below), false).empty())
         return Cameras{Camera{above + left + below}, Camera{above + right + below}};
     }
   }
@@ -72,7 +69,7 @@ std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& a
 
 /// Images of both cameras in one folder, distinguished by a word of their names.
 std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& above) {
-  const std::vector<std::string> files = list_entries(root / above, false);
+  const std::vector<std::string> files = list_names(root / above, false);
   const std::array<std::string, 2> sides = side_names(files);
   if (sides[0].empty()) return std::nullopt;
   Cameras cameras;
@@ -95,7 +92,7 @@ std::optional<Cameras> read_cameras(const fs::path& root, const std::string& abo
 std::optional<Cameras> find_cameras(const fs::path& root) {
   std::optional<Cameras> found = read_cameras(root, "");
   if (found) return found;
-  for (const std::string& name : list_entries(root, true)) {
+  for (const std::string& name : list_names(root, true)) {
     auto cameras = read_cameras(root, name + "/");
     if (cameras && found) return std::nullopt;
     if (cameras) found = std::move(cameras);
@@ -107,20 +104,19 @@ std::optional<Cameras> find_cameras(const fs::path& root) {
 std::vector<std::string> list_images(const fs::path& root, const std::string& below) {
   const fs::path folder = root / below;
   require_folder(folder, "images");
-  std::vector<std::string> names = list_entries(folder, false);
+  std::vector<std::string> names = list_names(folder, false);
   if (names.empty()) {
     // Advice by the extension of a file that cannot be read.
     std::string advice;
     std::error_code error;
-    for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
-      if (const fs::path& file = it->path(); file.has_extension() && file.stem() != "")
+    for (const fs::path& file : entries_in(folder, &error))
+      if (file.has_extension() && file.stem() != "")
         advice = fmt::format(
             "; {0} files are not supported: convert them, for example with `mogrify -format png "
             "*{0}`",
             file.extension().string());
-    refuse(folder, 0,
-           error ? "cannot be listed (" + error.message() + "): check its permissions"
-                 : "holds no PNG, JPEG, BMP or PGM image" + advice);
+    if (error) refuse(folder, 0, "cannot be listed ({}): check its permissions", error.message());
+    refuse(folder, 0, "holds no PNG, JPEG, BMP or PGM image{}", advice);
   }
   for (std::string& name : names) name = below.empty() ? name : below + "/" + name;
   return names;
@@ -499,13 +495,9 @@ void pair_cameras(const Cameras& cameras, const Lists& lists, StereoSequence* se
 /// Name of a file in the directory that may be a calibration of another program; empty if there is
 /// none.
 std::string other_calibration(const fs::path& folder) {
-  std::error_code ignored;
-  for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored)) {
-    const std::string ending = lower(it->path().extension().string());
-    if (ending == ".yaml" || ending == ".yml" || ending == ".json" || ending == ".xml")
-      return it->path().filename().string();
-  }
+  for (const fs::path& entry : entries_in(folder))
+    for (const char* ending : {".yaml", ".yml", ".json", ".xml"})
+      if (lower(entry.extension().string()) == ending) return entry.filename().string();
   return "";
 }
 

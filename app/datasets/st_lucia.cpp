@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/text_file.hpp"
 #include "core/comparison/geodesy.hpp"
@@ -17,20 +18,14 @@ namespace {
 
 std::optional<std::filesystem::path> find_log(const std::filesystem::path& folder,
                                               std::string_view ending) {
-  std::vector<std::filesystem::path> found;
   std::error_code error;
-  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error))
-    if (it->path().filename().string().ends_with(ending)) found.push_back(it->path());
-  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
-  if (found.empty()) return std::nullopt;
-  if (found.size() > 1) {
-    std::ranges::sort(found);
-    refuse(folder, 0,
-           "holds " + std::to_string(found.size()) + " files that end in " + std::string(ending) +
-               " (" + found[0].filename().string() + ", …); use one directory per sequence");
-  }
-  return found[0];
+  std::vector<std::filesystem::path> found = entries_in(folder, &error);
+  if (error) refuse(folder, 0, "cannot be listed ({}): check its permissions", error.message());
+  std::erase_if(found, [&](const auto& entry) { return !entry.string().ends_with(ending); });
+  if (found.size() > 1)
+    refuse(folder, 0, "holds {} files that end in {} ({}, …); use one directory per sequence",
+           found.size(), ending, found[0].filename().string());
+  return found.empty() ? std::nullopt : std::optional(found[0]);
 }
 
 std::optional<Stamp> parse_stamp(std::string_view seconds, std::string_view microseconds) noexcept {

@@ -46,23 +46,18 @@ const Container& find_container(BagFormat format) {
 
 std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
   const Container& container = find_container(format);
-  const std::string ending = container.ending;
   std::error_code error;
   if (!fs::is_directory(bag, error)) {
     if (!fs::exists(bag, error))
-      refuse(bag, 0,
-             "does not exist; a " + ending + " file or a directory with such files is expected");
+      refuse(bag, 0, "does not exist; a {} file or a directory with such files is expected",
+             container.ending);
     return {bag};
   }
-  std::vector<fs::path> files;
-  for (fs::directory_iterator it(bag, error), end; !error && it != end; it.increment(error))
-    if (bag_format(it->path()) == container.sequence) files.push_back(it->path());
-  if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "); check its permissions");
-  if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
   // Recorders count without leading zeros: drive_2.mcap precedes drive_10.mcap.
-  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
-    return in_name_order(a.filename().string(), b.filename().string());
-  });
+  std::vector<fs::path> files = entries_in(bag, &error);
+  if (error) refuse(bag, 0, "cannot be listed ({}); check its permissions", error.message());
+  std::erase_if(files, [&](const auto& file) { return bag_format(file) != container.sequence; });
+  if (files.empty()) refuse(bag, 0, "holds no {} file", container.ending);
   return files;
 }
 
