@@ -471,21 +471,6 @@ void check_binning(const std::string& name, const Intrinsics& lens) {
              lens.width, lens.height, lens.cx, lens.cy, lens.width / parts, lens.height / parts);
 }
 
-void finish(const std::string& name, const CalibrationUse& use, CalibrationFile* calibration) {
-  for (const Intrinsics& lens : calibration->rig.intrinsics)
-    if (lens.width > 0 && lens.height > 0) check_binning(name, lens);
-  calibration->source = "given";
-  calibration->rig.baseline = calibration->rig.T_camera_left[1].t.norm();
-  if (const auto bad = find_implausible(&calibration->rig))
-    refuse(name, 0, "converted to calibration.yaml: {}", bad->message);
-  apply_use(use, &calibration->rig);
-}
-
-bool is_own(const YamlFile& file) {
-  return file.root().IsMap() && file.root()["cameras"] && !file.root()["cameras"].IsScalar() &&
-         (file.root()["version"] || file.root()["rig"]);
-}
-
 /// Files of an argument; a directory stands for its left.yaml and right.yaml. Commas separate files
 /// unless one has the whole name.
 std::vector<fs::path> split_files(const std::string& text) {
@@ -503,7 +488,11 @@ std::vector<fs::path> split_files(const std::string& text) {
 
 bool is_own_calibration(const fs::path& file) {
   const auto trees = settings_trees(read_text(file, kLargestYaml), file.string());
-  return std::ranges::any_of(trees, is_own);
+  return std::ranges::any_of(trees, [](const YamlFile& tree) {
+    const YAML::Node& root = tree.root();
+    return root.IsMap() && root["cameras"] && !root["cameras"].IsScalar() &&
+           (root["version"] || root["rig"]);
+  });
 }
 
 CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
@@ -533,7 +522,14 @@ CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
     add_named_files(&files);
     out = RigReader(files, size, use, remarks).read();
   }
-  finish(texts.back().name, use, &out);
+  const std::string& name = texts.back().name;
+  for (const Intrinsics& lens : out.rig.intrinsics)
+    if (lens.width > 0 && lens.height > 0) check_binning(name, lens);
+  out.source = "given";
+  out.rig.baseline = out.rig.T_camera_left[1].t.norm();
+  if (const auto bad = find_implausible(&out.rig))
+    refuse(name, 0, "converted to calibration.yaml: {}", bad->message);
+  apply_use(use, &out.rig);
   return out;
 }
 

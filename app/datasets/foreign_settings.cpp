@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <map>
 #include <sstream>
 #include <string_view>
 
@@ -14,46 +15,27 @@
 namespace vergence::app {
 namespace {
 
-struct Vocabulary {
-  std::string_view part, words;
-};
-/// Last part of a key in lower-case letters, without the words and number of the camera.
-constexpr std::array kWords{
-    Vocabulary{"matrix",
-               " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
-    Vocabulary{"fx", " fx mu "},
-    Vocabulary{"fy", " fy mv "},
-    Vocabulary{"cx", " cx u0 "},
-    Vocabulary{"cy", " cy v0 "},
-    Vocabulary{"focal", " f focal focallength "},
-    Vocabulary{"centre", " principalpoint pp "},
-    Vocabulary{"distortion",
-               " d dist distcoeff distcoeffs distcoef distcoefs distortion distortioncoeffs "
-               "distortioncoefficients distortionvector distortionparameters coefficients "},
-    Vocabulary{"camera_model", " model modeltype cameramodel cameratype type "},
-    Vocabulary{"distortion_model", " distortionmodel distortiontype "},
-    Vocabulary{"fisheye", " fisheye fisheyemodel "},
-    Vocabulary{"size", " size imagesize imgsize imagedimension resolution "},
-    Vocabulary{"width", " width imagewidth imgwidth cols "},
-    Vocabulary{"height", " height imageheight imgheight rows "},
-    Vocabulary{"rectification", " rectification rectificationmatrix rrect "},
-    Vocabulary{"projection", " p projection projectionmatrix prect "},
-    Vocabulary{"rotation", " r rot rotation rotationmatrix rmat om rvec rotationvector "},
-    Vocabulary{"translation",
-               " t tran trans trns translation translationvector translationmatrix tvec "},
-    Vocabulary{"to_previous", " tcncnm "},
-    Vocabulary{"from_body", " tcamimu tcambody tcb tci "},
-    Vocabulary{"to_body", " timucam tbodycam bodytcam tbs tsc tbc tic "},
-    Vocabulary{"baseline", " baseline b "},
-    Vocabulary{"focal_baseline", " bf focalxbaseline "},
-    Vocabulary{"binning_x", " binningx "},
-    Vocabulary{"binning_y", " binningy "},
-    Vocabulary{"roi_x", " roixoffset "},
-    Vocabulary{"roi_y", " roiyoffset "},
-    Vocabulary{"roi_width", " roiwidth "},
-    Vocabulary{"roi_height", " roiheight "},
-    Vocabulary{"name", " cameraname "},
-    Vocabulary{"file", " calib camcalib "}};
+/// Parts of a calibration, each with the words for it: the last part of a key in lower-case letters
+/// and digits, without the words and number of the camera.
+constexpr const char* kWords =
+    "matrix: k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics; "
+    "fx: fx mu; fy: fy mv; cx: cx u0; cy: cy v0; "
+    "focal: f focal focallength; centre: principalpoint pp; "
+    "distortion: d dist distcoeff distcoeffs distcoef distcoefs distortion distortioncoeffs "
+    "distortioncoefficients distortionvector distortionparameters coefficients; "
+    "camera_model: model modeltype cameramodel cameratype type; "
+    "distortion_model: distortionmodel distortiontype; fisheye: fisheye fisheyemodel; "
+    "size: size imagesize imgsize imagedimension resolution; "
+    "width: width imagewidth imgwidth cols; height: height imageheight imgheight rows; "
+    "rectification: rectification rectificationmatrix rrect; "
+    "projection: p projection projectionmatrix prect; "
+    "rotation: r rot rotation rotationmatrix rmat om rvec rotationvector; "
+    "translation: t tran trans trns translation translationvector translationmatrix tvec; "
+    "to_previous: tcncnm; from_body: tcamimu tcambody tcb tci; "
+    "to_body: timucam tbodycam bodytcam tbs tsc tbc tic; "
+    "baseline: baseline b; focal_baseline: bf focalxbaseline; "
+    "binning_x: binningx; binning_y: binningy; roi_x: roixoffset; roi_y: roiyoffset; "
+    "roi_width: roiwidth; roi_height: roiheight; name: cameraname; file: calib camcalib;";
 
 struct Program {
   // Key at the root; with a final underscore the beginning of one.
@@ -105,19 +87,20 @@ struct Side {
   bool word = false;
 };
 Side extract_side(std::vector<std::string>* tokens) {
-  const auto remove = [&](std::size_t i, int number, bool word) {
-    tokens->erase(tokens->begin() + static_cast<std::ptrdiff_t>(i));
-    return Side{number, word};
-  };
   const std::size_t n = tokens->size();
+  const auto at = [&](std::size_t i) { return tokens->begin() + static_cast<std::ptrdiff_t>(i); };
   for (std::size_t i = 0; i < n; ++i)
-    if (const std::string& token = (*tokens)[i];
+    if (const std::string token = (*tokens)[i];
         token == "left" || token == "right" ||
-        (n > 1 && i + 1 == n && (token == "l" || token == "r")))
-      return remove(i, token[0] == 'r' ? 1 : 0, true);
+        (n > 1 && i + 1 == n && (token == "l" || token == "r"))) {
+      tokens->erase(at(i));
+      return {token[0] == 'r' ? 1 : 0, true};
+    }
   for (std::size_t i = n; i-- > 0;)
-    if (const std::string& token = (*tokens)[i]; is_number(token) && token.size() <= 2)
-      return remove(i, std::stoi(token), false);
+    if (const std::string token = (*tokens)[i]; is_number(token) && token.size() <= 2) {
+      tokens->erase(at(i));
+      return {std::stoi(token), false};
+    }
   return {};
 }
 
@@ -125,10 +108,21 @@ std::string joined(const std::vector<std::string>& tokens) {
   return fmt::format("{}", fmt::join(tokens, ""));
 }
 
-const Vocabulary* find_part(const std::string& word) {
-  const std::string whole = " " + word + " ";
-  return std::ranges::find_if(
-      kWords, [&](const Vocabulary& w) { return w.words.find(whole) != std::string_view::npos; });
+/// Part that a word stands for; empty for other words.
+std::string_view find_part(const std::string& word) {
+  static const std::map<std::string, std::string> kParts = [] {
+    std::map<std::string, std::string> parts;
+    std::istringstream words(kWords);
+    std::string part;
+    for (std::string next; words >> next;)
+      if (next.ends_with(':'))
+        part = next.substr(0, next.size() - 1);
+      else
+        parts[next.substr(0, next.find(';'))] = part;
+    return parts;
+  }();
+  const auto found = kParts.find(word);
+  return found == kParts.end() ? std::string_view() : found->second;
 }
 
 /// k1 to k6, p1 or p2 of a scalar, whose number is not that of a camera; empty for other keys.
@@ -168,12 +162,11 @@ class Walk {
     constexpr int kDeepest = 12;
     if (depth > kDeepest) return;
     if (node.IsSequence()) {
-      for (std::size_t i = 0; i < node.size(); ++i)
-        if (node[i].IsMap() || node[i].IsSequence()) {
-          auto inner = groups;
-          inner.push_back(std::to_string(i));
-          visit(node[i], above + "[" + std::to_string(i) + "]", inner, depth + 1);
-        }
+      for (std::size_t i = 0; i < node.size(); ++i) {
+        auto inner = groups;
+        inner.push_back(std::to_string(i));
+        visit(node[i], above + "[" + std::to_string(i) + "]", inner, depth + 1);
+      }
       return;
     }
     if (!node.IsMap()) return;
@@ -248,17 +241,14 @@ class Walk {
   static bool find_fact(const std::vector<std::string>& tokens,
                         const std::vector<std::string>& groups, Side* side, Fact* fact) {
     std::string word = joined(tokens);
-    auto known = find_part((!groups.empty() && groups.back() == "roi" ? "roi" : "") + word);
-    if (known == kWords.end() && !side->number && (word.ends_with('l') || word.ends_with('r'))) {
-      known = find_part(word.substr(0, word.size() - 1));
-      if (known != kWords.end()) *side = {word.back() == 'r' ? 1 : 0, true};
+    fact->part = find_part((!groups.empty() && groups.back() == "roi" ? "roi" : "") + word);
+    if (fact->part.empty() && !side->number && (word.ends_with('l') || word.ends_with('r'))) {
+      fact->part = find_part(word.substr(0, word.size() - 1));
+      if (!fact->part.empty()) *side = {word.back() == 'r' ? 1 : 0, true};
     }
-    if (const std::size_t at = word.find("stereo");
-        known == kWords.end() && at != std::string::npos)
-      known = find_part(word.erase(at, std::string_view("stereo").size()));
-    if (known == kWords.end()) return false;
-    fact->part = known->part;
-    return true;
+    if (const std::size_t at = word.find("stereo"); fact->part.empty() && at != std::string::npos)
+      fact->part = find_part(word.erase(at, std::string_view("stereo").size()));
+    return !fact->part.empty();
   }
 
   const YamlFile& file_;

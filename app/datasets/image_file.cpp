@@ -24,7 +24,10 @@ constexpr off_t kMaxFile = off_t{256} << 20;
 const detail::ImageKind* detect_kind(Bytes bytes) noexcept {
   for (const detail::ImageKind* kind :
        {&detail::kPng, &detail::kJpeg, &detail::kBmp, &detail::kNetpbm})
-    if (kind->is(bytes)) return kind;
+    for (const std::string_view begin : kind->begins)
+      if (std::ranges::equal(bytes.first(std::min(bytes.size(), begin.size())), begin, {}, {},
+                             [](char c) { return static_cast<std::uint8_t>(c); }))
+        return kind;
   return nullptr;
 }
 

@@ -165,34 +165,6 @@ class Writer {
   Trajectory truth_;
 };
 
-bool has_pair(const RecordedFrame& frame) {
-  return frame.images[0].offset != 0 && frame.images[1].offset != 0;
-}
-
-/// First frame with both images.
-const RecordedFrame& first_complete_frame(const RecordedSession& session) {
-  const auto& frames = session.frames();
-  const auto first = std::ranges::find_if(frames, has_pair);
-  if (first == frames.end())
-    throw InputError(
-        "the recording has no frame with both images, so nothing is exported; record with record: "
-        "[images]");
-  return *first;
-}
-
-/// Throws InputError if the calibration is for images of another size.
-void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration) {
-  for (std::size_t k = 0; k < 2; ++k) {
-    const RecordedImage& image = frame.images[k];
-    const Intrinsics& lens = calibration.rig.intrinsics[k];
-    if (image.width != lens.width || image.height != lens.height)
-      throw InputError(fmt::format(
-          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; use the "
-          "calibration that belongs to these images",
-          k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
-  }
-}
-
 /// Returns false if one image of the pair is missing.
 bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
                std::array<std::vector<std::uint8_t>, 2>* pixels) {
@@ -211,18 +183,33 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
                             const std::function<void(std::size_t)>& progress) {
   ExportResult result;
   result.remarks = session.remarks();
-  const RecordedFrame& first = first_complete_frame(session);
-  check_sizes(first, request.calibration);
-  if (first.given.cameras > 2)
+  const auto& frames = session.frames();
+  const auto first = std::ranges::find_if(frames, [](const RecordedFrame& f) {
+    return f.images[0].offset != 0 && f.images[1].offset != 0;
+  });
+  if (first == frames.end())
+    throw InputError(
+        "the recording has no frame with both images, so nothing is exported; record with record: "
+        "[images]");
+  for (std::size_t k = 0; k < 2; ++k) {
+    const RecordedImage& image = first->images[k];
+    const Intrinsics& lens = request.calibration.rig.intrinsics[k];
+    if (image.width != lens.width || image.height != lens.height)
+      throw InputError(fmt::format(
+          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; use the "
+          "calibration that belongs to these images",
+          k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
+  }
+  if (first->given.cameras > 2)
     result.remarks.push_back(fmt::format(
         "{} cameras were recorded; the first two are exported, because the format has only two",
-        first.given.cameras));
+        first->given.cameras));
   request.calibration.rig.cameras = 2;
   Writer writer(request);
   const ReferenceTrack track(request.truth);
   std::array<std::vector<std::uint8_t>, 2> pixels;
   std::size_t done = 0, without_truth = 0;
-  for (const RecordedFrame& frame : session.frames()) {
+  for (const RecordedFrame& frame : frames) {
     progress(done++);
     if (!load_pair(session, frame, &pixels)) {
       ++result.left_out;

@@ -10,6 +10,7 @@
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/datasets/times_file.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/so3.hpp"
 
@@ -28,13 +29,7 @@ std::optional<std::filesystem::path> find_log(const std::filesystem::path& folde
   return found.empty() ? std::nullopt : std::optional(found[0]);
 }
 
-std::optional<Stamp> parse_stamp(std::string_view seconds, std::string_view microseconds) noexcept {
-  // Maximum number of seconds that 64 bits of nanoseconds hold.
-  constexpr std::int64_t kLatest = 9'000'000'000;
-  const auto s = parse_integer(seconds), us = parse_integer(microseconds);
-  if (!s || !us || *s < 0 || *s > kLatest || *us < 0 || *us > 999'999) return std::nullopt;
-  return Stamp(*s * 1'000'000'000 + *us * 1'000);
-}
+constexpr std::int64_t kMicroseconds = 1'000'000;
 
 constexpr std::string_view kImageLog = "_MultiCamera0.log";
 
@@ -43,11 +38,8 @@ constexpr std::string_view kImageLog = "_MultiCamera0.log";
 RigCalibration published_calibration() {
   RigCalibration rig;
   rig.cameras = 2;
-  for (Intrinsics& lens : rig.intrinsics) {
-    lens.width = 1024;
-    lens.height = 768;
-  }
   Intrinsics &left = rig.intrinsics[0], &right = rig.intrinsics[1];
+  left.width = right.width = 1024, left.height = right.height = 768;
   left.fx = 1246.561673900704, left.fy = 1247.092336797580, left.cx = 532.287936343425,
   left.cy = 383.604069688392;
   right.fx = 1244.805048771648, right.fy = 1245.815687282771, right.cx = 506.635543659909,
@@ -61,23 +53,21 @@ RigCalibration published_calibration() {
   return rig;
 }
 
-/// A log names images with or without their directory; all are in one.
-std::string image_name(const std::string& images, std::string_view path) {
-  return images + "/" + std::string(path.substr(path.find_last_of('/') + 1));
-}
-
 StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
                      std::string_view line, const std::string& images) {
-  constexpr std::size_t kFields = 12;
-  std::array<std::string_view, kFields> f;
-  if (split(line, ' ', f) != kFields)
+  std::array<std::string_view, 12> f;
+  if (split(line, ' ', f) != f.size())
     refuse(log, line_number,
            "is not a line `seconds microseconds width height format` for both cameras with two "
            "image names; check that this is the log of the cameras");
-  const auto stamp = parse_stamp(f[0], f[1]);
-  if (!stamp || !parse_stamp(f[5], f[6]))
+  const auto stamp = read_parts(f[0], f[1], kMicroseconds);
+  if (!stamp || !read_parts(f[5], f[6], kMicroseconds))
     refuse(log, line_number, "does not begin with seconds and microseconds below a million");
-  return {*stamp, {image_name(images, f[10]), image_name(images, f[11])}};
+  // A log names images with or without their directory; all are in one.
+  const auto name = [&](std::string_view path) {
+    return images + "/" + std::string(path.substr(path.find_last_of('/') + 1));
+  };
+  return {*stamp, {name(f[10]), name(f[11])}};
 }
 
 // ---- the INS
@@ -148,12 +138,11 @@ struct Moving {
 };
 
 bool parse_line(std::string_view text, Line* line) noexcept {
-  constexpr std::size_t kFields = 12;
-  std::array<std::string_view, kFields> f;
-  if (split(text, ' ', f) != kFields) return false;
-  const auto stamp = parse_stamp(f[0], f[1]);
-  std::array<double, kFields> v{};
-  for (std::size_t i = 2; i < kFields; ++i)
+  std::array<std::string_view, 12> f;
+  if (split(text, ' ', f) != f.size()) return false;
+  const auto stamp = read_parts(f[0], f[1], kMicroseconds);
+  std::array<double, 12> v{};
+  for (std::size_t i = 2; i < f.size(); ++i)
     if (!parse_number(f[i], &v[i])) return false;
   if (!stamp) return false;
   line->stamp = *stamp;

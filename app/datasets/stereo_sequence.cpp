@@ -23,8 +23,6 @@
 namespace vergence::app {
 namespace {
 
-std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
-
 /// Recording of a session as a sequence of images, with the session's initial calibration and its
 /// INS samples.
 StereoSequence open_session(const std::filesystem::path& folder, const SequenceOptions& o) {
@@ -292,11 +290,12 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
       ++(size == requested ? good : bad);
       if (size == requested || !message.empty()) continue;
-      message = (sequence.root / name).string() + ": is " + text(size) +
-                " pixels, but the calibration of this camera (" + sequence.calibration_source +
-                ") is for " + text(requested) +
-                (sequence.side_by_side ? " (twice its width, side by side)" : "") +
-                "; use the calibration that belongs to these images";
+      message = fmt::format(
+          "{}: is {}x{} pixels, but the calibration of this camera ({}) is for {}x{}{}; use the "
+          "calibration that belongs to these images",
+          (sequence.root / name).string(), size.width, size.height, sequence.calibration_source,
+          requested.width, requested.height,
+          sequence.side_by_side ? " (twice its width, side by side)" : "");
     }
   // Single images of another size are skipped as frames.
   if (bad > good) throw InputError(message);

@@ -9,17 +9,6 @@
 namespace vergence::app::detail {
 namespace {
 
-std::uint16_t sample_at(const std::uint8_t* row, int x, bool big_endian) noexcept {
-  const std::uint8_t* at = row + std::size_t{2} * static_cast<std::size_t>(x);
-  return static_cast<std::uint16_t>(at[big_endian ? 0 : 1] << 8U | at[big_endian ? 1 : 0]);
-}
-
-/// `red` and `blue` are the positions of the colours in a pixel of `bytes`.
-void colour_to_grey(const std::uint8_t* row, int width, std::size_t bytes, std::size_t red,
-                    std::size_t blue, std::uint8_t* out) noexcept {
-  for (int x = 0; x < width; ++x, row += bytes) out[x] = luminance(row[red], row[1], row[blue]);
-}
-
 /// Converts one row of a layout that needs no neighbouring rows.
 void row_to_grey(const RosImage& image, const std::uint8_t* in, int deep_bits,
                  std::uint8_t* out) noexcept {
@@ -27,21 +16,25 @@ void row_to_grey(const RosImage& image, const std::uint8_t* in, int deep_bits,
   switch (image.layout) {
     case PixelLayout::grey16:
     case PixelLayout::bayer16:
-      for (int x = 0; x < width; ++x)
-        out[x] = narrowed(sample_at(in, x, image.big_endian), deep_bits);
+      for (int x = 0; x < width; ++x, in += 2)
+        out[x] = narrowed(static_cast<std::uint16_t>(in[image.big_endian ? 0 : 1] << 8U |
+                                                     in[image.big_endian ? 1 : 0]),
+                          deep_bits);
       return;
     case PixelLayout::rgb:
-      return colour_to_grey(in, width, 3, 0, 2, out);
     case PixelLayout::bgr:
-      return colour_to_grey(in, width, 3, 2, 0, out);
     case PixelLayout::rgba:
-      return colour_to_grey(in, width, 4, 0, 2, out);
-    case PixelLayout::bgra:
-      return colour_to_grey(in, width, 4, 2, 0, out);
+    case PixelLayout::bgra: {
+      const bool three = image.layout == PixelLayout::rgb || image.layout == PixelLayout::bgr;
+      const bool red_first = image.layout == PixelLayout::rgb || image.layout == PixelLayout::rgba;
+      for (int x = 0; x < width; ++x, in += three ? 3 : 4)
+        out[x] = luminance(in[red_first ? 0 : 2], in[1], in[red_first ? 2 : 0]);
+      return;
+    }
     case PixelLayout::luma_first:
     case PixelLayout::luma_second:
       in += image.layout == PixelLayout::luma_second ? 1 : 0;
-      for (int x = 0; x < width; ++x) out[x] = in[std::size_t{2} * static_cast<std::size_t>(x)];
+      for (int x = 0; x < width; ++x, in += 2) out[x] = *in;
       return;
     case PixelLayout::grey:
     case PixelLayout::bayer:

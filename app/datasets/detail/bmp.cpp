@@ -14,10 +14,10 @@ constexpr std::size_t kBmpHead = 26;
 constexpr std::size_t kFileHeader = 14, kMinHeader = 40, kWholeHead = kFileHeader + kMinHeader;
 
 std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
-  return b[at] | std::uint32_t{b[at + 1]} << 8U;
+  return whole_at(b, at, 2, std::endian::little);
 }
 std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
-  return u16(b, at) | u16(b, at + 2) << 16U;
+  return whole_at(b, at, 4, std::endian::little);
 }
 
 /// A negative height means that the first row is the top one.
@@ -27,10 +27,6 @@ bool is_plain(ImageBytes b) noexcept {
   constexpr std::uint32_t kBitFields = 3;
   return u32(b, kCompression) == 0 || (u32(b, kCompression) == kBitFields && u16(b, kBits) == 32);
 }
-std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
-  return (std::size_t{width} * bits + 31) / 32 * 4;
-}
-
 /// Grey value of one pixel (blue, green, red).
 std::uint8_t to_grey(const std::uint8_t* bgr) noexcept { return luminance(bgr[2], bgr[1], bgr[0]); }
 
@@ -45,10 +41,6 @@ std::array<std::uint8_t, 256> read_palette(ImageBytes b) noexcept {
               : i < std::min(count, there) ? to_grey(&b[first + 4 * i])
                                            : std::uint8_t{0};
   return grey;
-}
-
-bool is_bmp(ImageBytes bytes) noexcept {
-  return bytes.size() >= 2 && bytes[0] == 'B' && bytes[1] == 'M';
 }
 
 ImageFileStatus bmp_size(ImageBytes b, ImageSize* size) noexcept {
@@ -68,8 +60,7 @@ ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std:
   if (!is_plain(b) || (bits != 8 && bits != 24 && bits != 32)) return ImageFileStatus::undecodable;
   const std::size_t width = static_cast<std::size_t>(size.width),
                     height = static_cast<std::size_t>(size.height);
-  const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), bits),
-                    pixels = u32(b, kPixelsAt);
+  const std::size_t row = (width * bits + 31) / 32 * 4, pixels = u32(b, kPixelsAt);
   if (pixels > b.size() || row * height > b.size() - pixels) return ImageFileStatus::truncated;
   const std::array<std::uint8_t, 256> grey =
       bits == 8 ? read_palette(b) : std::array<std::uint8_t, 256>{};
@@ -83,6 +74,6 @@ ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std:
 
 }  // namespace
 
-const ImageKind kBmp{kBmpHead, is_bmp, bmp_size, decode_bmp};
+const ImageKind kBmp{kBmpHead, {"BM", "BM"}, bmp_size, decode_bmp};
 
 }  // namespace vergence::app::detail

@@ -81,6 +81,11 @@ bool in_name_order(std::string_view a, std::string_view b) noexcept {
   return a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
+bool present(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
 std::vector<std::filesystem::path> entries_in(const std::filesystem::path& folder,
                                               std::error_code* error) {
   std::vector<std::filesystem::path> entries;

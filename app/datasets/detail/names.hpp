@@ -29,6 +29,8 @@ namespace vergence::app::detail {
 /// comes first.
 [[nodiscard]] bool in_name_order(std::string_view a, std::string_view b) noexcept;
 
+/// True if the file or directory exists and can be reached.
+[[nodiscard]] bool present(const std::filesystem::path& path);
 /// Entries of a directory in the order of their names; empty if it cannot be listed, for the reason
 /// in *error.
 [[nodiscard]] std::vector<std::filesystem::path> entries_in(const std::filesystem::path& folder,

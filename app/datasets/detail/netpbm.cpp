@@ -30,6 +30,8 @@ bool is_blank(std::uint8_t c) noexcept { return c == ' ' || (c >= '\t' && c <= '
 ImageFileStatus read_header(ImageBytes bytes, Header* header) noexcept {
   std::array<std::uint32_t, 3> numbers{};
   std::size_t at = 2;
+  if (bytes.size() > at && !is_blank(bytes[at]) && bytes[at] != '#')
+    return ImageFileStatus::not_an_image;
   for (std::uint32_t& number : numbers) {
     while (at < bytes.size() && (is_blank(bytes[at]) || bytes[at] == '#')) {
       if (bytes[at] == '#')
@@ -48,11 +50,6 @@ ImageFileStatus read_header(ImageBytes bytes, Header* header) noexcept {
   header->samples = bytes[1] == '6' ? 3 : 1;
   header->begin = at + 1;
   return accept_size(numbers[0], numbers[1], &header->size);
-}
-
-bool is_netpbm(ImageBytes b) noexcept {
-  return b.size() > 2 && b[0] == 'P' && (b[1] == '5' || b[1] == '6') &&
-         (is_blank(b[2]) || b[2] == '#');
 }
 
 ImageFileStatus netpbm_size(ImageBytes head, ImageSize* size) noexcept {
@@ -89,6 +86,6 @@ ImageFileStatus decode_netpbm(ImageBytes bytes, ImageSize /*size*/, std::uint8_t
 
 }  // namespace
 
-const ImageKind kNetpbm{kNetpbmHead, is_netpbm, netpbm_size, decode_netpbm};
+const ImageKind kNetpbm{kNetpbmHead, {"P5", "P6"}, netpbm_size, decode_netpbm};
 
 }  // namespace vergence::app::detail
