@@ -22,12 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const char* phrase(OfferResult verdict) {
-  constexpr std::array kPhrases{"taken", "target not seen by all cameras", "hold it still",
-                                "already covered"};
-  return kPhrases.at(static_cast<std::size_t>(verdict));
-}
-
 /// A folder that is there and has nothing in it yet.
 void make_empty_folder(const fs::path& folder) {
   std::error_code error;
@@ -87,12 +81,14 @@ class Collection {
                                    seen.corners[0]);
     const OfferResult result = collector_.offer(seen);
     if (result == OfferResult::accepted && request_.keep_views) keep(frame, number);
+    constexpr std::array kPhrases{"taken", "target not seen by all cameras", "hold it still",
+                                  "already covered"};
     const auto needs = collector_.coverage().needs();
     state_.state = "calibrate";
     ++state_.frame;
-    state_.activity =
-        fmt::format("{} views · {}{}", collector_.views().size(), phrase(result),
-                    needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
+    state_.activity = fmt::format(
+        "{} views · {}{}", collector_.views().size(), kPhrases.at(static_cast<std::size_t>(result)),
+        needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
     progress_->update(state_);
   }
 

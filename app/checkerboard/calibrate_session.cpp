@@ -19,14 +19,6 @@
 namespace vergence::app {
 namespace {
 
-const char* how_to_count(BoardKind kind) {
-  constexpr std::array kTexts{"count the points where four squares meet",
-                              "at least four tags of the family 36h11 must be visible",
-                              "count squares of both colours; at least four markers must be "
-                              "visible, and --dictionary must match them"};
-  return kTexts.at(static_cast<std::size_t>(kind));
-}
-
 /// Views whose boards lie differently: by 2 degrees, or 3 % of their distance. One view many times
 /// over says no more than once.
 std::size_t distinct_views(const BoardCalibration& found) {
@@ -65,17 +57,6 @@ std::string undetermined(const BoardCalibration& found) {
   return "";
 }
 
-/// Squares of real boards have between 2 mm and half a metre.
-void remark_square(double square, Progress* progress) {
-  // Limits in m.
-  constexpr double kSmallest = 0.002, kLargest = 0.5;
-  if (square < kSmallest || square > kLargest)
-    progress->print(
-        fmt::format("vergence: --square is {:g} m, unusually {}; check that it is in metres, "
-                    "because the baseline scales with it",
-                    square, square < kSmallest ? "small" : "large"));
-}
-
 /// With k3 where that explains the corners better: every camera's k3 is far from 0, and the
 /// residuals shrink.
 BoardCalibration calibrate_with_k3(const std::vector<BoardView>& views,
@@ -107,7 +88,12 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const std::vector
                               Progress* progress) {
   BoardCalibrationOptions options = request.calibration;
   options.sizes = sizes;
-  remark_square(options.board.square, progress);
+  // Squares of real boards have between 2 mm and half a metre.
+  if (const double square = options.board.square; square < 0.002 || square > 0.5)
+    progress->print(
+        fmt::format("vergence: --square is {:g} m, unusually {}; check that it is in metres, "
+                    "because the baseline scales with it",
+                    square, square < 0.002 ? "small" : "large"));
   const BoardCalibration found =
       calibrate_with_k3(views, options, calibrate_boards(views, options), progress);
   const std::string why = found.error.empty() ? undetermined(found) : found.error;
@@ -159,11 +145,17 @@ ExitCode calibrate_images(const CalibrateRequest& request,
       });
   progress.finish();
   for (const std::string& message : remarks) progress.print("vergence: " + message);
+  // By kind of board.
+  constexpr std::array kHowToCount{"count the points where four squares meet",
+                                   "at least four tags of the family 36h11 must be visible",
+                                   "count squares of both colours; at least four markers must be "
+                                   "visible, and --dictionary must match them"};
   // One message per view would hide the message that helps.
   if (images.views.empty())
     throw InputError(fmt::format(
         "no view shows the target with {}{}; {} ({})", request.calibration.board.describe(),
-        patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.calibration.board.kind),
+        patterns.size() > 1 ? " in two cameras" : "",
+        kHowToCount.at(static_cast<std::size_t>(request.calibration.board.kind)),
         images.remarks.empty() ? "there are no images" : images.remarks.front()));
   for (const std::string& message : images.remarks) progress.print("vergence: " + message);
   return conclude_calibration(request, images.sizes, {}, images.views, &progress);

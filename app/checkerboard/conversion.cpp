@@ -114,23 +114,14 @@ WrittenFiles format_calibration_as(CalibrationFormat format, const std::string& 
   const std::string first = out.substr(0, comma), second = two ? out.substr(comma + 1) : "";
   if (two && (format == CalibrationFormat::vergence || format == CalibrationFormat::kalibr))
     throw InputError(fmt::format("{}: {} is one file; name one file", out, describe(format)));
-  switch (format) {
-    case CalibrationFormat::vergence:
-      return {{out, format_calibration(calibration)}};
-    case CalibrationFormat::kalibr:
-      return {{out, format_kalibr(calibration, remarks)}};
-    case CalibrationFormat::opencv:
-      break;
-    case CalibrationFormat::ros: {
-      const auto [left, right] = format_ros(calibration, remarks);
-      if (two) return {{first, left}, {second, right}};
-      return {{fs::path(out) / "left.yaml", left}, {fs::path(out) / "right.yaml", right}};
-    }
-  }
-  const std::string head = "%YAML:1.0\n---\n";
-  const auto [lenses, place] = format_opencv(calibration, remarks);
-  if (two) return {{first, head + lenses}, {second, head + place}};
-  return {{out, head + lenses + place}};
+  if (format == CalibrationFormat::vergence) return {{out, format_calibration(calibration)}};
+  if (format == CalibrationFormat::kalibr) return {{out, format_kalibr(calibration, remarks)}};
+  const bool ros = format == CalibrationFormat::ros;
+  auto [one, other] = ros ? format_ros(calibration, remarks) : format_opencv(calibration, remarks);
+  const std::string head = ros ? "" : "%YAML:1.0\n---\n";
+  if (two) return {{first, head + one}, {second, head + other}};
+  if (ros) return {{fs::path(out) / "left.yaml", one}, {fs::path(out) / "right.yaml", other}};
+  return {{out, head + one + other}};
 }
 
 Remarks convert_calibration(const ConversionRequest& request) {

@@ -100,14 +100,8 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
 
 void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
                  const CalibrationUse& use, CalibrationFile* calibration) {
-  std::vector<std::string> known{"name",
-                                 "serial",
-                                 "size",
-                                 "model",
-                                 "intrinsics",
-                                 "distortion",
-                                 "intrinsics_sigma",
-                                 "distortion_sigma"};
+  std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion"};
+  known.insert(known.end(), {"intrinsics_sigma", "distortion_sigma"});
   if (k > 0)
     known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_total", "covariance_total"});
   // Other programs write the inverse, for which the nearest key would be suggested.

@@ -119,16 +119,14 @@ std::string line_of(const std::string& text, int number) {
 std::string explain(const YAML::Exception& error, const std::string& text) {
   using Explanation = std::pair<std::string_view, std::string_view>;
   constexpr std::string_view kIndentation =
-      "the indentation does not match the lines above; indent the keys of a group, and the items "
-      "of a list, by the same number of spaces";
+      "lines are indented differently; indent the keys of a group, and the items of a list, "
+      "equally";
   constexpr std::string_view kOpen =
-      "a `{` or `[` is not closed, or a comma is missing; close it, and separate its items by "
-      "commas";
+      "a `{` or `[` is not closed, or a comma between two items is missing";
   constexpr std::array kExplanations{
-      Explanation{
-          "illegal map value",
-          "a second `key: value` on one line, or a line that is indented too far; write one key "
-          "per line, indented as its neighbours are, and put a text with a colon in quotes"},
+      Explanation{"illegal map value",
+                  "two `key: value` on one line, or a line that is indented too far; write one key "
+                  "per line, and put a text with a colon in quotes"},
       Explanation{"end of map not found", kIndentation},
       Explanation{"end of sequence not found", kIndentation},
       Explanation{"illegal block entry", kIndentation},
@@ -136,10 +134,8 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
       Explanation{"end of sequence flow not found", kOpen},
       Explanation{"illegal flow end", "a `}` or `]` that nothing opens; remove it"},
       Explanation{"the referenced anchor is not defined",
-                  "a value that begins with `*` is a reference; put the value in quotes"},
-      Explanation{"unknown token",
-                  "a value begins with a character that YAML reserves, such as @ or %; put the "
-                  "value in quotes"}};
+                  "put a value that begins with `*` in quotes"},
+      Explanation{"unknown token", "put a value that begins with @, % or ` in quotes"}};
   if (!error.mark.is_null()) {
     const std::string line = line_of(text, error.mark.line);
     if (line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos)
