@@ -1,7 +1,5 @@
 #include "app/checkerboard/board_calibration.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numeric>
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "app/datasets/text_file.hpp"

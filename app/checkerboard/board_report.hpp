@@ -1,10 +1,7 @@
 #pragma once
-#include <optional>
-#include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "app/checkerboard/board_calibration.hpp"
 #include "app/checkerboard/coverage.hpp"
 #include "app/config/calibration_file.hpp"
 

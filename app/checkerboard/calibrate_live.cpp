@@ -1,19 +1,13 @@
 
-#include <array>
 #include <chrono>
-#include <thread>
-
-#include <fmt/format.h>
 
 #include "app/checkerboard/board_detector.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
 #include "app/checkerboard/coverage.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/capture_result.hpp"
-#include "app/devices/drive_devices.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/nearest.hpp"
-#include "app/runtime/signals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/clock.hpp"
 

@@ -1,7 +1,6 @@
 #include "app/checkerboard/calibrate_session.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -12,7 +11,6 @@
 #include "app/checkerboard/board_images.hpp"
 #include "app/checkerboard/board_report.hpp"
 #include "app/config/calibration_checks.hpp"
-#include "app/config/calibration_file.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <vector>
 
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>

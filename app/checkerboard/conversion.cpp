@@ -1,11 +1,7 @@
 #include "app/checkerboard/conversion.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
-#include <span>
-#include <string_view>
-#include <utility>
 
 #include <fmt/format.h>
 

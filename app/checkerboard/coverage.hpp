@@ -1,12 +1,6 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "app/checkerboard/board_calibration.hpp"
-#include "app/datasets/image_file.hpp"
 
 namespace vergence::app {
 

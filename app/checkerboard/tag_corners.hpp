@@ -1,5 +1,4 @@
 #pragma once
-#include <vector>
 
 #include <opencv2/core.hpp>
 

@@ -2,14 +2,9 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <span>
-#include <vector>
-
-#include <fmt/format.h>
 
 #include "app/runtime/nearest.hpp"
 #include "core/math/linear_solve.hpp"

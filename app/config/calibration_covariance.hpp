@@ -1,9 +1,6 @@
 #pragma once
-#include <optional>
-#include <string>
 
 #include "app/config/calibration_file.hpp"
-#include "app/config/yaml_file.hpp"
 
 /// Group `covariance` of calibration.yaml: the joint covariance of a rig's parameters. `parameters`
 /// names the rows by camera and parameter (`right.rx`, `left.k1`), `upper` has the upper triangle

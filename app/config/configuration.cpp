@@ -2,14 +2,11 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <charconv>
 #include <map>
 #include <set>
 #include <sstream>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "app/config/schema.hpp"
 #include "app/config/yaml_file.hpp"

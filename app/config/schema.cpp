@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <sstream>
 #include <type_traits>
 #include <utility>

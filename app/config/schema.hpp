@@ -1,9 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <functional>
-#include <string>
 #include <variant>
-#include <vector>
 
 #include "app/config/configuration.hpp"
 

@@ -1,6 +1,5 @@
 #include "app/config/yaml_file.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
@@ -11,7 +10,6 @@
 #include <sstream>
 #include <system_error>
 
-#include <fmt/format.h>
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 

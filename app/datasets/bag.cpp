@@ -1,10 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
-#include <span>
-
-#include <fmt/format.h>
 
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"

@@ -1,12 +1,9 @@
 #include "app/datasets/foreign_calibration.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <sstream>
 #include <tuple>
-
-#include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
 #include "app/datasets/foreign_settings.hpp"

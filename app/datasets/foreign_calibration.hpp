@@ -1,8 +1,4 @@
 #pragma once
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"

@@ -5,10 +5,6 @@
 #include <cstdlib>
 #include <map>
 #include <sstream>
-#include <string_view>
-
-#include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include "app/datasets/text_file.hpp"
 

@@ -5,9 +5,6 @@
 #include <algorithm>
 #include <cassert>
 #include <chrono>
-#include <optional>
-
-#include <fmt/format.h>
 
 #include "app/datasets/text_file.hpp"
 #include "core/types/bayer.hpp"

@@ -1,16 +1,8 @@
 #pragma once
-#include <array>
-#include <atomic>
-#include <cstddef>
-#include <cstdint>
-#include <thread>
-#include <vector>
 
-#include "app/datasets/image_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/background_thread.hpp"
 #include "core/memory/frame_pool.hpp"
-#include "core/memory/ring.hpp"
 #include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {

@@ -1,16 +1,9 @@
-#include <algorithm>
-#include <array>
-#include <map>
-#include <optional>
 
-#include <fmt/format.h>
 
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/foreign_calibration.hpp"
-#include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/times_file.hpp"
 

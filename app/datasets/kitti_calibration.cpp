@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <map>
-#include <string>
-#include <string_view>
 
-#include <fmt/format.h>
-
+#include "app/config/calibration_checks.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"

@@ -1,18 +1,11 @@
-#include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <ranges>
-
-#include <fmt/format.h>
 
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/kitti_calibration.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/times_file.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 

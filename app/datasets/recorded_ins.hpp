@@ -1,13 +1,7 @@
 #pragma once
-#include <array>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/math/se3.hpp"
-#include "core/types/ins_sample.hpp"
 #include "drivers/ins.hpp"
 
 /// INS data recorded with a sequence, in a common form for all data sets; a replay compares its

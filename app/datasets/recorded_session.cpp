@@ -1,11 +1,7 @@
 #include "app/datasets/recorded_session.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <map>
-#include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/ros_messages.hpp"

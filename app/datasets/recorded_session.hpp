@@ -1,10 +1,4 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <vector>
 
 #include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/recorded_ins.hpp"

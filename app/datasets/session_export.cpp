@@ -1,11 +1,8 @@
 #include "app/datasets/session_export.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/image_writer.hpp"
 #include "app/datasets/reference_track.hpp"

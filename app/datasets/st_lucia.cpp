@@ -1,10 +1,6 @@
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"

@@ -1,19 +1,13 @@
 #include "app/datasets/stereo_sequence.hpp"
 
-#include <algorithm>
 #include <new>
-#include <optional>
 #include <system_error>
-#include <vector>
-
-#include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"

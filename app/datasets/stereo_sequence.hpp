@@ -1,17 +1,9 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
-#include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
 /// Recorded stereo sequences as lists of image files with stamps, read by a replay regardless of

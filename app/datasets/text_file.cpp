@@ -11,8 +11,6 @@
 #include <limits>
 #include <system_error>
 
-#include <fmt/format.h>
-
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

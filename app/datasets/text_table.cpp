@@ -1,10 +1,7 @@
 #include "app/datasets/text_table.hpp"
 
-#include <algorithm>
-
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/image_file.hpp"
-#include "app/datasets/text_file.hpp"
 #include "app/datasets/times_file.hpp"
 
 namespace vergence::app {

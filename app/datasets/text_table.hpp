@@ -1,7 +1,4 @@
 #pragma once
-#include <cstddef>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/datasets/text_file.hpp"

@@ -1,13 +1,8 @@
 #include "app/datasets/times_file.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <ctime>
 #include <ranges>
-#include <vector>
 
-#include "app/datasets/text_file.hpp"
 #include "app/datasets/text_table.hpp"
 #include "core/math/robust.hpp"
 

@@ -1,16 +1,10 @@
 #include "app/datasets/trajectory_files.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <numeric>
 #include <system_error>
 
-#include <fmt/format.h>
-
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
-#include "app/datasets/text_file.hpp"
 #include "app/datasets/text_table.hpp"
 #include "core/math/robust.hpp"
 

@@ -1,8 +1,5 @@
 #include "app/report/analysis.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>

@@ -4,10 +4,8 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstddef>
 #include <map>
 #include <optional>
-#include <span>
 
 #include <fmt/format.h>
 

@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <string_view>
-#include <vector>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>

@@ -1,9 +1,6 @@
 #pragma once
-#include <string>
 
-#include "app/report/analysis.hpp"
 #include "app/report/assessment.hpp"
-#include "app/report/session.hpp"
 
 namespace vergence::app::report {
 

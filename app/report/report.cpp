@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "app/report/analysis.hpp"
 #include "app/report/page.hpp"
-#include "app/report/session.hpp"
 #include "app/runtime/durable_file.hpp"
 
 namespace vergence::app {

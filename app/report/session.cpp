@@ -1,14 +1,10 @@
 #include "app/report/session.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fstream>
-#include <span>
 #include <type_traits>
-#include <utility>
 
-#include <fmt/format.h>
 #include <Eigen/Geometry>
 
 #include "app/datasets/text_file.hpp"

@@ -1,11 +1,8 @@
 #pragma once
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>

@@ -1,8 +1,6 @@
 #include "app/simulation/experiment.hpp"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <fstream>
 #include <iostream>
 

@@ -1,6 +1,5 @@
 #include "app/datasets/detail/bag_images.hpp"
 
-#include <algorithm>
 #include <charconv>
 
 #include "app/datasets/detail/image_kinds.hpp"

@@ -1,10 +1,6 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <memory>
 #include <mutex>
-#include <string>
-#include <vector>
 
 #include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/image_file.hpp"

@@ -1,12 +1,7 @@
 #include "app/datasets/detail/bag_index.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cstdlib>
-#include <span>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/detail/image_kinds.hpp"
 #include "app/datasets/detail/names.hpp"

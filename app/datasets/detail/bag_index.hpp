@@ -1,13 +1,8 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <string>
-#include <vector>
 
-#include "app/datasets/detail/bag_scan.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 
 /// Content of a ROS recording by topic.

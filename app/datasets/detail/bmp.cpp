@@ -1,8 +1,5 @@
 #include "app/datasets/detail/image_kinds.hpp"
 
-#include <algorithm>
-#include <array>
-
 namespace vergence::app::detail {
 namespace {
 

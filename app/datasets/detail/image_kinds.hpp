@@ -2,10 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <string_view>
 
 #include "app/datasets/image_file.hpp"
 

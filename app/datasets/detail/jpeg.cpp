@@ -1,7 +1,5 @@
 #include "app/datasets/detail/image_kinds.hpp"
 
-#include <algorithm>
-#include <array>
 #include <csetjmp>
 #include <cstdio>
 

@@ -1,7 +1,6 @@
 #include "app/datasets/detail/pairing.hpp"
 #include "core/math/robust.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>

@@ -1,10 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <map>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "app/datasets/detail/bag_scan.hpp"
 

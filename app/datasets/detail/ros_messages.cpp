@@ -1,9 +1,6 @@
 #include "app/datasets/detail/ros_messages.hpp"
 
-#include <array>
 #include <cmath>
-#include <string_view>
-#include <vector>
 
 #include "app/datasets/detail/image_kinds.hpp"
 #include "app/datasets/detail/names.hpp"

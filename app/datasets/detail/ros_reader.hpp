@@ -1,11 +1,8 @@
 #pragma once
 #include <array>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <cstring>
 #include <span>
-#include <string>
 #include <type_traits>
 
 #include "app/datasets/detail/bag_scan.hpp"

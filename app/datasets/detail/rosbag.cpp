@@ -1,8 +1,5 @@
-#include "app/datasets/detail/bag_scan.hpp"
 
 #include <algorithm>
-#include <array>
-#include <string_view>
 
 #include "app/datasets/detail/record_scanner.hpp"
 #include "app/datasets/detail/ros_reader.hpp"

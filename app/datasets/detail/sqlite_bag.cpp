@@ -3,10 +3,7 @@
 #include <sqlite3.h>
 
 #include <map>
-#include <string>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/text_file.hpp"
 

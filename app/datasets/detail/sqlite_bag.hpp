@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
-#include <optional>
 
 #include "app/datasets/detail/bag_scan.hpp"
 
