@@ -3,7 +3,8 @@
 #include <ctime>
 #include <ranges>
 
-#include "app/datasets/text_table.hpp"
+#include "app/datasets/image_file.hpp"
+#include "app/datasets/text_file.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::app {

@@ -5,7 +5,7 @@
 
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
-#include "app/datasets/text_table.hpp"
+#include "app/datasets/text_file.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::app {

@@ -6,7 +6,6 @@
 #include "app/datasets/detail/image_kinds.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/detail/sqlite_bag.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/text_file.hpp"
 #include "core/math/robust.hpp"
@@ -207,10 +206,9 @@ class Indexer {
 std::vector<BagFile> open_bag_files(BagFormat format, const fs::path& path) {
   std::vector<BagFile> files;
   for (const fs::path& file : list_files(format, path))
-    files.push_back({file.filename().string(),
-                     format == BagFormat::sqlite
-                         ? std::unique_ptr<const ByteSource>(std::make_unique<SqliteBag>(file))
-                         : std::make_unique<FileBytes>(file)});
+    files.push_back({file.filename().string(), format == BagFormat::sqlite
+                                                   ? open_sqlite_bag(file)
+                                                   : std::make_unique<FileBytes>(file)});
   return files;
 }
 

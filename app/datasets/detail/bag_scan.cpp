@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/detail/sqlite_bag.hpp"
-
 namespace vergence::app::detail {
 
 std::string plain_type(std::string_view type) {
@@ -44,7 +42,7 @@ void BagScan::remark(const std::string& name, std::vector<std::string>* remarks)
 }
 
 std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file, const BagVisitor& each) {
-  if (format == BagFormat::sqlite) return dynamic_cast<const SqliteBag&>(file).scan(each);
+  if (format == BagFormat::sqlite) return scan_sqlite(file, each);
   return format == BagFormat::mcap ? scan_mcap(file, each) : scan_rosbag(file, each);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -87,8 +88,8 @@ struct BagScan {
 
 /// Passes every message to `each`, in the file's order (sqlite: by log time), except incomplete
 /// ones. Of uncompressed chunks only message headers are read. Returns nothing if the file does not
-/// begin as the format requires. Precondition: of sqlite a SqliteBag. Uses at most two times
-/// kMaxChunk, and kMaxChannels names.
+/// begin as the format requires. Precondition: of sqlite one of open_sqlite_bag(). Uses at most two
+/// times kMaxChunk, and kMaxChannels names.
 [[nodiscard]] std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file,
                                               const BagVisitor& each);
 
@@ -111,5 +112,11 @@ struct BagScan {
 [[nodiscard]] std::optional<BagScan> scan_rosbag(const ByteSource& file, const BagVisitor& each);
 [[nodiscard]] bool unpack_rosbag_chunk(const ByteSource& file, std::uint64_t offset,
                                        std::vector<std::uint8_t>* records);
+
+// ROS 2 bags in an SQLite file (.db3), opened read-only, with a write-ahead log (-wal) next to it.
+// A message's bytes have the offset row number · 2^32, so that code which reads files by offset can
+// read them. Opening throws InputError if the file is missing or SQLite cannot open it.
+[[nodiscard]] std::unique_ptr<const ByteSource> open_sqlite_bag(const std::filesystem::path& file);
+[[nodiscard]] std::optional<BagScan> scan_sqlite(const ByteSource& file, const BagVisitor& each);
 
 }  // namespace vergence::app::detail

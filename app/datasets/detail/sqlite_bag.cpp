@@ -1,14 +1,48 @@
-#include "app/datasets/detail/sqlite_bag.hpp"
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <sqlite3.h>
 
+#include <filesystem>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <system_error>
 
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
 namespace {
+
+/// ROS 2 bag in an SQLite file (.db3), opened read-only. A message's bytes have the offset row
+/// number · 2^32, so that code which reads files by offset can read it.
+class SqliteBag final : public ByteSource {
+ public:
+  /// Throws InputError if the file is missing or SQLite cannot open it. Also reads a write-ahead
+  /// log (-wal) next to it.
+  explicit SqliteBag(const std::filesystem::path& file);
+  ~SqliteBag() override;
+  SqliteBag(const SqliteBag&) = delete;
+  SqliteBag& operator=(const SqliteBag&) = delete;
+
+  [[nodiscard]] std::uint64_t size() const noexcept override;
+  [[nodiscard]] bool read(std::uint64_t offset,
+                          std::span<std::uint8_t> out) const noexcept override;
+  /// Same as scan_bag(). Empty if it is no SQLite file, or has no tables of a bag.
+  [[nodiscard]] std::optional<BagScan> scan(const BagVisitor& each) const;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const noexcept;
+    void operator()(sqlite3_blob* blob) const noexcept;
+  };
+
+  std::unique_ptr<sqlite3, Close> database_;
+  // Guards the members below and all accesses to the database.
+  mutable std::mutex mutex_;
+  mutable std::unique_ptr<sqlite3_blob, Close> blob_;
+  // Row of the blob.
+  mutable std::uint64_t row_ = 0;
+};
 
 // The lower bits are the offset in a row's bytes, the upper ones the row.
 constexpr unsigned kRowBits = 32;
@@ -43,8 +77,6 @@ std::string text(const Statement& row, int column) {
              : std::string(reinterpret_cast<const char*>(bytes),
                            static_cast<std::size_t>(sqlite3_column_bytes(row.get(), column)));
 }
-
-}  // namespace
 
 void SqliteBag::Close::operator()(sqlite3* database) const noexcept { sqlite3_close(database); }
 void SqliteBag::Close::operator()(sqlite3_blob* blob) const noexcept { sqlite3_blob_close(blob); }
@@ -133,6 +165,16 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
   if (status != SQLITE_DONE)
     scan.skip(0, std::string("where SQLite reports: ") + sqlite3_errstr(status));
   return scan;
+}
+
+}  // namespace
+
+std::unique_ptr<const ByteSource> open_sqlite_bag(const std::filesystem::path& file) {
+  return std::make_unique<SqliteBag>(file);
+}
+
+std::optional<BagScan> scan_sqlite(const ByteSource& file, const BagVisitor& each) {
+  return dynamic_cast<const SqliteBag&>(file).scan(each);
 }
 
 }  // namespace vergence::app::detail
