@@ -9,8 +9,6 @@
 #include <apriltag/tag36h11.h>
 #include <opencv2/imgproc.hpp>
 
-#include "app/checkerboard/tag_corners.hpp"
-
 namespace vergence::app {
 namespace {
 
@@ -120,18 +118,6 @@ struct Layout {
   }
 };
 
-/// Residual of corners numbered like this.
-double misfit(const std::vector<Tag>& tags, const BoardPattern& board, const Layout& layout) {
-  std::vector<cv::Point2d> on_board, in_image;
-  for (const Tag& tag : tags)
-    for (std::size_t k = 0; k < 4; ++k) {
-      const Vec3 X = board.corner(layout.index(board, tag.id, k));
-      on_board.emplace_back(X.x(), X.y());
-      in_image.emplace_back(tag.corners[k]);
-    }
-  return homography_misfit(on_board, in_image);
-}
-
 double mean_side(const std::vector<Tag>& tags) {
   double sum = 0;
   for (const Tag& tag : tags)
@@ -156,11 +142,19 @@ BoardCorners find_aprilgrid(const ImageView& image, const BoardPattern& board, B
   Layout best;
   double least = std::numeric_limits<double>::infinity();
   for (const bool from_below : {true, false})
-    for (std::size_t turn = 0; turn < 4; ++turn)
-      if (const double m = misfit(tags, board, {from_below, turn}); m < least) {
-        least = m;
-        best = {from_below, turn};
-      }
+    for (std::size_t turn = 0; turn < 4; ++turn) {
+      // Residual of corners numbered like this.
+      const Layout layout{from_below, turn};
+      std::vector<cv::Point2d> on_board, in_image;
+      for (const Tag& tag : tags)
+        for (std::size_t k = 0; k < 4; ++k) {
+          const Vec3 X = board.corner(layout.index(board, tag.id, k));
+          on_board.emplace_back(X.x(), X.y());
+          in_image.emplace_back(tag.corners[k]);
+        }
+      if (const double m = homography_misfit(on_board, in_image); m < least)
+        least = m, best = layout;
+    }
   if (!(least < kFlatToSide * mean_side(tags))) return {};
   // To the saddle between tag and square.
   const int window = std::clamp(static_cast<int>(kWindowOfGap * board.spacing * mean_side(tags)),

@@ -32,9 +32,7 @@ using Points2 = std::vector<std::vector<cv::Point2f>>;
 using LensNumbers = Eigen::Matrix<double, 9, 1>;
 
 /// When OpenCV's solvers stop.
-cv::TermCriteria criteria() {
-  return {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-10};
-}
+const cv::TermCriteria kStop{cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-10};
 
 struct Lens {
   cv::Mat K, D;
@@ -195,7 +193,7 @@ class BoardCalibrator {
       if (start != nullptr) lens = start->lenses[camera].clone();
       s->alone_rms[camera] = cv::calibrateCamera(
           object, image, size(camera), lens.K, lens.D, rvecs, tvecs, sigmas, cv::noArray(), by_view,
-          k3_flag() | (start != nullptr ? cv::CALIB_USE_INTRINSIC_GUESS : 0), criteria());
+          k3_flag() | (start != nullptr ? cv::CALIB_USE_INTRINSIC_GUESS : 0), kStop);
       for (int i = 0; i < 9; ++i) s->lens_sigmas[camera](i) = sigmas.at<double>(i);
       for (std::size_t i = 0; i < at.size(); ++i)
         errors[i] = by_view.at<double>(static_cast<int>(i));
@@ -236,7 +234,7 @@ class BoardCalibrator {
       std::vector<cv::Mat> turns, places;
       try {
         const double rms = cv::fisheye::calibrate(object, image, size, next.K, next.D, turns,
-                                                  places, kFlags, criteria());
+                                                  places, kFlags, kStop);
         if (!(rms < best)) continue;
         best = rms;
         *lens = next;
@@ -290,7 +288,7 @@ class BoardCalibrator {
     const double rms = cv::stereoCalibrate(
         object, image[0], image[1], first.K, radtan() ? first.D : none[0], second.K,
         radtan() ? second.D : none[1], size(0), R, T, E, F, by_view,
-        refine ? cv::CALIB_USE_INTRINSIC_GUESS | k3_flag() : cv::CALIB_FIX_INTRINSIC, criteria());
+        refine ? cv::CALIB_USE_INTRINSIC_GUESS | k3_flag() : cv::CALIB_FIX_INTRINSIC, kStop);
     if (!std::isfinite(rms) || !cv::checkRange(R) || !cv::checkRange(T))
       refuse("the extrinsics are not finite; add views that both cameras see");
     if (camera == 1) s->rms = rms;

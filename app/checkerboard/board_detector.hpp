@@ -1,4 +1,6 @@
 #pragma once
+#include <opencv2/core.hpp>
+
 #include "app/checkerboard/board_pattern.hpp"
 #include "core/types/image.hpp"
 
@@ -51,5 +53,24 @@ enum class BoardSearch : std::uint8_t {
 /// squares. The upper left square may be black (as printed since OpenCV 4.7) or, with an even
 /// number of rows, white (before); the image determines which.
 [[nodiscard]] BoardCorners find_charuco(const ImageView& image, const BoardPattern& board);
+
+// ---- shared by the detectors
+
+/// Mean distance in px between points in an image and those of a flat target; infinite without a
+/// homography.
+[[nodiscard]] double homography_misfit(const std::vector<cv::Point2d>& on_board,
+                                       const std::vector<cv::Point2d>& in_image);
+
+/// Moves corners to the saddles of the image within the window.
+void to_saddles(const cv::Mat& image, int half_window, std::vector<cv::Point2f>* corners);
+
+/// Refines `rough` corners (pixel centres at integers) to saddle points by OpenCV's cornerSubPix in
+/// windows of 2 `half_window` + 1 px. Drops corners near the image's edge or moved by more than
+/// `max_moved` px. Ordered by index.
+[[nodiscard]] BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough,
+                                          int half_window, double max_moved);
+
+/// Wraps the pixels without copying; they must not be written.
+[[nodiscard]] cv::Mat to_mat(const ImageView& image);
 
 }  // namespace vergence::app

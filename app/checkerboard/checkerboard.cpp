@@ -6,8 +6,6 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "app/checkerboard/tag_corners.hpp"
-
 namespace vergence::app {
 namespace {
 

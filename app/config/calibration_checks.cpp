@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include <fmt/format.h>
 
-#include "app/config/calibration_covariance.hpp"
 #include "core/math/linear_solve.hpp"
 
 namespace vergence::app {
-
 namespace {
 
 // Limits of an image side in px.
@@ -30,6 +29,10 @@ constexpr double kNearRotation = 1e-3;
 constexpr double kShortestBaseline = 0.005, kLongestBaseline = 20;
 // Relative tolerance, in addition to four sigmas of the measured length.
 constexpr double kBaselineTolerance = 0.02;
+
+// Tolerance for a correlation and for the smallest eigenvalue of the correlation matrix: the
+// rounding error of numbers with nine digits.
+constexpr double kRounding = 1e-6;
 
 using Finding = std::optional<ValidationError>;
 
@@ -153,15 +156,6 @@ Finding check_baseline(const RigCalibration& rig) {
   return std::nullopt;
 }
 
-Finding check_found(const RigCalibration& rig) {
-  if (rig.frames < 0) return finding("found.frames", "is negative");
-  if (auto bad = check_sigmas(std::array{rig.reprojection_px}, "found.reprojection_px")) return bad;
-  if (auto bad = check_sigmas(std::array{rig.scale_sigma}, "found.scale_sigma")) return bad;
-  if (!std::isfinite(rig.inflation) || rig.inflation < 0)
-    return finding("found.inflation", "must be a number from 0 on");
-  return std::nullopt;
-}
-
 }  // namespace
 
 std::string baseline_message(const RigCalibration& rig) {
@@ -199,7 +193,41 @@ std::optional<ValidationError> find_implausible(RigCalibration* rig) {
   }
   if (const auto flaw = find_flaw(rig->covariance)) return finding("covariance", "{}", *flaw);
   if (auto bad = check_baseline(*rig)) return bad;
-  return check_found(*rig);
+  if (rig->frames < 0) return finding("found.frames", "is negative");
+  if (auto bad = check_sigmas(std::array{rig->reprojection_px}, "found.reprojection_px"))
+    return bad;
+  if (auto bad = check_sigmas(std::array{rig->scale_sigma}, "found.scale_sigma")) return bad;
+  if (!std::isfinite(rig->inflation) || rig->inflation < 0)
+    return finding("found.inflation", "must be a number from 0 on");
+  return std::nullopt;
+}
+
+std::optional<std::string> find_flaw(const RigCovariance& covariance) {
+  for (int i = 0; i < kRigSize; ++i)
+    for (int j = 0; j <= i; ++j) {
+      const double value = covariance(i, j);
+      if (!std::isfinite(value)) return "holds a number that is not finite";
+      if (i == j && value < 0) return "has a negative variance";
+      if (value != 0 && !(covariance.known(i) && covariance.known(j)))
+        return "correlates a parameter with one that has no variance";
+    }
+  std::vector<int> rows(kRigSize);
+  std::iota(rows.begin(), rows.end(), 0);
+  std::erase_if(rows, [&](int row) { return !covariance.known(row); });
+  const auto n = std::ssize(rows);
+  if (n == 0) return std::nullopt;
+  // Correlations: rad, m and px in one matrix would hide what the small ones do.
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::NullaryExpr(n, n, [&](auto i, auto j) {
+    const int a = rows[static_cast<std::size_t>(i)], b = rows[static_cast<std::size_t>(j)];
+    return covariance(a, b) / std::sqrt(covariance(a, a)) / std::sqrt(covariance(b, b));
+  });
+  if (!(correlation.cwiseAbs().maxCoeff() <= 1 + kRounding)) return "has a correlation beyond 1";
+  // No eigenvalue is below −kRounding.
+  correlation.diagonal().array() += kRounding;
+  if (!positive_definite(correlation))
+    return "is not positive semidefinite: some combination of its parameters has a negative "
+           "variance";
+  return std::nullopt;
 }
 
 }  // namespace vergence::app

@@ -1,21 +1,135 @@
 #include "app/config/calibration_file.hpp"
 
+#include <array>
+#include <limits>
+
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
-#include <limits>
-#include <span>
-
-#include <fmt/format.h>
-
 #include "app/config/calibration_checks.hpp"
-#include "app/config/calibration_covariance.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
-
 namespace {
+
+// ---- group `covariance`: the joint covariance of a rig's parameters. `parameters` names the rows
+// by camera and parameter (`right.rx`, `left.k1`), `upper` has the upper triangle row by row. Names
+// that two cameras share are numbered. Rotations in rad and translations in m are left
+// perturbations; intrinsics are in px or without unit.
+
+constexpr std::array kPlaceNames{"rx", "ry", "rz", "tx", "ty", "tz"};
+constexpr std::array kRadtanNames{"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
+constexpr std::array kEquidistantNames{"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
+
+struct NamedRow {
+  std::string name;
+  int row = 0;
+};
+
+/// Every parameter of the rig, in the order of the rows.
+std::vector<NamedRow> make_rows(const CalibrationFile& c) {
+  const std::vector<std::string> cameras =
+      distinct_names({c.names.begin(), c.names.begin() + c.rig.cameras});
+  std::vector<NamedRow> rows;
+  const auto append = [&](std::size_t k, std::span<const char* const> names, int row) {
+    for (const char* name : names) rows.push_back({cameras[k] + "." + name, row++});
+  };
+  for (std::size_t k = 1; k < cameras.size(); ++k)
+    append(k, kPlaceNames, extrinsic_row(static_cast<int>(k)));
+  for (std::size_t k = 0; k < cameras.size(); ++k)
+    if (c.rig.intrinsics[k].kind == CameraModelKind::pinhole_radtan)
+      append(k, kRadtanNames, intrinsic_row(static_cast<int>(k)));
+    else
+      append(k, kEquidistantNames, intrinsic_row(static_cast<int>(k)));
+  return rows;
+}
+
+/// The rows that a list of names stands for.
+std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
+                                const CalibrationFile& calibration) {
+  const std::string field = "covariance.parameters";
+  const std::vector<NamedRow> known = make_rows(calibration);
+  if (!list.IsSequence() || list.size() == 0)
+    file.fail(list, field + " is not a list of parameters, like right.rx or left.k1");
+  std::vector<NamedRow> rows;
+  for (const auto& item : list) {
+    const std::string name = file.text(item, field);
+    const auto found = std::ranges::find(known, name, &NamedRow::name);
+    if (found == known.end()) {
+      std::vector<std::string> names;
+      for (const NamedRow& row : known) names.push_back(row.name);
+      file.fail(item, "{} has \"{}\", which is not a parameter of this rig{}", field,
+                name.substr(0, 60), did_you_mean(name, names));
+    }
+    if (std::ranges::find(rows, found->row, &NamedRow::row) != rows.end())
+      file.fail(item, "{} has {} twice; remove one", field, name);
+    rows.push_back(*found);
+  }
+  return rows;
+}
+
+/// Empty if no covariance is known.
+std::string format_covariance(const CalibrationFile& calibration) {
+  const RigCovariance& C = calibration.rig.covariance;
+  std::vector<NamedRow> rows = make_rows(calibration);
+  std::erase_if(rows, [&C](const NamedRow& r) { return !C.known(r.row); });
+  if (rows.empty()) return {};
+  std::vector<std::string> names;
+  std::string upper;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    names.push_back(yaml_scalar(rows[i].name));
+    // A line a row: a person finds the variance of a parameter at the start of its own.
+    upper += i == 0 ? "\n    " : ",\n    ";
+    for (std::size_t j = i; j < rows.size(); ++j)
+      upper += fmt::format("{}{}", j == i ? "" : ", ", C(rows[i].row, rows[j].row));
+  }
+  return fmt::format(
+      "covariance:  # of all parameters together, wide; rad, m, px\n  parameters: [{}]\n  upper: "
+      "[{}]\n",
+      fmt::join(names, ", "), upper);
+}
+
+/// Names, camera models and the number of cameras must be read before.
+void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationFile* calibration) {
+  file.check_keys(group, "covariance", {"parameters", "upper"});
+  for (const char* key : {"parameters", "upper"})
+    if (!group[key])
+      file.fail(group, "covariance.{} is missing; add it, or remove the block `covariance`", key);
+  const std::vector<NamedRow> rows = read_rows(file, group["parameters"], *calibration);
+  const std::size_t n = rows.size(), count = n * (n + 1) / 2;
+  const std::vector<double> upper = file.numbers(group["upper"], "covariance.upper", count, count);
+  auto next = upper.begin();
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(*next > 0))
+      file.fail(group["upper"],
+                "covariance.upper has {:g} as the variance of {}; it "
+                "must be positive (upper triangle, row by row)",
+                *next, rows[i].name);
+    for (std::size_t j = i; j < n; ++j)
+      calibration->rig.covariance.set(rows[i].row, rows[j].row, *next++);
+  }
+}
+
+/// Scales the rows and columns of translations by a factor.
+void scale_lengths(double factor, RigCovariance* covariance) {
+  std::array<double, kRigSize> by;
+  by.fill(1);
+  for (int k = 1; k < kMaxCameras; ++k) std::fill_n(by.begin() + extrinsic_row(k) + 3, 3, factor);
+  for (int i = 0; i < kRigSize; ++i)
+    for (int j = 0; j <= i; ++j)
+      covariance->set(
+          i, j,
+          (*covariance)(i, j) * by[static_cast<std::size_t>(i)] * by[static_cast<std::size_t>(j)]);
+}
+
+/// Removes the covariance of the extrinsics and keeps that of the intrinsics.
+void clear_places(RigCovariance* covariance) {
+  for (int i = 0; i < kExtrinsicsSize; ++i)
+    for (int j = 0; j < kRigSize; ++j) covariance->set(i, j, 0);
+}
+
+// ---- the file
 
 constexpr std::int64_t kVersion = 1;
 constexpr const char* kRadtan = "pinhole-radtan";

@@ -93,10 +93,6 @@ void add_argument(const std::string& argument, std::vector<Entry>* entries) {
   flatten(file, file.root(), name, origin, entries);
 }
 
-bool is_group(const std::string& name) {
-  return !name.empty() && std::ranges::find(schema(), name, &Group::name) != schema().end();
-}
-
 const Key* find_key(const std::string& name) {
   for (const Group& group : schema())
     for (const Key& key : group.keys)
@@ -173,7 +169,8 @@ std::string as_switch(const std::string& value, const std::vector<std::string>& 
 }
 
 void apply(const Entry& entry, Configuration* configuration) {
-  if (is_group(entry.name)) {
+  if (!entry.name.empty() &&
+      std::ranges::find(schema(), entry.name, &Group::name) != schema().end()) {
     if (entry.scalar && !entry.value.empty())
       throw InputError(
           entry.origin + ": " + entry.name +

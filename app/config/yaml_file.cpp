@@ -104,27 +104,20 @@ std::string is_value(const YAML::Node& node) {
   return node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\"" : " is a list or a group";
 }
 
-/// Line `number` of a text, counted from 0; empty after the last one.
-std::string line_of(const std::string& text, int number) {
-  std::istringstream in(text);
-  std::string line;
-  for (int i = 0; i <= number && std::getline(in, line); ++i) {
-  }
-  return in ? line : std::string();
-}
-
 /// Explains an error of yaml-cpp, whose own words name the grammar's rules, and the usual fix.
 std::string explain(const YAML::Exception& error, const std::string& text) {
   using Explanation = std::pair<std::string_view, std::string_view>;
   constexpr std::string_view kIndentation =
-      "lines are indented differently; indent the keys of a group, and the items of a list, "
-      "equally";
+      "the indentation does not match the lines above; indent the keys of a group, and the items "
+      "of a list, by the same number of spaces";
   constexpr std::string_view kOpen =
-      "a `{` or `[` is not closed, or a comma between two items is missing";
+      "a `{` or `[` is not closed, or a comma is missing; close it, and separate its items by "
+      "commas";
   constexpr std::array kExplanations{
-      Explanation{"illegal map value",
-                  "two `key: value` on one line, or a line that is indented too far; write one key "
-                  "per line, and put a text with a colon in quotes"},
+      Explanation{
+          "illegal map value",
+          "a second `key: value` on one line, or a line that is indented too far; write one key "
+          "per line, indented as its neighbours are, and put a text with a colon in quotes"},
       Explanation{"end of map not found", kIndentation},
       Explanation{"end of sequence not found", kIndentation},
       Explanation{"illegal block entry", kIndentation},
@@ -132,10 +125,14 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
       Explanation{"end of sequence flow not found", kOpen},
       Explanation{"illegal flow end", "a `}` or `]` that nothing opens; remove it"},
       Explanation{"the referenced anchor is not defined",
-                  "put a value that begins with `*` in quotes"},
-      Explanation{"unknown token", "put a value that begins with @, % or ` in quotes"}};
+                  "a value that begins with `*` is a reference; put the value in quotes"},
+      Explanation{"unknown token",
+                  "a value begins with a character that YAML reserves, such as @ or %; put the "
+                  "value in quotes"}};
   if (!error.mark.is_null()) {
-    const std::string line = line_of(text, error.mark.line);
+    std::istringstream lines(text);
+    std::string line;
+    for (int i = 0; i <= error.mark.line; ++i) std::getline(lines, line);
     if (line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos)
       return "the line is indented by a tab; use spaces";
   }

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <map>
-#include <optional>
 #include <sstream>
 #include <tuple>
 
@@ -291,23 +290,19 @@ bool begins_number(std::string_view word) {
   return parse_number(word.substr(0, word.find_first_of(" \t")), &ignored);
 }
 
-/// Converts numbers separated by blanks, commas or semicolons to a YAML list.
-std::string as_list(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return c == ',' || c == ';'; }, ' ');
-  std::istringstream words(text);
-  std::string list;
-  for (std::string word; words >> word;) list += (list.empty() ? "[" : ", ") + word;
-  return list + "]";
-}
-
-/// Converts a value of another syntax: a number, a list of numbers, or text.
+/// Converts a value of another syntax: a number, a list of numbers between blanks, commas or
+/// semicolons, or text.
 std::string as_yaml(std::string_view value) {
   value = trimmed(value);
   if (value.starts_with('[') || value.starts_with('{')) return std::string(value);
-  const bool several = value.find_first_of(" \t,\n") != std::string_view::npos;
-  if (begins_number(value) && several) return as_list(std::string(value));
-  return begins_number(value) ? std::string(value) : double_quoted(value);
+  if (!begins_number(value)) return double_quoted(value);
+  if (value.find_first_of(" \t,\n") == std::string_view::npos) return std::string(value);
+  std::string text(value), list;
+  std::ranges::replace_if(
+      text, [](char c) { return c == ',' || c == ';'; }, ' ');
+  std::istringstream words(text);
+  for (std::string word; words >> word;) list += (list.empty() ? "[" : ", ") + word;
+  return list + "]";
 }
 
 /// OpenCV's XML: elements become keys, an element with text only its value. `depth`: of nesting, at
@@ -378,42 +373,30 @@ bool is_ini(std::string_view text) {
          !begins_number(line.substr(1)) && line.find_first_of(",{\"") == std::string_view::npos;
 }
 
-/// OpenCV's header and tabs are not valid YAML 1.2. They are replaced by blanks, so that line
-/// numbers stay the same.
-void replace_invalid_yaml(std::string* text) {
-  if (text->starts_with("\xEF\xBB\xBF")) text->erase(0, 3);
-  if (text->starts_with("%YAML"))
-    std::fill(text->begin(),
-              text->begin() + static_cast<std::ptrdiff_t>(std::min(text->find('\n'), text->size())),
-              ' ');
-  std::ranges::replace(*text, '\t', ' ');
-}
-
 /// All values whose keys are in the vocabulary, in the order of the file. Keys are compared without
 /// case and punctuation; a camera is identified by left and right, l and r, or a number (from 0 or
 /// 1) in the key or an enclosing group.
 std::vector<Fact> find_facts(const YamlFile& file) { return Walk(file).facts(); }
 
-/// Program of a file, by a key that only its files have, and what is needed to read it, as a
-/// message fragment. Empty if unknown. Sets *never if a program's files are not supported.
-std::string find_program(const YamlFile& file, bool* never) {
-  if (!file.root().IsMap()) return "";
-  for (const Program& program : kPrograms)
-    for (const auto& entry : file.root())
-      if (entry.first.IsScalar() &&
-          (entry.first.Scalar() == program.key ||
-           (program.key.ends_with('_') && entry.first.Scalar().starts_with(program.key)))) {
-        *never = program.needs.empty();
-        return fmt::format("is of {}{}{}", program.name,
-                           *never ? ", which is not supported; convert it to Kalibr, ROS or OpenCV"
-                                  : ": it needs ",
-                           program.needs);
-      }
-  return "";
+/// Program of a file, by a key that only its files have; null if unknown.
+const Program* find_program(const YamlFile& file) {
+  if (file.root().IsMap())
+    for (const Program& program : kPrograms)
+      for (const auto& entry : file.root())
+        if (entry.first.IsScalar() &&
+            (entry.first.Scalar() == program.key ||
+             (program.key.ends_with('_') && entry.first.Scalar().starts_with(program.key))))
+          return &program;
+  return nullptr;
 }
 
 std::vector<YamlFile> settings_trees(std::string text, const std::string& name) {
-  replace_invalid_yaml(&text);
+  // OpenCV's header and tabs are not valid YAML 1.2. They are replaced by blanks, so that line
+  // numbers stay the same.
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  if (text.starts_with("%YAML"))
+    std::fill_n(text.begin(), std::min(text.find('\n'), text.size()), ' ');
+  std::ranges::replace(text, '\t', ' ');
   std::string_view rest = text;
   rest.remove_prefix(std::min(rest.find_first_not_of(" \r\n"), rest.size()));
   if (rest.starts_with('<'))
@@ -539,10 +522,10 @@ std::string join_names(const std::vector<YamlFile>& files) {
 }
 
 [[noreturn]] void fail_missing(const std::vector<YamlFile>& files, const std::string& what) {
-  bool never = false;
   for (const YamlFile& file : files)
-    if (const std::string program = find_program(file, &never); !program.empty())
-      refuse(join_names(files), 0, "{} is missing; the file {}", what, program);
+    if (const Program* program = find_program(file))
+      refuse(join_names(files), 0, "{} is missing; the file is of {}: it needs {}", what,
+             program->name, program->needs);
   refuse(join_names(files), 0,
          "{} is missing; supported are calibration.yaml, Kalibr, ROS camera_info, OpenCV (M1 D1 M2 "
          "D2 R T), EuRoC, KITTI, ORB-SLAM, VINS and Kimera",
@@ -932,13 +915,14 @@ CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
   } else {
     if (files.empty()) refuse(texts.front().name, 0, "is empty; pass a calibration");
     for (const YamlFile& file : files) {
-      bool never = false;
       if (!file.root().IsMap())
         refuse(file.name(), 0,
                "is not a calibration: it has no lines `key: value`; pass a calibration.yaml, or a "
                "file of Kalibr, ROS or OpenCV");
-      if (const std::string program = find_program(file, &never); never)
-        refuse(file.name(), 0, program);
+      if (const Program* program = find_program(file); program != nullptr && program->needs.empty())
+        refuse(file.name(), 0,
+               "is of {}, which is not supported; convert it to Kalibr, ROS or OpenCV",
+               program->name);
     }
     add_named_files(&files);
     out = RigReader(files, size, use, remarks).read();

@@ -87,9 +87,8 @@ class FrameDecoder {
   // Slots in hand; those of a skipped pair serve the next one.
   std::array<FrameSlot, 2> own_{};
   std::size_t own_count_ = 0;
-  Stamp newest_{};
-  // True if newest_ is valid.
-  bool any_ = false;
+  // Latest stamp of a frame that was not skipped for its stamp.
+  std::optional<Stamp> newest_;
 
   Ring<DecodedPair, kAhead> ring_;
   // Signalled by the decoder for a pair or the end.

@@ -483,15 +483,6 @@ void pair_cameras(const Cameras& cameras, const Lists& lists, StereoSequence* se
 
 // ---- calibrations
 
-/// Name of a file in the directory that may be a calibration of another program; empty if there is
-/// none.
-std::string other_calibration(const fs::path& folder) {
-  for (const fs::path& entry : entries_in(folder))
-    for (const char* ending : {".yaml", ".yml", ".json", ".xml"})
-      if (lower(entry.extension().string()) == ending) return entry.filename().string();
-  return "";
-}
-
 void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
                           StereoSequence* sequence) {
   const fs::path& folder = sequence->root;
@@ -513,7 +504,12 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
     sequence->calibration_source = sensors[1].lexically_relative(folder).string();
     return;
   }
-  const std::string other = other_calibration(folder);
+  // A file that may be a calibration of another program.
+  std::string other;
+  for (const fs::path& entry : entries_in(folder))
+    for (const char* ending : {".yaml", ".yml", ".json", ".xml"})
+      if (other.empty() && lower(entry.extension().string()) == ending)
+        other = entry.filename().string();
   refuse(folder, 0,
          "has no calibration.yaml; pass a calibration with --calibration (of vergence, Kalibr, "
          "ROS, OpenCV or another program), or --focal and --baseline{}",

@@ -44,31 +44,19 @@ std::string sensor_yaml(const RigCalibration& rig, std::size_t k) {
       radtan && d[4] != 0 ? fmt::format(", {}", d[4]) : "");
 }
 
-std::string projections(const RigCalibration& rig) {
-  std::string text;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Intrinsics& i = rig.intrinsics[k];
-    text += fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", k, i.fx, i.cx,
-                        i.fx * rig.T_camera_left[k].t.x(), i.fy, i.cy);
-  }
-  return text;
-}
-
-/// KITTI cannot store distortion and rotated cameras.
-void check_rectified(const RigCalibration& rig) {
-  const Transform& T = rig.T_camera_left[1];
-  if (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
-      !T.R.isApprox(Mat3::Identity(), 1e-9) || std::abs(T.t.y()) > 1e-9 || std::abs(T.t.z()) > 1e-9)
-    throw InputError(
-        "--format kitti cannot store distortion and rotated cameras, which this rig has; use euroc "
-        "or folder");
-}
-
 /// Writes the images and text files of a layout.
 class Writer {
  public:
   explicit Writer(const ExportRequest& request) : request_(request) {
-    if (request.format == ExportFormat::kitti) check_rectified(request.calibration.rig);
+    const RigCalibration& rig = request.calibration.rig;
+    const Transform& T = rig.T_camera_left[1];
+    if (request.format == ExportFormat::kitti &&
+        (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
+         !T.R.isApprox(Mat3::Identity(), 1e-9) || std::abs(T.t.y()) > 1e-9 ||
+         std::abs(T.t.z()) > 1e-9))
+      throw InputError(
+          "--format kitti cannot store distortion and rotated cameras, which this rig has; use "
+          "euroc or folder");
     for (std::size_t k = 0; k < 2; ++k) make_folder(images(k));
   }
   [[nodiscard]] fs::path image(std::size_t index, Stamp stamp, std::size_t camera) const {
@@ -84,6 +72,7 @@ class Writer {
   /// Writes the text files after all images.
   void finish() const {
     const fs::path& out = request_.out;
+    std::string projections;
     switch (request_.format) {
       case ExportFormat::folder:
         replace_durably(out / "times.txt",
@@ -101,10 +90,16 @@ class Writer {
         }
         break;
       case ExportFormat::kitti:
+        for (std::size_t k = 0; k < 2; ++k) {
+          const Intrinsics& i = request_.calibration.rig.intrinsics[k];
+          const double x = request_.calibration.rig.T_camera_left[k].t.x();
+          projections += fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", k, i.fx, i.cx, i.fx * x,
+                                     i.fy, i.cy);
+        }
         replace_durably(out / "times.txt", lines([this](Stamp stamp) {
                           return format_seconds((stamp - stamps_.front()).ns());
                         }));
-        replace_durably(out / "calib.txt", projections(request_.calibration.rig));
+        replace_durably(out / "calib.txt", projections);
         break;
     }
     write_truth();

@@ -155,11 +155,10 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   std::size_t broken = 0, first_broken = 0;
   for (std::string_view raw; lines.next(&raw);) {
     Line line;
-    if (parse_line(raw, &line)) {
+    if (parse_line(raw, &line))
       out.push_back(line);
-    } else if (broken++ == 0) {
+    else if (broken++ == 0)
       first_broken = lines.number();
-    }
   }
   if (out.empty() || broken > 1 + out.size() / kMaxBroken)
     refuse(log, first_broken,
@@ -175,9 +174,9 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
     remarks->push_back(
         fmt::format("{} samples of the INS have stamps that do not increase and are skipped",
                     out.size() - kept.size()));
-  std::vector<Line> in_order;
-  for (const std::size_t i : kept) in_order.push_back(out[i]);
-  return in_order;
+  for (std::size_t i = 0; i < kept.size(); ++i) out[i] = out[kept[i]];
+  out.resize(kept.size());
+  return out;
 }
 
 /// Swaps the columns if latitude exceeds 90 in all lines.
@@ -220,18 +219,6 @@ Mat3 attitude(const Line& line, const Conventions& c) {
          exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) * exp_so3(Vec3(roll, 0, 0));
 }
 
-/// Selects the velocity axes that agree best with the motion of the position.
-void decide_axes(const std::vector<Moving>& moving, Conventions* c) {
-  double least = 1e300;
-  for (const Axes& axes : kAxes) {
-    const Mat3 to_enu = to_matrix(axes);
-    double sum = 0;
-    for (const Moving& m : moving)
-      sum += (to_enu * m.line->velocity - m.motion).head<2>().squaredNorm();
-    if (sum < least) least = sum, c->enu_of_velocity = to_enu, c->axes = axes.phrase;
-  }
-}
-
 /// Selects the angles whose forward axis agrees best with the velocity. The mean cosine is used,
 /// because the vehicle may also drive backwards. On a level path the pitch is that of the MTi-G.
 void decide_angles(const std::vector<Moving>& fast, Conventions* c) {
@@ -265,7 +252,15 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
         "yaw from north counter-clockwise are assumed");
     return c;
   }
-  decide_axes(moving, &c);
+  // The velocity axes that agree best with the motion of the position.
+  double least = 1e300;
+  for (const Axes& axes : kAxes) {
+    const Mat3 to_enu = to_matrix(axes);
+    double sum = 0;
+    for (const Moving& m : moving)
+      sum += (to_enu * m.line->velocity - m.motion).head<2>().squaredNorm();
+    if (sum < least) least = sum, c.enu_of_velocity = to_enu, c.axes = axes.phrase;
+  }
   decide_angles(fast, &c);
   remarks->push_back(fmt::format(
       "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up", c.axes,

@@ -4,7 +4,6 @@
 #include <system_error>
 
 #include "app/config/calibration_checks.hpp"
-#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
@@ -57,22 +56,17 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
   refuse(folder, 0, "has no reader for its format");
 }
 
-/// Marks the frames whose stamps do not fit, so that one stamp that leaps ahead costs only its own
-/// frame.
-void mark_out_of_order(std::vector<StereoPair>* pairs) {
-  std::vector<Stamp> stamps;
-  for (StereoPair& pair : *pairs) {
-    stamps.push_back(pair.stamp);
-    pair.in_order = false;
-  }
-  for (const std::size_t kept : detail::ascending(stamps)) (*pairs)[kept].in_order = true;
-}
-
 /// Checks common to all formats. `source` is the file of the calibration.
 void check(const std::filesystem::path& source, const CalibrationUse& use, StereoSequence* opened) {
   StereoSequence& sequence = *opened;
   check_times(sequence);
-  mark_out_of_order(&sequence.pairs);
+  // One stamp that leaps ahead costs only its own frame.
+  std::vector<Stamp> stamps;
+  for (StereoPair& pair : sequence.pairs) {
+    stamps.push_back(pair.stamp);
+    pair.in_order = false;
+  }
+  for (const std::size_t kept : detail::ascending(stamps)) sequence.pairs[kept].in_order = true;
   apply_use(use, &sequence.calibration);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->message);
   if (sequence.calibration.cameras != 2)
@@ -357,7 +351,7 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
 }
 
 void check_topics(SequenceFormat format, const BagTopics& topics) {
-  if (!is_bag(format) && !topics.empty())
+  if (!is_bag(format) && topics != BagTopics{})
     throw InputError(
         "--left-topic, --right-topic, --ins-topic and --imu-topic select topics of a bag, and DATA "
         "is not a bag; remove them");

@@ -1,6 +1,5 @@
 #pragma once
 #include <functional>
-#include <memory>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
@@ -98,9 +97,7 @@ struct BagTopics {
   std::string ins{};
   /// Topic of Imu, with the orientation that belongs to NavSatFix.
   std::string imu{};
-  [[nodiscard]] bool empty() const noexcept {
-    return left.empty() && right.empty() && ins.empty() && imu.empty();
-  }
+  bool operator==(const BagTopics&) const = default;
 };
 
 [[nodiscard]] inline bool is_bag(SequenceFormat format) noexcept {

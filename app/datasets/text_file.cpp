@@ -1,7 +1,5 @@
 #include "app/datasets/text_file.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>

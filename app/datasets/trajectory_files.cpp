@@ -183,23 +183,17 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
 
 /// First rows of a file, from which the format is inferred.
 struct Sample {
+  explicit Sample(TextTable table) : names(table.names()), separator(table.separator()) {
+    constexpr std::size_t kRows = 1000;
+    while (rows.size() < kRows && table.next())
+      if (!table.fields().empty()) rows.push_back(table.fields());
+    if (!rows.empty()) time = find_time_columns(rows);
+  }
+  std::vector<std::string_view> names;
+  char separator;
   std::vector<std::vector<std::string_view>> rows{};
   TimeColumns time{};
-  std::vector<std::string_view> names{};
-  char separator = ' ';
 };
-
-Sample read_sample(std::string_view text) {
-  constexpr std::size_t kRows = 1000;
-  Sample s;
-  TextTable table(text);
-  s.names = table.names();
-  s.separator = table.separator();
-  while (s.rows.size() < kRows && table.next())
-    if (!table.fields().empty()) s.rows.push_back(table.fields());
-  if (!s.rows.empty()) s.time = find_time_columns(s.rows);
-  return s;
-}
 
 Columns find_columns(const fs::path& file, const Sample& sample, std::size_t first_line) {
   if (auto named = columns_of_names(sample.names)) return *named;
@@ -235,7 +229,7 @@ void sort_by_stamp(Trajectory* poses) {
 class Reader {
  public:
   Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
-      : file_(file), text_(text), options_(options), sample_(read_sample(text)) {
+      : file_(file), text_(text), options_(options), sample_(TextTable(text)) {
     TextTable table(text);
     if (!table.next())
       refuse(file, 0,

@@ -32,17 +32,6 @@ void measure_time(const Session& s, Analysis* a) {
     a->breaks[i] = a->time_s[i] - a->time_s[i - 1] > kWideGap * a->interval_s ? 1 : 0;
 }
 
-void measure_distance(const Session& s, Analysis* a) {
-  const Vec3* last = nullptr;
-  for (const Frame& f : s.frames) {
-    if (f.posed) {
-      if (last != nullptr) a->path_m += (f.T_world_left.t - *last).norm();
-      last = &f.T_world_left.t;
-    }
-    a->distance_m.push_back(a->path_m);
-  }
-}
-
 /// Frames that only waited for the first verification of the calibration in use. What is not
 /// confirmed later on, after a knock, is held against the drive.
 void count_waiting(const Session& s, Analysis* a) {
@@ -299,7 +288,12 @@ Analysis analyse(const Session& session) {
   Analysis a;
   measure_time(session, &a);
   a.map_breaks = a.breaks;
-  measure_distance(session, &a);
+  const Vec3* last = nullptr;
+  for (const Frame& f : session.frames) {
+    if (f.posed && last != nullptr) a.path_m += (f.T_world_left.t - *last).norm();
+    if (f.posed) last = &f.T_world_left.t;
+    a.distance_m.push_back(a.path_m);
+  }
   count_frames(session, &a);
   count_waiting(session, &a);
   compare(session, &a);

@@ -53,8 +53,6 @@ constexpr std::array<std::string_view, 6> kSkipped{"stamp_not_increasing", "stam
 constexpr const char* kSkippedAdvice =
     "The events name the files: check them, or copy the recording again.";
 
-std::string frames_text(std::size_t n) { return fmt::format("{} frame{}", n, n == 1 ? "" : "s"); }
-
 /// A drive of so many moving frames can confirm its calibration: 36 with a calibration given, 54
 /// from scratch (docs/calibration.md).
 inline constexpr std::size_t kFramesToVerify = 60;
@@ -218,10 +216,9 @@ class Assessor {
 
   /// Why no calibration was accepted; empty if one was, or there was no attempt.
   [[nodiscard]] std::string rejection() const {
-    std::string why;
-    for (const CalibrationRow& row : s_.calibrations)
-      if (!row.kept && !row.reason.empty()) why = row.reason;
-    return any_accepted() ? "" : why;
+    const auto last = std::find_if(s_.calibrations.rbegin(), s_.calibrations.rend(),
+                                   [](const auto& c) { return !c.kept && !c.reason.empty(); });
+    return any_accepted() || last == s_.calibrations.rend() ? "" : last->reason;
   }
 
   /// No frame is ok. Returns true if that is because the run ended before it could verify its
@@ -454,13 +451,14 @@ class Assessor {
   void advise_by_reasons() {
     for (const std::string_view kind : kSkipped)
       if (const std::size_t n = count(kind); n > 0)
-        advise(fmt::format("{} ({} skipped): {}", kind, frames_text(n), kSkippedAdvice));
+        advise(
+            fmt::format("{} ({} frame{} skipped): {}", kind, n, n == 1 ? "" : "s", kSkippedAdvice));
     for (std::size_t i = 1; i < a_.by_reason.size(); ++i) {
       // Frames that were doubted for a moment, or a calibration that was asked for, are no knock.
       if (static_cast<Reason>(i) == Reason::recalibrating && count("rig_changed") == 0) continue;
       if (const std::size_t n = a_.by_reason[i] - a_.waited_by_reason[i]; n > 0)
-        advise(fmt::format("{} ({}): {}", to_string(static_cast<Reason>(i)), frames_text(n),
-                           kAdvice[i]));
+        advise(fmt::format("{} ({} frame{}): {}", to_string(static_cast<Reason>(i)), n,
+                           n == 1 ? "" : "s", kAdvice[i]));
     }
   }
 

@@ -125,19 +125,6 @@ std::vector<Lane> make_lanes(std::span<const Frame> frames) {
   return lanes;
 }
 
-void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
-  draw_track("events", box, top, svg);
-  double last = -1;
-  for (const Event& e : s.events) {
-    if (s.frames.empty() || e.stamp < s.frames.front().stamp || e.stamp > s.frames.back().stamp)
-      continue;
-    const double at = box.x(seconds_between(s.frames.front().stamp, e.stamp));
-    if (std::abs(at - last) < 1) continue;
-    svg->rect("f-ink", std::clamp(at - 1, box.left, box.right - 2), top + 3, 2, kLaneHeight - 7);
-    last = at;
-  }
-}
-
 /// Value of a calibration parameter, in use from `from` to `to`.
 struct CalibrationValue {
   enum class Kind : std::uint8_t { used, measured, rejected } kind = Kind::used;
@@ -207,18 +194,6 @@ struct MapScale {
   }
 };
 
-MapScale scale_for(const Eigen::AlignedBox2d& b) {
-  // Minimum extent in m, so that the noise of a vehicle at rest is not enlarged.
-  constexpr double kSmallest = 1;
-  const double width = std::max(b.sizes().x(), kSmallest),
-               depth = std::max(b.sizes().y(), kSmallest);
-  MapScale s;
-  s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
-  s.height = std::clamp(depth * s.per_metre + kMargin + kFoot, kMin, kMax);
-  s.x_middle = b.center().x(), s.y_middle = b.center().y();
-  return s;
-}
-
 void draw_path(const char* css, std::vector<double> x, std::vector<double> y,
                const std::vector<std::uint8_t>& breaks, const MapScale& s, Svg* svg) {
   for (double& v : x) v = s.x(v);
@@ -235,17 +210,6 @@ void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
   svg->circle("f-ours", s.x(a.estimate_x[first]), s.y(a.estimate_y[first]), 4.5);
   const double x = s.x(a.estimate_x[last - 1]), y = s.y(a.estimate_y[last - 1]);
   svg->rect("f-ours", x - 4, y - 4, 8, 8);
-}
-
-void draw_scale_bar(const MapScale& s, Svg* svg) {
-  const auto ticks = nice_ticks(0, 150 / s.per_metre, 2);
-  const double metres = ticks.size() > 1 ? ticks[1] : 1;
-  const double y = s.height - 14, length = metres * s.per_metre;
-  svg->lines("curve s-ink",
-             {{{kMargin, y - 5}, {kMargin, y}, {kMargin + length, y}, {kMargin + length, y - 5}}});
-  const std::string words =
-      metres >= 1000 ? fmt::format("{:g} km", metres / 1000) : fmt::format("{:g} m", metres);
-  svg->text("strong", Anchor::start, kMargin + length + 8, y + 1, words);
 }
 
 /// From the first frame to the last along x.
@@ -299,7 +263,17 @@ std::string bands_plot(const Session& session, const Analysis& analysis) {
     draw_track(std::string(lanes[i].name), box, top, &svg);
     draw_runs(lanes[i].css, box, analysis, top + 3, kLaneHeight - 7, lanes[i].shown, &svg);
   }
-  draw_events(session, box, events_top, &svg);
+  const auto& frames = session.frames;
+  draw_track("events", box, events_top, &svg);
+  double last = -1;
+  for (const Event& e : session.events) {
+    if (frames.empty() || e.stamp < frames.front().stamp || e.stamp > frames.back().stamp) continue;
+    const double at = box.x(seconds_between(frames.front().stamp, e.stamp));
+    if (std::abs(at - last) < 1) continue;
+    svg.rect("f-ink", std::clamp(at - 1, box.left, box.right - 2), events_top + 3, 2,
+             kLaneHeight - 7);
+    last = at;
+  }
   box.draw_time_axis(&svg);
   return std::move(svg).finish();
 }
@@ -342,7 +316,14 @@ std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
     include(analysis.reference_x[i], analysis.reference_y[i]);
   }
   if (bounds.isEmpty()) return {};
-  const MapScale scale = scale_for(bounds);
+  // Minimum extent in m, so that the noise of a vehicle at rest is not enlarged.
+  constexpr double kSmallest = 1;
+  const double width = std::max(bounds.sizes().x(), kSmallest),
+               depth = std::max(bounds.sizes().y(), kSmallest);
+  MapScale scale;
+  scale.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
+  scale.height = std::clamp(depth * scale.per_metre + kMargin + kFoot, kMin, kMax);
+  scale.x_middle = bounds.center().x(), scale.y_middle = bounds.center().y();
   Svg svg(kPlotWidth, scale.height, "Trajectory seen from above");
   draw_path("curve map-theirs s-theirs", analysis.reference_x, analysis.reference_y,
             analysis.breaks, scale, &svg);
@@ -355,7 +336,12 @@ std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
   draw_path("curve map-care s-care", degraded, analysis.estimate_y, analysis.map_breaks, scale,
             &svg);
   draw_ends(analysis, scale, &svg);
-  draw_scale_bar(scale, &svg);
+  const auto ticks = nice_ticks(0, 150 / scale.per_metre, 2);
+  const double metres = ticks.size() > 1 ? ticks[1] : 1;
+  const double foot = scale.height - 14, end = kMargin + metres * scale.per_metre;
+  svg.lines("curve s-ink", {{{kMargin, foot - 5}, {kMargin, foot}, {end, foot}, {end, foot - 5}}});
+  svg.text("strong", Anchor::start, end + 8, foot + 1,
+           metres >= 1000 ? fmt::format("{:g} km", metres / 1000) : fmt::format("{:g} m", metres));
   if (analysis.map_is_enu) {
     const double x = kPlotWidth - kMargin - 8, y = scale.height - 12;
     svg.polygon("f-ink", {{x, y - 22}, {x + 6, y}, {x, y - 5}, {x - 6, y}});

@@ -1,7 +1,6 @@
 #include "app/report/report.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
@@ -58,22 +57,6 @@ std::optional<double> times(std::optional<double> value, double factor) {
   return value ? std::optional(*value * factor) : std::nullopt;
 }
 
-void error_group(const Analysis& a, MetricTable* f) {
-  f->group(a.source == ErrorSource::ins ? "Errors against the INS"
-                                        : "Errors against the reference");
-  f->row("drift, " + a.drift_message, times(a.drift, 100), "{:.2f} %");
-  f->row("KITTI segment error (with the INS attitude)", times(a.segment_error, 100), "{:.2f} %");
-  f->row("horizontal error, RMS", metres(a.horizontal.rms));
-  f->row("horizontal error, maximum", metres(a.horizontal.max));
-  f->row("vertical error, RMS", metres(a.vertical.rms));
-  f->row("heading error, RMS", a.heading.rms, "{:.2f}°");
-  f->row("heading error, maximum", a.heading.max, "{:.2f}°");
-  f->row("rotation error", a.rotation_deg_per_m, "{:.4f} °/m");
-  if (a.ate_m) f->row("ATE (RMS after SE(3) alignment)", metres(*a.ate_m));
-  f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the distance travelled");
-  f->row("scale (reference / estimate)", a.scale, "{:.4f}");
-}
-
 std::string event_time(const Session& s, Stamp stamp) {
   if (s.frames.empty()) return "";
   const Stamp first = s.frames.front().stamp;
@@ -121,7 +104,22 @@ std::string metrics_table(const Session& session, const Analysis& analysis) {
     if (analysis.by_reason[i] > 0)
       f.row(fmt::format("frames with {}", to_string(static_cast<Reason>(i))),
             grouped(analysis.by_reason[i]));
-  if (analysis.source != ErrorSource::none) error_group(analysis, &f);
+  if (analysis.source != ErrorSource::none) {
+    f.group(analysis.source == ErrorSource::ins ? "Errors against the INS"
+                                                : "Errors against the reference");
+    f.row("drift, " + analysis.drift_message, times(analysis.drift, 100), "{:.2f} %");
+    f.row("KITTI segment error (with the INS attitude)", times(analysis.segment_error, 100),
+          "{:.2f} %");
+    f.row("horizontal error, RMS", metres(analysis.horizontal.rms));
+    f.row("horizontal error, maximum", metres(analysis.horizontal.max));
+    f.row("vertical error, RMS", metres(analysis.vertical.rms));
+    f.row("heading error, RMS", analysis.heading.rms, "{:.2f}°");
+    f.row("heading error, maximum", analysis.heading.max, "{:.2f}°");
+    f.row("rotation error", analysis.rotation_deg_per_m, "{:.4f} °/m");
+    if (analysis.ate_m) f.row("ATE (RMS after SE(3) alignment)", metres(*analysis.ate_m));
+    f.row("error at the end", times(analysis.end_error, 100), "{:.2f} % of the distance travelled");
+    f.row("scale (reference / estimate)", analysis.scale, "{:.4f}");
+  }
   f.group("Depth error (1 σ) predicted by the calibration");
   for (const auto& [name, path] :
        {std::pair{"at the start", "calibration.initial."}, {"at the end", "calibration."}})
@@ -209,11 +207,13 @@ std::string error_cards(const Analysis& a) {
 
 std::string ok_card(const Session& s, const Analysis& a) {
   if (!a.ok_share) return number_card("unknown", "Frames ok", "no frame was received");
+  // Only what devices give has metrics of their clocks.
+  const bool live = s.summary.is_object() && s.summary.value("time", nlohmann::json()).is_object();
   // Rounded down, so that 100 % means every frame.
   const double percent = std::floor(*a.ok_share * 1000) / 10;
-  const std::string skipped = a.skipped > 0 ? fmt::format(", {} {}", grouped(a.skipped),
-                                                          is_live(s) ? "not received" : "skipped")
-                                            : "";
+  const std::string skipped =
+      a.skipped > 0 ? fmt::format(", {} {}", grouped(a.skipped), live ? "not received" : "skipped")
+                    : "";
   const std::string waited =
       a.waited > 0 ? fmt::format(" ({} before the calibration was verified)", grouped(a.waited))
                    : "";
@@ -255,25 +255,6 @@ std::string curve_figure(const CurvePlot& plot, const char* note, const Session&
                          const Analysis& a) {
   const std::string drawing = curve_plot(plot, a, s.frames);
   return drawing.empty() ? "" : figure(plot.description + " · over time", drawing, note);
-}
-
-std::string error_plots(const Session& s, const Analysis& a) {
-  return curve_figure({"Horizontal error, m", a.horizontal_m, "curve s-ours", true},
-                      "Distance to the reference in the ground plane; a steady rise is drift.", s,
-                      a) +
-         curve_figure({"Vertical error, m", a.vertical_m, "curve s-theirs", false},
-                      "Positive where the estimate is above the reference.", s, a) +
-         curve_figure({"Heading error, degrees", a.heading_deg, "curve s-third", false},
-                      "Positive where the estimate is rotated clockwise.", s, a);
-}
-
-std::string errors_head(const Analysis& a) {
-  return section("wide", "Errors",
-                 "<p>" + escape(a.source_message, 500) + "</p>" +
-                     (a.lost > 0 && a.source != ErrorSource::none
-                          ? "<p class=\"soft\">Red stripes are frames without a pose; curves are "
-                            "interrupted there.</p>"
-                          : ""));
 }
 
 std::string running_plots(const Session& s, const Analysis& a) {
@@ -359,8 +340,22 @@ std::string page_html(const Session& session, const Analysis& analysis,
   if (!session.missing.empty())
     out += section("wide", "What is missing in this session", list(session.missing));
   out += map_section(session, analysis);
-  out += running_plots(session, analysis) + errors_head(analysis);
-  if (analysis.source != ErrorSource::none) out += error_plots(session, analysis);
+  out += running_plots(session, analysis) +
+         section("wide", "Errors",
+                 "<p>" + escape(analysis.source_message, 500) + "</p>" +
+                     (analysis.lost > 0 && analysis.source != ErrorSource::none
+                          ? "<p class=\"soft\">Red stripes are frames without a pose; curves are "
+                            "interrupted there.</p>"
+                          : ""));
+  if (analysis.source != ErrorSource::none)
+    for (const auto& [plot, note] :
+         {std::pair{CurvePlot{"Horizontal error, m", analysis.horizontal_m, "curve s-ours", true},
+                    "Distance to the reference in the ground plane; a steady rise is drift."},
+          {CurvePlot{"Vertical error, m", analysis.vertical_m, "curve s-theirs", false},
+           "Positive where the estimate is above the reference."},
+          {CurvePlot{"Heading error, degrees", analysis.heading_deg, "curve s-third", false},
+           "Positive where the estimate is rotated clockwise."}})
+      out += curve_figure(plot, note, session, analysis);
   out += calibration_sections(session, analysis) +
          section("wide long", "Events",
                  session.events.empty() ? "<p>No events.</p>" : events_table(session));

@@ -83,9 +83,6 @@ struct Session {
 /// not a directory or has no session file.
 [[nodiscard]] Session read_session(const std::filesystem::path& folder);
 
-/// True if it was recorded from devices; false for a replay, or if unknown.
-[[nodiscard]] bool is_live(const Session& session);
-
 /// Finite number of summary.json by its path, such as `metrics.ate_m`; empty for anything else.
 [[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);
 /// Reads a boolean at a path.

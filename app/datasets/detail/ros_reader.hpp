@@ -2,7 +2,6 @@
 #include <array>
 #include <bit>
 #include <cstring>
-#include <span>
 #include <type_traits>
 
 #include "app/datasets/detail/bag_scan.hpp"

@@ -2,9 +2,7 @@
 
 #include <sqlite3.h>
 
-#include <filesystem>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <system_error>
 
