@@ -1,4 +1,4 @@
-#include "app/checkerboard/aprilgrid.hpp"
+#include "app/checkerboard/board_detector.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,6 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 #include <opencv2/imgproc.hpp>
-
-#include "app/checkerboard/tag_corners.hpp"
 
 namespace vergence::app {
 namespace {
@@ -89,13 +87,12 @@ class TagDetector {
         tag.corners[k] = {static_cast<float>(d->p[k][0]), static_cast<float>(d->p[k][1])};
       tags.push_back(tag);
     }
-    std::ranges::sort(tags, [](const Tag& a, const Tag& b) { return a.id < b.id; });
+    std::ranges::sort(tags, {}, &Tag::id);
     // A tag seen twice is a reflection or a second target: neither is used.
     std::vector<Tag> once;
-    for (std::size_t i = 0; i < tags.size(); ++i)
-      if ((i == 0 || tags[i - 1].id != tags[i].id) &&
-          (i + 1 == tags.size() || tags[i + 1].id != tags[i].id))
-        once.push_back(tags[i]);
+    std::ranges::copy_if(tags, std::back_inserter(once), [&](const Tag& tag) {
+      return std::ranges::count(tags, tag.id, &Tag::id) == 1;
+    });
     return once;
   }
 
@@ -121,37 +118,11 @@ struct Layout {
   }
 };
 
-/// Residual of corners numbered like this.
-double misfit(const std::vector<Tag>& tags, const BoardPattern& board, const Layout& layout) {
-  std::vector<cv::Point2d> on_board, in_image;
-  for (const Tag& tag : tags)
-    for (std::size_t k = 0; k < 4; ++k) {
-      const Vec3 X = board.corner(layout.index(board, tag.id, k));
-      on_board.emplace_back(X.x(), X.y());
-      in_image.emplace_back(tag.corners[k]);
-    }
-  return homography_misfit(on_board, in_image);
-}
-
 double mean_side(const std::vector<Tag>& tags) {
   double sum = 0;
   for (const Tag& tag : tags)
     for (std::size_t k = 0; k < 4; ++k) sum += cv::norm(tag.corners[k] - tag.corners[(k + 1) % 4]);
   return sum / static_cast<double>(4 * tags.size());
-}
-
-/// To the saddle between tag and square.
-BoardCorners refined(const cv::Mat& image, const BoardPattern& board, const Layout& layout,
-                     const std::vector<Tag>& tags) {
-  const int window = std::clamp(static_cast<int>(kWindowOfGap * board.spacing * mean_side(tags)),
-                                kNarrowestWindow, kWidestWindow);
-  BoardCorners rough;
-  for (const Tag& tag : tags)
-    for (std::size_t k = 0; k < 4; ++k)
-      // The library's pixels have their corner at integers.
-      rough.push_back({layout.index(board, tag.id, k),
-                       Vec2(tag.corners[k].x, tag.corners[k].y) - Vec2(0.5, 0.5)});
-  return refine_corners(image, rough, window, kMaxRefined);
 }
 
 }  // namespace
@@ -171,13 +142,30 @@ BoardCorners find_aprilgrid(const ImageView& image, const BoardPattern& board, B
   Layout best;
   double least = std::numeric_limits<double>::infinity();
   for (const bool from_below : {true, false})
-    for (std::size_t turn = 0; turn < 4; ++turn)
-      if (const double m = misfit(tags, board, {from_below, turn}); m < least) {
-        least = m;
-        best = {from_below, turn};
-      }
+    for (std::size_t turn = 0; turn < 4; ++turn) {
+      // Residual of corners numbered like this.
+      const Layout layout{from_below, turn};
+      std::vector<cv::Point2d> on_board, in_image;
+      for (const Tag& tag : tags)
+        for (std::size_t k = 0; k < 4; ++k) {
+          const Vec3 X = board.corner(layout.index(board, tag.id, k));
+          on_board.emplace_back(X.x(), X.y());
+          in_image.emplace_back(tag.corners[k]);
+        }
+      if (const double m = homography_misfit(on_board, in_image); m < least)
+        least = m, best = layout;
+    }
   if (!(least < kFlatToSide * mean_side(tags))) return {};
-  return refined(pixels, board, best, tags);
+  // To the saddle between tag and square.
+  const int window = std::clamp(static_cast<int>(kWindowOfGap * board.spacing * mean_side(tags)),
+                                kNarrowestWindow, kWidestWindow);
+  BoardCorners rough;
+  for (const Tag& tag : tags)
+    for (std::size_t k = 0; k < 4; ++k)
+      // The library's pixels have their corner at integers.
+      rough.push_back({best.index(board, tag.id, k),
+                       Vec2(tag.corners[k].x, tag.corners[k].y) - Vec2(0.5, 0.5)});
+  return refine_corners(pixels, rough, window, kMaxRefined);
 }
 
 }  // namespace vergence::app

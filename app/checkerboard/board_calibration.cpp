@@ -1,7 +1,5 @@
 #include "app/checkerboard/board_calibration.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -34,12 +32,12 @@ using Points2 = std::vector<std::vector<cv::Point2f>>;
 using LensNumbers = Eigen::Matrix<double, 9, 1>;
 
 /// When OpenCV's solvers stop.
-cv::TermCriteria criteria() {
-  return {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-10};
-}
+const cv::TermCriteria kStop{cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-10};
 
 struct Lens {
   cv::Mat K, D;
+
+  [[nodiscard]] Lens clone() const { return {K.clone(), D.clone()}; }
 
   [[nodiscard]] LensNumbers numbers() const {
     LensNumbers n = LensNumbers::Zero();
@@ -157,7 +155,7 @@ class BoardCalibrator {
     s.view_rms.resize(used.size());
     for (std::size_t k = 0; k < cameras_; ++k) {
       if (start != nullptr && hold_lenses)
-        s.lenses[k] = {start->lenses[k].K.clone(), start->lenses[k].D.clone()};
+        s.lenses[k] = start->lenses[k].clone();
       else
         calibrate_alone(k, used, start, &s);
     }
@@ -192,17 +190,17 @@ class BoardCalibrator {
     std::vector<double> errors(at.size());
     if (radtan()) {
       cv::Mat sigmas, by_view;
-      if (start != nullptr)
-        lens = {start->lenses[camera].K.clone(), start->lenses[camera].D.clone()};
+      if (start != nullptr) lens = start->lenses[camera].clone();
       s->alone_rms[camera] = cv::calibrateCamera(
           object, image, size(camera), lens.K, lens.D, rvecs, tvecs, sigmas, cv::noArray(), by_view,
-          k3_flag() | (start != nullptr ? cv::CALIB_USE_INTRINSIC_GUESS : 0), criteria());
+          k3_flag() | (start != nullptr ? cv::CALIB_USE_INTRINSIC_GUESS : 0), kStop);
       for (int i = 0; i < 9; ++i) s->lens_sigmas[camera](i) = sigmas.at<double>(i);
       for (std::size_t i = 0; i < at.size(); ++i)
         errors[i] = by_view.at<double>(static_cast<int>(i));
     } else {
-      s->alone_rms[camera] =
-          calibrate_fisheye(object, image, size(camera), start, camera, &lens, &rvecs, &tvecs);
+      s->alone_rms[camera] = calibrate_fisheye(object, image, size(camera),
+                                               start == nullptr ? nullptr : &start->lenses[camera],
+                                               &lens, &rvecs, &tvecs);
       for (std::size_t i = 0; i < at.size(); ++i) {
         std::vector<cv::Point2f> projected;
         cv::fisheye::projectPoints(object[i], projected, rvecs[i], tvecs[i], lens.K, lens.D);
@@ -219,28 +217,24 @@ class BoardCalibrator {
   }
   /// fisheye::calibrate ends in wrong minima from the focal length of another lens: the best of a
   /// few starts.
-  [[nodiscard]] double calibrate_fisheye(const Points3& object, const Points2& image,
-                                         const cv::Size& size, const Solution* start,
-                                         std::size_t camera, Lens* lens,
-                                         std::vector<cv::Mat>* rvecs,
-                                         std::vector<cv::Mat>* tvecs) const {
+  static double calibrate_fisheye(const Points3& object, const Points2& image, const cv::Size& size,
+                                  const Lens* start, Lens* lens, std::vector<cv::Mat>* rvecs,
+                                  std::vector<cv::Mat>* tvecs) {
     constexpr int kFlags = cv::fisheye::CALIB_USE_INTRINSIC_GUESS |
                            cv::fisheye::CALIB_RECOMPUTE_EXTRINSIC | cv::fisheye::CALIB_FIX_SKEW;
-    std::vector<double> focals;
-    for (const double part : {0.3, 0.45, 0.65, 1.0, 1.5}) focals.push_back(part * size.width);
     double best = std::numeric_limits<double>::infinity();
-    if (start != nullptr) focals = {start->lenses[camera].K.at<double>(0, 0)};
-    for (const double focal : focals) {
+    for (const double part : {0.3, 0.45, 0.65, 1.0, 1.5}) {
+      if (start != nullptr && std::isfinite(best)) break;
+      const double focal = part * size.width;
       Lens next;
       next.K = (cv::Mat_<double>(3, 3) << focal, 0, 0.5 * (size.width - 1), 0, focal,
                 0.5 * (size.height - 1), 0, 0, 1);
       next.D = cv::Mat::zeros(4, 1, CV_64F);
-      if (start != nullptr)
-        next = {start->lenses[camera].K.clone(), start->lenses[camera].D.clone()};
+      if (start != nullptr) next = start->clone();
       std::vector<cv::Mat> turns, places;
       try {
         const double rms = cv::fisheye::calibrate(object, image, size, next.K, next.D, turns,
-                                                  places, kFlags, criteria());
+                                                  places, kFlags, kStop);
         if (!(rms < best)) continue;
         best = rms;
         *lens = next;
@@ -294,7 +288,7 @@ class BoardCalibrator {
     const double rms = cv::stereoCalibrate(
         object, image[0], image[1], first.K, radtan() ? first.D : none[0], second.K,
         radtan() ? second.D : none[1], size(0), R, T, E, F, by_view,
-        refine ? cv::CALIB_USE_INTRINSIC_GUESS | k3_flag() : cv::CALIB_FIX_INTRINSIC, criteria());
+        refine ? cv::CALIB_USE_INTRINSIC_GUESS | k3_flag() : cv::CALIB_FIX_INTRINSIC, kStop);
     if (!std::isfinite(rms) || !cv::checkRange(R) || !cv::checkRange(T))
       refuse("the extrinsics are not finite; add views that both cameras see");
     if (camera == 1) s->rms = rms;

@@ -1,7 +1,4 @@
 #pragma once
-#include <array>
-#include <string>
-#include <vector>
 
 #include "app/checkerboard/board_pattern.hpp"
 #include "app/datasets/image_file.hpp"

@@ -26,20 +26,17 @@ std::string number_in(const fs::path& file) {
   return stem.empty() ? stem : fmt::format("{:0>20}", stem);
 }
 
-struct Grey {
-  std::vector<std::uint8_t> pixels;
-  ImageSize size;
-};
-
-ImageFileStatus read_grey(const fs::path& file, Grey* grey) {
+/// Reads a file into *pixels, without padding.
+ImageFileStatus read_grey(const fs::path& file, std::vector<std::uint8_t>* pixels,
+                          ImageSize* size) {
   std::vector<std::uint8_t> bytes;
   if (const auto status = read_image_file(file, &bytes); status != ImageFileStatus::ok)
     return status;
-  if (const auto status = read_image_size(bytes, &grey->size); status != ImageFileStatus::ok)
+  if (const auto status = read_image_size(bytes, size); status != ImageFileStatus::ok)
     return status;
-  const auto width = static_cast<std::size_t>(grey->size.width);
-  grey->pixels.resize(width * static_cast<std::size_t>(grey->size.height));
-  return decode_grey(bytes, grey->size, grey->pixels.data(), width);
+  const auto width = static_cast<std::size_t>(size->width);
+  pixels->resize(width * static_cast<std::size_t>(size->height));
+  return decode_grey(bytes, *size, pixels->data(), width);
 }
 
 }  // namespace
@@ -95,13 +92,12 @@ std::vector<std::vector<fs::path>> group_views(std::vector<std::vector<fs::path>
     return views;
   }
   if (!numbered || views.empty()) {
-    std::string counts;
-    for (const auto& files : cameras)
-      counts += (counts.empty() ? "" : ", ") + std::to_string(files.size());
+    std::vector<std::size_t> counts;
+    for (const auto& files : cameras) counts.push_back(files.size());
     throw InputError(
         fmt::format("the cameras have {} images, and the numbers in their names do not show which "
                     "belong together; give the images of a view the same number",
-                    counts));
+                    fmt::join(counts, ", ")));
   }
   for (const fs::path& file : alone)
     remarks->push_back(fmt::format(
@@ -115,25 +111,26 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
   const std::size_t cameras = views.empty() ? 0 : views.front().size();
   BoardImages images;
   images.sizes.resize(cameras);
-  Grey grey;
+  std::vector<std::uint8_t> grey;
+  ImageSize own;
   for (std::size_t v = 0; v < views.size(); ++v) {
     BoardView view;
     view.name = views[v][0].filename().string();
     std::vector<std::string> without;
     for (std::size_t k = 0; k < cameras; ++k) {
       const fs::path& file = views[v][k];
-      if (const auto status = read_grey(file, &grey); status != ImageFileStatus::ok) {
+      if (const auto status = read_grey(file, &grey, &own); status != ImageFileStatus::ok) {
         without.push_back(fmt::format("{} {}", file.string(), to_phrase(status)));
         continue;
       }
       ImageSize& size = images.sizes[k];
-      if (size.width == 0) size = grey.size;
-      if (grey.size != size)
+      if (size.width == 0) size = own;
+      if (own != size)
         throw InputError(
             fmt::format("{}: has {} x {} pixels, the images before it {} x {}; use images of one "
                         "size per camera",
-                        file.string(), grey.size.width, grey.size.height, size.width, size.height));
-      const ImageView pixels{grey.pixels.data(), size.width, size.height, size.width};
+                        file.string(), own.width, own.height, size.width, size.height));
+      const ImageView pixels{grey.data(), size.width, size.height, size.width};
       view.corners[k] = find_board(pixels, board, BoardSearch::thorough, view.corners[0]);
       if (view.corners[k].empty())
         without.push_back(fmt::format(

@@ -1,11 +1,7 @@
 #pragma once
-#include <filesystem>
 #include <functional>
-#include <string>
-#include <vector>
 
 #include "app/checkerboard/board_calibration.hpp"
-#include "app/datasets/image_file.hpp"
 
 /// Views of a calibration target from image files.
 namespace vergence::app {

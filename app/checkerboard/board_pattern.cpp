@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -23,23 +22,17 @@ constexpr double kNarrowest = 0.05, kWidest = 2;
 // Limits of the marker's side over the side of a square.
 constexpr double kSmallestMarker = 0.3, kLargestMarker = 0.95;
 
-bool parse_whole(std::string_view text, int* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
 /// A board whose size is a text like `9x6`: `parts` of `option`, `least` to `most` along each side.
 BoardPattern parse_size(BoardKind kind, const char* option, const char* parts,
                         std::string_view text, int least, int most, const char* example) {
-  BoardPattern board;
-  board.kind = kind;
-  const std::size_t x = text.find('x');
-  if (x == std::string_view::npos || !parse_whole(text.substr(0, x), &board.columns) ||
-      !parse_whole(text.substr(x + 1), &board.rows) ||
-      std::min(board.columns, board.rows) < least || std::max(board.columns, board.rows) > most)
+  const auto sides = parse_product(text);
+  if (!sides || std::ranges::min(*sides) < least || std::ranges::max(*sides) > most)
     throw InputError(
         fmt::format("{} is \"{}\"; write the {}, columns x rows, {} to {} each, like {}", option,
                     text.substr(0, 60), parts, least, most, example));
+  BoardPattern board;
+  board.kind = kind;
+  board.columns = static_cast<int>((*sides)[0]), board.rows = static_cast<int>((*sides)[1]);
   return board;
 }
 
@@ -69,6 +62,14 @@ void check_side(double square) {
 }
 
 }  // namespace
+
+std::optional<std::array<std::int64_t, 2>> parse_product(std::string_view text) {
+  const std::size_t x = std::min(text.find('x'), text.size());
+  const auto first = parse_integer(text.substr(0, x)),
+             second = parse_integer(text.substr(std::min(x + 1, text.size())));
+  if (!first || !second) return std::nullopt;
+  return {{*first, *second}};
+}
 
 std::size_t BoardPattern::corners() const noexcept {
   const std::size_t n = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -67,6 +68,9 @@ struct BoardCorner {
 
 /// Corners of a target in one image, by index without duplicates; empty if none.
 using BoardCorners = std::vector<BoardCorner>;
+
+/// Parses two whole numbers such as `9x6`; empty if the text is another.
+[[nodiscard]] std::optional<std::array<std::int64_t, 2>> parse_product(std::string_view text);
 
 /// Parses inner corners such as `9x6`; `square` is the side of a square in metres. Throws
 /// InputError unless these are two numbers from 3 to 100, not equal (a rotation by 90° would be

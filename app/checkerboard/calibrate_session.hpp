@@ -1,8 +1,4 @@
 #pragma once
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/checkerboard/board_calibration.hpp"
 #include "app/config/calibration_file.hpp"

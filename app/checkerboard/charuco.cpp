@@ -1,13 +1,10 @@
-#include "app/checkerboard/charuco.hpp"
+#include "app/checkerboard/board_detector.hpp"
 
 #include <algorithm>
 #include <limits>
-#include <vector>
 
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>
-
-#include "app/checkerboard/tag_corners.hpp"
 
 namespace vergence::app {
 namespace {
@@ -37,18 +34,6 @@ struct Markers {
   }
 };
 
-/// A marker that is seen twice is a reflection or another board: both are left out.
-Markers detect(const cv::Mat& image, const cv::Ptr<cv::aruco::Dictionary>& dictionary) {
-  Markers found, once;
-  cv::aruco::detectMarkers(image, dictionary, found.corners, found.ids);
-  for (std::size_t i = 0; i < found.ids.size(); ++i)
-    if (std::ranges::count(found.ids, found.ids[i]) == 1) {
-      once.ids.push_back(found.ids[i]);
-      once.corners.push_back(found.corners[i]);
-    }
-  return once;
-}
-
 /// Markers that lie as on OpenCV's board, and their residual; infinite if there are too few.
 double misfit(const Markers& markers, const cv::aruco::CharucoBoard& board, Markers* own) {
   std::vector<cv::Point2d> on_board, in_image;
@@ -71,7 +56,14 @@ BoardCorners find_charuco(const ImageView& image, const BoardPattern& board) {
   if (image.empty()) return {};
   const cv::Mat pixels = to_mat(image);
   const auto dictionary = cv::aruco::getPredefinedDictionary(static_cast<int>(board.dictionary));
-  const Markers all = detect(pixels, dictionary);
+  Markers found, all;
+  cv::aruco::detectMarkers(pixels, dictionary, found.corners, found.ids);
+  // A marker that is seen twice is a reflection or another board: both are left out.
+  for (std::size_t i = 0; i < found.ids.size(); ++i)
+    if (std::ranges::count(found.ids, found.ids[i]) == 1) {
+      all.ids.push_back(found.ids[i]);
+      all.corners.push_back(found.corners[i]);
+    }
   // OpenCV's board has its black square first. One that has a white square first is OpenCV's
   // without its first row.
   double least = std::numeric_limits<double>::infinity();

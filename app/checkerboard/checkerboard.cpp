@@ -1,12 +1,10 @@
-#include "app/checkerboard/checkerboard.hpp"
+#include "app/checkerboard/board_detector.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
-
-#include "app/checkerboard/tag_corners.hpp"
 
 namespace vergence::app {
 namespace {

@@ -1,14 +1,11 @@
 #include "app/checkerboard/conversion.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <span>
-#include <string_view>
-#include <utility>
+#include <limits>
 
 #include <fmt/format.h>
 
+#include "app/checkerboard/board_pattern.hpp"
 #include "app/config/calibration_checks.hpp"
 #include "app/recording/messages.hpp"
 #include "app/runtime/durable_file.hpp"
@@ -61,14 +58,13 @@ void check_pair(const CalibrationFile& calibration, const char* format, Remarks*
   remark_lost(calibration, format, remarks);
 }
 
-std::string ros_matrix(const char* key, int rows, int columns, std::span<const double> values) {
-  return fmt::format("{}:\n  rows: {}\n  cols: {}\n  data: {}\n", key, rows, columns,
-                     number_list(values));
-}
-
-std::string opencv_matrix(const char* key, int rows, int columns, std::span<const double> values) {
-  return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: {}\n", key,
-                     rows, columns, number_list(values));
+/// A matrix as ROS or OpenCV writes it.
+constexpr const char *kOfRos = "{}:\n  rows: {}\n  cols: {}\n  data: {}\n",
+                     *kOfOpenCv =
+                         "{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: {}\n";
+std::string matrix(const char* form, const char* key, int rows, int columns,
+                   std::span<const double> values) {
+  return fmt::format(fmt::runtime(form), key, rows, columns, number_list(values));
 }
 
 }  // namespace
@@ -76,15 +72,12 @@ std::string opencv_matrix(const char* key, int rows, int columns, std::span<cons
 namespace fs = std::filesystem;
 
 ImageSize parse_size(const std::string& text) {
-  ImageSize size;
-  const char *begin = text.data(), *end = begin + text.size();
-  const auto width = std::from_chars(begin, end, size.width);
-  const bool cross = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
-  const auto height = cross ? std::from_chars(width.ptr + 1, end, size.height) : width;
-  if (!cross || height.ec != std::errc() || height.ptr != end || size.width < 1 || size.height < 1)
+  constexpr std::int64_t kLargest = std::numeric_limits<int>::max();
+  const auto sides = parse_product(text);
+  if (!sides || std::ranges::min(*sides) < 1 || std::ranges::max(*sides) > kLargest)
     throw InputError("--size is \"" + text.substr(0, 60) +
                      "\"; write the image's width and height in pixels, like 640x480");
-  return size;
+  return {static_cast<int>((*sides)[0]), static_cast<int>((*sides)[1])};
 }
 
 CalibrationFormat format_of(const std::string& word, const std::string& out) {
@@ -117,23 +110,14 @@ WrittenFiles format_calibration_as(CalibrationFormat format, const std::string& 
   const std::string first = out.substr(0, comma), second = two ? out.substr(comma + 1) : "";
   if (two && (format == CalibrationFormat::vergence || format == CalibrationFormat::kalibr))
     throw InputError(fmt::format("{}: {} is one file; name one file", out, describe(format)));
-  switch (format) {
-    case CalibrationFormat::vergence:
-      return {{out, format_calibration(calibration)}};
-    case CalibrationFormat::kalibr:
-      return {{out, format_kalibr(calibration, remarks)}};
-    case CalibrationFormat::opencv:
-      break;
-    case CalibrationFormat::ros: {
-      const auto [left, right] = format_ros(calibration, remarks);
-      if (two) return {{first, left}, {second, right}};
-      return {{fs::path(out) / "left.yaml", left}, {fs::path(out) / "right.yaml", right}};
-    }
-  }
-  const std::string head = "%YAML:1.0\n---\n";
-  const auto [lenses, place] = format_opencv(calibration, remarks);
-  if (two) return {{first, head + lenses}, {second, head + place}};
-  return {{out, head + lenses + place}};
+  if (format == CalibrationFormat::vergence) return {{out, format_calibration(calibration)}};
+  if (format == CalibrationFormat::kalibr) return {{out, format_kalibr(calibration, remarks)}};
+  const bool ros = format == CalibrationFormat::ros;
+  auto [one, other] = ros ? format_ros(calibration, remarks) : format_opencv(calibration, remarks);
+  const std::string head = ros ? "" : "%YAML:1.0\n---\n";
+  if (two) return {{first, head + one}, {second, head + other}};
+  if (ros) return {{fs::path(out) / "left.yaml", one}, {fs::path(out) / "right.yaml", other}};
+  return {{out, head + one + other}};
 }
 
 Remarks convert_calibration(const ConversionRequest& request) {
@@ -207,11 +191,11 @@ std::array<std::string, 2> format_ros(const CalibrationFile& calibration, Remark
     const auto D = coefficients(lens);
     texts[k] = fmt::format("image_width: {}\nimage_height: {}\ncamera_name: {}\n", lens.width,
                            lens.height, double_quoted(calibration.names[k])) +
-               ros_matrix("camera_matrix", 3, 3, camera_matrix(lens)) +
+               matrix(kOfRos, "camera_matrix", 3, 3, camera_matrix(lens)) +
                fmt::format("distortion_model: {}\n", D.size() == 5 ? "plumb_bob" : "equidistant") +
-               ros_matrix("distortion_coefficients", 1, static_cast<int>(D.size()), D) +
-               ros_matrix("rectification_matrix", 3, 3, std::span(R.data(), 9)) +
-               ros_matrix("projection_matrix", 3, 4, std::span(P.data(), 12));
+               matrix(kOfRos, "distortion_coefficients", 1, static_cast<int>(D.size()), D) +
+               matrix(kOfRos, "rectification_matrix", 3, 3, std::span(R.data(), 9)) +
+               matrix(kOfRos, "projection_matrix", 3, 4, std::span(P.data(), 12));
   }
   return texts;
 }
@@ -225,14 +209,14 @@ std::array<std::string, 2> format_opencv(const CalibrationFile& calibration, Rem
                                    l.width, l.height, fisheye ? 1 : 0);
   for (std::size_t k = 0; k < 2; ++k) {
     const Intrinsics& lens = rig.intrinsics[k];
-    lenses += opencv_matrix(k == 0 ? "M1" : "M2", 3, 3, camera_matrix(lens));
-    lenses +=
-        opencv_matrix(k == 0 ? "D1" : "D2", fisheye ? 4 : 1, fisheye ? 1 : 5, coefficients(lens));
+    lenses += matrix(kOfOpenCv, k == 0 ? "M1" : "M2", 3, 3, camera_matrix(lens));
+    lenses += matrix(kOfOpenCv, k == 0 ? "D1" : "D2", fisheye ? 4 : 1, fisheye ? 1 : 5,
+                     coefficients(lens));
   }
   const Transform& T = rig.T_camera_left[1];
   const RowMajor3 R = T.R;
-  return {lenses, opencv_matrix("R", 3, 3, std::span(R.data(), 9)) +
-                      opencv_matrix("T", 3, 1, std::span(T.t.data(), 3))};
+  return {lenses, matrix(kOfOpenCv, "R", 3, 3, std::span(R.data(), 9)) +
+                      matrix(kOfOpenCv, "T", 3, 1, std::span(T.t.data(), 3))};
 }
 
 }  // namespace vergence::app

@@ -1,11 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "app/datasets/foreign_calibration.hpp"
 

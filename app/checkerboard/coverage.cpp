@@ -54,11 +54,10 @@ Coverage::Coverage(const BoardPattern& board, std::vector<std::string> names,
 
 void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) const {
   const ImageSize size = sizes_[camera];
-  std::array<int, kParts> parts{};
-  for (const BoardCorner& c : view.corners[camera]) {
+  Seen parts{};
+  for (const BoardCorner& c : view.corners[camera])
     ++parts[part_of(c.pixel.y() / size.height) * 3 + part_of(c.pixel.x() / size.width)];
-  }
-  for (std::size_t i = 0; i < kParts; ++i) seen->parts[i] = std::max(seen->parts[i], parts[i]);
+  for (std::size_t i = 0; i < kParts; ++i) (*seen)[i] = std::max((*seen)[i], parts[i]);
 }
 
 Coverage::Stand Coverage::pose_bin(const BoardView& view) const {
@@ -111,7 +110,7 @@ bool Coverage::brings_something(const BoardView& view) const {
     Seen more = seen_[k];
     count(view, k, &more);
     for (std::size_t i = 0; i < kParts; ++i)
-      if (seen_[k].parts[i] < kEnoughCorners && more.parts[i] >= kEnoughCorners) return true;
+      if (seen_[k][i] < kEnoughCorners && more[i] >= kEnoughCorners) return true;
   }
   const Stand stand = pose_bin(view);
   for (std::size_t i = 0; i < kTilts; ++i)
@@ -125,7 +124,7 @@ std::vector<std::string> Coverage::needs() const {
   for (std::size_t k = 0; k < seen_.size(); ++k) {
     std::vector<std::string> parts;
     for (std::size_t i = 0; i < kParts; ++i)
-      if (seen_[k].parts[i] < kEnoughCorners) parts.emplace_back(kPartNames[i]);
+      if (seen_[k][i] < kEnoughCorners) parts.emplace_back(kPartNames[i]);
     if (parts.size() == kParts)
       needs.push_back(names_[k] + ": every part of the image");
     else if (!parts.empty())
@@ -155,10 +154,9 @@ ViewCollector::ViewCollector(Coverage coverage, double image_width_px)
       elsewhere_px_(kElsewhereOfWidth * image_width_px) {}
 
 bool ViewCollector::still(const BoardView& seen) const {
-  for (std::size_t k = 0; k < seen.corners.size(); ++k) {
-    if (seen.corners[k].empty()) continue;
-    if (mean_distance(last_.corners[k], seen.corners[k]) > still_px_) return false;
-  }
+  for (std::size_t k = 0; k < seen.corners.size(); ++k)
+    if (!seen.corners[k].empty() && mean_distance(last_.corners[k], seen.corners[k]) > still_px_)
+      return false;
   return true;
 }
 

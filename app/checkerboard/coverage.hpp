@@ -1,12 +1,6 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "app/checkerboard/board_calibration.hpp"
-#include "app/datasets/image_file.hpp"
 
 namespace vergence::app {
 
@@ -34,10 +28,8 @@ class Coverage {
 
  private:
   static constexpr std::size_t kParts = 9, kTilts = 4;
-  struct Seen {
-    // Maximum number of corners in a part, over the views.
-    std::array<int, kParts> parts{};
-  };
+  /// Maximum number of corners in each part of an image, over the views.
+  using Seen = std::array<int, kParts>;
   /// Pose of the target in front of camera 0.
   struct Stand {
     // Largest share of the image's width or height.

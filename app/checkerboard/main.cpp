@@ -7,7 +7,6 @@
 #include "app/checkerboard/calibrate_session.hpp"
 #include "app/checkerboard/conversion.hpp"
 #include "app/command_line/calibrate_options.hpp"
-#include "app/command_line/program.hpp"
 
 namespace vergence::app {
 namespace {

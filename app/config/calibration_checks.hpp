@@ -22,6 +22,10 @@ struct ValidationError {
 /// element of RᵀR − I) is replaced by the nearest valid one; a larger error is reported.
 [[nodiscard]] std::optional<ValidationError> find_implausible(RigCalibration* rig);
 
+/// Message fragment about an invalid covariance: a non-finite number, a negative variance, or not
+/// positive semidefinite beyond the rounding to nine digits.
+[[nodiscard]] std::optional<std::string> find_flaw(const RigCovariance& covariance);
+
 /// Text such as "the baseline is 0.1101 m", for a check by the user.
 [[nodiscard]] std::string baseline_message(const RigCalibration& rig);
 /// Question about the unit of an unusual length, above 2 m or below 2 cm; empty otherwise.

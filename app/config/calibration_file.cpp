@@ -1,22 +1,135 @@
 #include "app/config/calibration_file.hpp"
 
+#include <array>
+#include <limits>
+
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
-#include <cctype>
-#include <limits>
-#include <span>
-
-#include <fmt/format.h>
-
 #include "app/config/calibration_checks.hpp"
-#include "app/config/calibration_covariance.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
-
 namespace {
+
+// ---- group `covariance`: the joint covariance of a rig's parameters. `parameters` names the rows
+// by camera and parameter (`right.rx`, `left.k1`), `upper` has the upper triangle row by row. Names
+// that two cameras share are numbered. Rotations in rad and translations in m are left
+// perturbations; intrinsics are in px or without unit.
+
+constexpr std::array kPlaceNames{"rx", "ry", "rz", "tx", "ty", "tz"};
+constexpr std::array kRadtanNames{"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
+constexpr std::array kEquidistantNames{"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
+
+struct NamedRow {
+  std::string name;
+  int row = 0;
+};
+
+/// Every parameter of the rig, in the order of the rows.
+std::vector<NamedRow> make_rows(const CalibrationFile& c) {
+  const std::vector<std::string> cameras =
+      distinct_names({c.names.begin(), c.names.begin() + c.rig.cameras});
+  std::vector<NamedRow> rows;
+  const auto append = [&](std::size_t k, std::span<const char* const> names, int row) {
+    for (const char* name : names) rows.push_back({cameras[k] + "." + name, row++});
+  };
+  for (std::size_t k = 1; k < cameras.size(); ++k)
+    append(k, kPlaceNames, extrinsic_row(static_cast<int>(k)));
+  for (std::size_t k = 0; k < cameras.size(); ++k)
+    if (c.rig.intrinsics[k].kind == CameraModelKind::pinhole_radtan)
+      append(k, kRadtanNames, intrinsic_row(static_cast<int>(k)));
+    else
+      append(k, kEquidistantNames, intrinsic_row(static_cast<int>(k)));
+  return rows;
+}
+
+/// The rows that a list of names stands for.
+std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
+                                const CalibrationFile& calibration) {
+  const std::string field = "covariance.parameters";
+  const std::vector<NamedRow> known = make_rows(calibration);
+  if (!list.IsSequence() || list.size() == 0)
+    file.fail(list, field + " is not a list of parameters, like right.rx or left.k1");
+  std::vector<NamedRow> rows;
+  for (const auto& item : list) {
+    const std::string name = file.text(item, field);
+    const auto found = std::ranges::find(known, name, &NamedRow::name);
+    if (found == known.end()) {
+      std::vector<std::string> names;
+      for (const NamedRow& row : known) names.push_back(row.name);
+      file.fail(item, "{} has \"{}\", which is not a parameter of this rig{}", field,
+                name.substr(0, 60), did_you_mean(name, names));
+    }
+    if (std::ranges::find(rows, found->row, &NamedRow::row) != rows.end())
+      file.fail(item, "{} has {} twice; remove one", field, name);
+    rows.push_back(*found);
+  }
+  return rows;
+}
+
+/// Empty if no covariance is known.
+std::string format_covariance(const CalibrationFile& calibration) {
+  const RigCovariance& C = calibration.rig.covariance;
+  std::vector<NamedRow> rows = make_rows(calibration);
+  std::erase_if(rows, [&C](const NamedRow& r) { return !C.known(r.row); });
+  if (rows.empty()) return {};
+  std::vector<std::string> names;
+  std::string upper;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    names.push_back(yaml_scalar(rows[i].name));
+    // A line a row: a person finds the variance of a parameter at the start of its own.
+    upper += i == 0 ? "\n    " : ",\n    ";
+    for (std::size_t j = i; j < rows.size(); ++j)
+      upper += fmt::format("{}{}", j == i ? "" : ", ", C(rows[i].row, rows[j].row));
+  }
+  return fmt::format(
+      "covariance:  # of all parameters together, wide; rad, m, px\n  parameters: [{}]\n  upper: "
+      "[{}]\n",
+      fmt::join(names, ", "), upper);
+}
+
+/// Names, camera models and the number of cameras must be read before.
+void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationFile* calibration) {
+  file.check_keys(group, "covariance", {"parameters", "upper"});
+  for (const char* key : {"parameters", "upper"})
+    if (!group[key])
+      file.fail(group, "covariance.{} is missing; add it, or remove the block `covariance`", key);
+  const std::vector<NamedRow> rows = read_rows(file, group["parameters"], *calibration);
+  const std::size_t n = rows.size(), count = n * (n + 1) / 2;
+  const std::vector<double> upper = file.numbers(group["upper"], "covariance.upper", count, count);
+  auto next = upper.begin();
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(*next > 0))
+      file.fail(group["upper"],
+                "covariance.upper has {:g} as the variance of {}; it "
+                "must be positive (upper triangle, row by row)",
+                *next, rows[i].name);
+    for (std::size_t j = i; j < n; ++j)
+      calibration->rig.covariance.set(rows[i].row, rows[j].row, *next++);
+  }
+}
+
+/// Scales the rows and columns of translations by a factor.
+void scale_lengths(double factor, RigCovariance* covariance) {
+  std::array<double, kRigSize> by;
+  by.fill(1);
+  for (int k = 1; k < kMaxCameras; ++k) std::fill_n(by.begin() + extrinsic_row(k) + 3, 3, factor);
+  for (int i = 0; i < kRigSize; ++i)
+    for (int j = 0; j <= i; ++j)
+      covariance->set(
+          i, j,
+          (*covariance)(i, j) * by[static_cast<std::size_t>(i)] * by[static_cast<std::size_t>(j)]);
+}
+
+/// Removes the covariance of the extrinsics and keeps that of the intrinsics.
+void clear_places(RigCovariance* covariance) {
+  for (int i = 0; i < kExtrinsicsSize; ++i)
+    for (int j = 0; j < kRigSize; ++j) covariance->set(i, j, 0);
+}
+
+// ---- the file
 
 constexpr std::int64_t kVersion = 1;
 constexpr const char* kRadtan = "pinhole-radtan";
@@ -34,11 +147,6 @@ class Section {
   }
 
   [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
-  /// False: the key is not there, or stands for no values: nothing behind it, or `[]`.
-  [[nodiscard]] bool gives(const char* key) const {
-    const YAML::Node node = node_[key];
-    return node && !node.IsNull() && !(node.IsSequence() && node.size() == 0);
-  }
   [[nodiscard]] std::string field(const char* key) const {
     return name_.empty() ? key : name_ + "." + key;
   }
@@ -61,12 +169,13 @@ class Section {
                                             std::size_t most) const {
     return file_.numbers(need(key), field(key), least, most);
   }
-  /// A list that may be left out, then zeros.
+  /// A list that may be left out or empty; *values is then unchanged.
   template <std::size_t N>
-  void optional_numbers(const char* key, std::array<double, N>* values) const {
-    if (!has(key)) return;
-    const auto given = numbers(key, N, N);
-    std::ranges::copy(given, values->begin());
+  void optional_numbers(const char* key, std::array<double, N>* values, std::size_t least = N,
+                        std::size_t most = N) const {
+    const YAML::Node node = node_[key];
+    if (node && !node.IsNull() && !(node.IsSequence() && node.size() == 0))
+      std::ranges::copy(numbers(key, least, most), values->begin());
   }
 
  private:
@@ -74,10 +183,6 @@ class Section {
   YAML::Node node_;
   std::string name_;
 };
-
-std::size_t max_coefficients(const Intrinsics& k) {
-  return k.kind == CameraModelKind::pinhole_radtan ? 5 : 4;
-}
 
 Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   // The allowed range of a size is checked with the other values.
@@ -94,60 +199,31 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   if (word == kEquidistant)
     k.kind = CameraModelKind::pinhole_equidistant;
   else if (word != kRadtan)
-    file.fail(model, fmt::format("{} is \"{}\"; use {} or {}", camera.field("model"),
-                                 word.substr(0, 60), kRadtan, kEquidistant));
+    file.fail(model, "{} is \"{}\"; use {} or {}", camera.field("model"), word.substr(0, 60),
+              kRadtan, kEquidistant);
 
   const auto f = camera.numbers("intrinsics", 4, 4);
   k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
-  if (camera.gives("distortion")) {
-    const auto d = camera.numbers("distortion", 4, max_coefficients(k));
-    std::ranges::copy(d, k.distortion.begin());
-  }
+  const std::size_t most = k.kind == CameraModelKind::pinhole_radtan ? 5 : 4;
+  camera.optional_numbers("distortion", &k.distortion, 4, most);
   camera.optional_numbers("intrinsics_sigma", &k.sigma);
-  if (camera.has("distortion_sigma")) {
-    const auto sigma = camera.numbers("distortion_sigma", 4, max_coefficients(k));
-    std::ranges::copy(sigma, k.distortion_sigma.begin());
-  }
+  camera.optional_numbers("distortion_sigma", &k.distortion_sigma, 4, most);
   return k;
-}
-
-Transform read_transform(const Section& camera) {
-  const auto n = camera.numbers("T_camera_left", 12, 12);
-  Transform T;
-  T.R << n[0], n[1], n[2], n[4], n[5], n[6], n[8], n[9], n[10];
-  T.t << n[3], n[7], n[11];
-  return T;
-}
-
-Mat6 read_wide_covariance(const Section& camera) {
-  Mat6 covariance = Mat6::Zero();
-  if (!camera.has("covariance_total")) return covariance;
-  const auto n = camera.numbers("covariance_total", kTriangle, kTriangle);
-  auto next = n.begin();
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) covariance(i, j) = covariance(j, i) = *next++;
-  return covariance;
 }
 
 void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
                  const CalibrationUse& use, CalibrationFile* calibration) {
-  std::vector<std::string> known{"name",
-                                 "serial",
-                                 "size",
-                                 "model",
-                                 "intrinsics",
-                                 "distortion",
-                                 "intrinsics_sigma",
-                                 "distortion_sigma"};
+  std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion"};
+  known.insert(known.end(), {"intrinsics_sigma", "distortion_sigma"});
   if (k > 0)
     known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_total", "covariance_total"});
   // Other programs write the inverse, for which the nearest key would be suggested.
   for (const char* inverse : {"T_left_camera", "T_left_right"})
     if (node.IsMap() && node[inverse])
       file.fail(node[inverse],
-                fmt::format("cameras.{}.{} is the inverse of T_camera_left; invert it to [R^T, "
-                            "-R^T t], so that X_camera = R X_left + t",
-                            k, inverse));
+                "cameras.{}.{} is the inverse of T_camera_left; invert it to [R^T, "
+                "-R^T t], so that X_camera = R X_left + t",
+                k, inverse);
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
   calibration->names[k] = camera.text("name", calibration->names[k]);
@@ -157,10 +233,17 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
   if (!camera.has("T_camera_left"))
     file.fail(node, camera.field("T_camera_left") +
                         " is missing; add it, or use --from-scratch to estimate it");
-  rig.T_camera_left[k] = read_transform(camera);
+  const auto T = camera.numbers("T_camera_left", 12, 12);
+  rig.T_camera_left[k].R << T[0], T[1], T[2], T[4], T[5], T[6], T[8], T[9], T[10];
+  rig.T_camera_left[k].t << T[3], T[7], T[11];
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_total", &rig.sigma_total[k]);
-  rig.covariance_total[k] = read_wide_covariance(camera);
+  std::array<double, kTriangle> upper{};
+  camera.optional_numbers("covariance_total", &upper);
+  auto next = upper.begin();
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j)
+      rig.covariance_total[k](i, j) = rig.covariance_total[k](j, i) = *next++;
 }
 
 void read_found(const YamlFile& file, const YAML::Node& node, CalibrationFile* calibration) {
@@ -197,11 +280,9 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
                     {"version", "rig", "cameras", "covariance", "found", "configured"});
   if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000);
       version != kVersion)
-    file.fail(
-        top.need("version"),
-        fmt::format(
-            "version is {}; this program reads version {}; use the program that wrote the file",
-            version, kVersion));
+    file.fail(top.need("version"),
+              "version is {}; this program reads version {}; use the program that wrote the file",
+              version, kVersion);
 
   CalibrationFile calibration;
   RigCalibration& rig = calibration.rig;
@@ -209,8 +290,7 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (!cameras.IsSequence())
     file.fail(cameras, "cameras is not a list; begin each camera with `- `");
   if (cameras.size() < 2 || cameras.size() > kMaxCameras)
-    file.fail(cameras, fmt::format("cameras lists {} cameras; a rig has 2 to {}", cameras.size(),
-                                   kMaxCameras));
+    file.fail(cameras, "cameras lists {} cameras; a rig has 2 to {}", cameras.size(), kMaxCameras);
   rig.cameras = static_cast<int>(cameras.size());
   for (std::size_t k = 0; k < cameras.size(); ++k)
     read_camera(file, cameras[k], k, use, &calibration);

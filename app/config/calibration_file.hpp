@@ -1,12 +1,7 @@
 #pragma once
-#include <yaml-cpp/node/node.h>
 
-#include <array>
-#include <filesystem>
 #include <map>
 #include <optional>
-#include <string>
-#include <string_view>
 
 #include "app/config/yaml_file.hpp"
 #include "core/types/calibration.hpp"

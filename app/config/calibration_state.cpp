@@ -31,13 +31,6 @@ std::string folder_name(const std::string& rig_name) {
   return name;
 }
 
-/// An absolute path from the environment, as the XDG rules want; nothing for any other.
-std::optional<std::filesystem::path> environment_folder(const char* variable) {
-  const char* value = std::getenv(variable);
-  if (value == nullptr || value[0] != '/') return std::nullopt;
-  return std::filesystem::path(value);
-}
-
 /// Why a calibration was found under another configuration; empty: it was not.
 std::string other_configuration(const CalibrationFile& found, const CalibrationFile& expected) {
   if (!found.configured) return "the configuration it was found with is not recorded";
@@ -98,10 +91,10 @@ std::map<std::string, std::string> configured_rig(const Configuration& configura
 std::optional<std::filesystem::path> state_file(const RigSettings& rig) {
   if (rig.state_dir == "none") return std::nullopt;
   if (!rig.state_dir.empty()) return std::filesystem::path(rig.state_dir) / kFileName;
-  const std::filesystem::path below =
-      std::filesystem::path("vergence") / folder_name(rig.name) / kFileName;
-  if (const auto state = environment_folder("XDG_STATE_HOME")) return *state / below;
-  if (const auto home = environment_folder("HOME")) return *home / ".local" / "state" / below;
+  for (const auto& [variable, below] : {std::pair{"XDG_STATE_HOME", ""}, {"HOME", ".local/state"}})
+    // The XDG rules require absolute paths.
+    if (const char* folder = std::getenv(variable); folder != nullptr && folder[0] == '/')
+      return std::filesystem::path(folder) / below / "vergence" / folder_name(rig.name) / kFileName;
   return std::nullopt;
 }
 

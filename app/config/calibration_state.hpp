@@ -1,8 +1,4 @@
 #pragma once
-#include <filesystem>
-#include <map>
-#include <optional>
-#include <string>
 
 #include "app/config/calibration_file.hpp"
 #include "app/config/configuration.hpp"

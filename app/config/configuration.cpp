@@ -2,14 +2,11 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <charconv>
 #include <map>
 #include <set>
 #include <sstream>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "app/config/schema.hpp"
 #include "app/config/yaml_file.hpp"
@@ -96,12 +93,6 @@ void add_argument(const std::string& argument, std::vector<Entry>* entries) {
   flatten(file, file.root(), name, origin, entries);
 }
 
-bool is_group(const std::string& name) {
-  const auto& groups = schema();
-  return std::ranges::any_of(groups,
-                             [&](const Group& g) { return !g.name.empty() && g.name == name; });
-}
-
 const Key* find_key(const std::string& name) {
   for (const Group& group : schema())
     for (const Key& key : group.keys)
@@ -149,28 +140,21 @@ std::string suggestion(const std::string& name) {
                    (why.empty() ? suggestion(entry.name) : why));
 }
 
-/// The rest of a message "it must be …".
-std::string allowed(const Key& key) {
-  const std::string range = range_text(key);
-  return range.rfind("from ", 0) == 0 ? range + " on" : "in " + range;
-}
-
-std::string with_unit(const Key& key) { return key.unit.empty() ? "" : " " + key.unit; }
-
 template <class Number>
 Number parse_number(const Entry& entry, const Key& key, const char* kind) {
   Number value{};
   const char* end = entry.value.data() + entry.value.size();
   const auto [stop, error] = std::from_chars(entry.value.data(), end, value);
-  if (error != std::errc() || stop != end)
-    throw InputError(fmt::format("{}: {} is \"{}\", not {}; it must be {}{}", entry.origin,
-                                 key.name, entry.value.substr(0, 60), kind, allowed(key),
-                                 with_unit(key)));
+  const bool parsed = error == std::errc() && stop == end;
   // Written so that a NaN is refused.
-  if (!(static_cast<double>(value) >= key.least && static_cast<double>(value) <= key.most))
-    throw InputError(fmt::format("{}: {} is {}; it must be {}{}", entry.origin, key.name,
-                                 entry.value.substr(0, 60), allowed(key), with_unit(key)));
-  return value;
+  if (parsed && static_cast<double>(value) >= key.least && static_cast<double>(value) <= key.most)
+    return value;
+  const std::string range = range_text(key);
+  throw InputError(fmt::format("{}: {} is \"{}\"{}; it must be {}{}{}", entry.origin, key.name,
+                               entry.value.substr(0, 60),
+                               parsed ? "" : fmt::format(", not {}", kind),
+                               range.starts_with("from ") ? range + " on" : "in " + range,
+                               key.unit.empty() ? "" : " ", key.unit));
 }
 
 /// Maps YAML 1.1 booleans to the keywords on and off.
@@ -185,7 +169,8 @@ std::string as_switch(const std::string& value, const std::vector<std::string>& 
 }
 
 void apply(const Entry& entry, Configuration* configuration) {
-  if (is_group(entry.name)) {
+  if (!entry.name.empty() &&
+      std::ranges::find(schema(), entry.name, &Group::name) != schema().end()) {
     if (entry.scalar && !entry.value.empty())
       throw InputError(
           entry.origin + ": " + entry.name +
@@ -304,20 +289,16 @@ std::vector<Entry> with_preset(std::vector<Entry> entries) {
   return all;
 }
 
-Configuration from_entries(const std::vector<Entry>& given, const std::string& name) {
-  Configuration configuration;
-  for (const Entry& entry : with_preset(with_record_as_switches(with_groups_as_text(given))))
-    apply(entry, &configuration);
-  if (const std::string message = find_contradiction(configuration); !message.empty())
-    throw InputError(name + ": " + message);
-  return configuration;
-}
-
 Configuration load(const std::optional<YamlFile>& file, const std::vector<std::string>& set) {
   std::vector<Entry> entries;
   if (file) add_file(*file, &entries);
   for (const std::string& argument : set) add_argument(argument, &entries);
-  return from_entries(entries, file ? file->name() : "--set");
+  Configuration configuration;
+  for (const Entry& entry : with_preset(with_record_as_switches(with_groups_as_text(entries))))
+    apply(entry, &configuration);
+  if (const std::string message = find_contradiction(configuration); !message.empty())
+    throw InputError((file ? file->name() : "--set") + ": " + message);
+  return configuration;
 }
 
 }  // namespace

@@ -1,21 +1,12 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <filesystem>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "app/runtime/realtime.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/options.hpp"
 #include "core/odometry/options.hpp"
-#include "core/types/calibration.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/mock/world/kinds.hpp"
-#include "drivers/options/options.hpp"
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger_board/options.hpp"
 #include "drivers/xsens/options.hpp"

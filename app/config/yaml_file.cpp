@@ -1,6 +1,5 @@
 #include "app/config/yaml_file.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
@@ -11,7 +10,6 @@
 #include <sstream>
 #include <system_error>
 
-#include <fmt/format.h>
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
@@ -22,24 +20,23 @@ namespace vergence::app {
 namespace {
 
 std::string contents(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status))
-    throw InputError(path.string() + ": no such file; check the path");
-  if (std::filesystem::is_directory(status))
-    throw InputError(path.string() + ": is a directory; name a YAML file");
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
   // Reading a pipe would block indefinitely.
-  if (!std::filesystem::is_regular_file(status))
-    throw InputError(path.string() + ": is a pipe or a device; name a YAML file");
+  const char* why = !std::filesystem::exists(status)        ? "no such file; check the path"
+                    : std::filesystem::is_directory(status) ? "is a directory; name a YAML file"
+                    : !std::filesystem::is_regular_file(status)
+                        ? "is a pipe or a device; name a YAML file"
+                        : nullptr;
+  if (why != nullptr) throw InputError(path.string() + ": " + why);
+  std::string text(kLargestYaml + 1, '\0');
   errno = 0;
   std::ifstream in(path, std::ios::binary);
-  if (!in)
-    throw InputError(path.string() +
-                     ": cannot be opened; check its permissions: " + std::strerror(errno));
-  std::string text(kLargestYaml + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad())
-    throw InputError(path.string() + ": cannot be read; check its disk: " + std::strerror(errno));
+  // A file that is not open is not at its end.
+  if (!in && !in.eof())
+    throw InputError(path.string() + ": cannot be read; check its permissions and its disk: " +
+                     std::strerror(errno));
   text.resize(static_cast<std::size_t>(in.gcount()));
   if (text.size() > kLargestYaml)
     throw InputError(fmt::format("{}: is larger than {} bytes; check that it is the right file",
@@ -107,20 +104,9 @@ std::string is_value(const YAML::Node& node) {
   return node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\"" : " is a list or a group";
 }
 
-/// Line `number` of a text, counted from 0; empty after the last one.
-std::string line_of(const std::string& text, int number) {
-  std::istringstream in(text);
-  std::string line;
-  for (int i = 0; i <= number && std::getline(in, line); ++i) {
-  }
-  return in ? line : std::string();
-}
-
 /// Explains an error of yaml-cpp, whose own words name the grammar's rules, and the usual fix.
 std::string explain(const YAML::Exception& error, const std::string& text) {
-  struct Explanation {
-    std::string_view message, meaning;
-  };
+  using Explanation = std::pair<std::string_view, std::string_view>;
   constexpr std::string_view kIndentation =
       "the indentation does not match the lines above; indent the keys of a group, and the items "
       "of a list, by the same number of spaces";
@@ -144,14 +130,16 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
                   "a value begins with a character that YAML reserves, such as @ or %; put the "
                   "value in quotes"}};
   if (!error.mark.is_null()) {
-    const std::string line = line_of(text, error.mark.line);
+    std::istringstream lines(text);
+    std::string line;
+    for (int i = 0; i <= error.mark.line; ++i) std::getline(lines, line);
     if (line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos)
       return "the line is indented by a tab; use spaces";
   }
   const auto* const known = std::ranges::find_if(
-      kExplanations, [&](const Explanation& e) { return e.message == error.msg; });
+      kExplanations, [&](const Explanation& e) { return e.first == error.msg; });
   return known != kExplanations.end()
-             ? std::string(known->meaning)
+             ? std::string(known->second)
              : error.msg + "; check indentation, quotes, brackets and the space after each colon";
 }
 
@@ -195,10 +183,10 @@ void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
       fail(item.first, what + " has a list or a group as a key; write `key: value`");
     const std::string& key = item.first.Scalar();
     if (std::ranges::find(known, key) == known.end())
-      fail(item.first, fmt::format("{} has the unknown key \"{}\"{}", what, shown(key),
-                                   did_you_mean(key, known)));
+      fail(item.first, "{} has the unknown key \"{}\"{}", what, shown(key),
+           did_you_mean(key, known));
     if (std::ranges::find(seen, key) != seen.end())
-      fail(item.first, fmt::format("{} has the key \"{}\" twice; remove one", what, key));
+      fail(item.first, "{} has the key \"{}\" twice; remove one", what, key);
     seen.push_back(key);
   }
 }
@@ -216,7 +204,7 @@ std::int64_t YamlFile::integer(const YAML::Node& node, const std::string& field,
   if (!node.IsScalar() || !parse_whole(node.Scalar(), &value))
     fail(node, field + is_value(node) + ", not an integer");
   if (value < least || value > most)
-    fail(node, fmt::format("{} is {}; it must be in {} … {}", field, value, least, most));
+    fail(node, "{} is {}; it must be in {} … {}", field, value, least, most);
   return value;
 }
 
@@ -231,10 +219,9 @@ std::vector<double> YamlFile::numbers(const YAML::Node& node, const std::string&
                                       std::size_t least, std::size_t most) const {
   const std::string requested =
       least == most ? std::to_string(least) : fmt::format("{} to {}", least, most);
-  if (!node.IsSequence())
-    fail(node, fmt::format("{} is not a list of {} numbers", field, requested));
+  if (!node.IsSequence()) fail(node, "{} is not a list of {} numbers", field, requested);
   if (node.size() < least || node.size() > most)
-    fail(node, fmt::format("{} has {} numbers; it needs {}", field, node.size(), requested));
+    fail(node, "{} has {} numbers; it needs {}", field, node.size(), requested);
   std::vector<double> values;
   values.reserve(node.size());
   for (const auto& item : node) values.push_back(number(item, field));

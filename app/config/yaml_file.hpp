@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include <fmt/format.h>
 #include <yaml-cpp/node/node.h>
 
 namespace vergence::app {
@@ -24,6 +25,12 @@ class YamlFile {
   [[nodiscard]] std::string at(const YAML::Node& node) const;
   /// Throws InputError: `file:line: message`.
   [[noreturn]] void fail(const YAML::Node& node, const std::string& message) const;
+  /// Same with a formatted message.
+  template <class First, class... Rest>
+  [[noreturn]] void fail(const YAML::Node& node, fmt::format_string<First, Rest...> message,
+                         First&& first, Rest&&... rest) const {
+    fail(node, fmt::format(message, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
 
   /// Refuses anything but a map, duplicate keys and unknown keys, naming the nearest known one.
   /// `what` names the owner of the keys, such as `camera 1`.

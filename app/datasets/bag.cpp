@@ -1,12 +1,6 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
-#include <span>
 
-#include <fmt/format.h>
-
-#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
@@ -90,10 +84,9 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
   if (!requested.left.empty() && !requested.right.empty()) return {requested.left, requested.right};
   std::vector<std::string> names;
   for (const auto& [name, topic] : bag.images) {
-    const std::string small = lower(name);
-    const bool of_a_camera = small.find("depth") == std::string::npos &&
-                             small.find("disparity") == std::string::npos &&
-                             small.find("confidence") == std::string::npos;
+    const bool of_a_camera = std::ranges::none_of(
+        std::array{"depth", "disparity", "confidence"},
+        [small = lower(name)](const char* word) { return small.find(word) != std::string::npos; });
     if (!topic.messages.empty() && of_a_camera) names.push_back(name);
   }
   std::vector<Topics> best;
@@ -101,9 +94,9 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
     if ((!requested.left.empty() && pair[0] != requested.left) ||
         (!requested.right.empty() && pair[1] != requested.right))
       continue;
-    if (!best.empty() && merit(bag, pair, given) > merit(bag, best.front(), given)) best.clear();
-    if (best.empty() || merit(bag, pair, given) == merit(bag, best.front(), given))
-      best.push_back(pair);
+    const int better = best.empty() ? 0 : merit(bag, pair, given) - merit(bag, best.front(), given);
+    if (better > 0) best.clear();
+    if (better >= 0) best.push_back(pair);
   }
   if (best.size() == 1) return best.front();
   refuse(path, 0,
@@ -131,40 +124,25 @@ std::vector<Stamp> recorded(const std::vector<BagImage>& images) {
   return log;
 }
 
-/// Median delay by which right images were recorded later than their stamps and the left images
-/// imply.
-Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
-                        std::span<const std::array<std::size_t, 2>> pairs) {
-  const std::array log{recorded(images[0]), recorded(images[1])};
-  return log[0].empty() || log[1].empty() ? Duration{} : pair_offset(log[0], log[1], pairs).median;
-}
-
-/// Pairs by the nearest recording times; empty if these do not decide.
-std::vector<std::array<std::size_t, 2>> pair_by_recording(
-    const std::array<std::vector<BagImage>, 2>& images, Duration interval) {
-  // The share of the interval keeps clear of both neighbours.
-  constexpr double kNear = 0.25;
-  auto pairs = pair_nearest(recorded(images[0]), recorded(images[1]),
-                            Duration::seconds(kNear * interval.to_seconds()));
-  if (2 * pairs.size() < std::min(images[0].size(), images[1].size())) pairs.clear();
-  return pairs;
-}
-
 /// Pairs images by the nearest stamps and adds remarks about their distance. If the stamps do not
 /// determine the pairs, the recording times do.
 std::vector<std::array<std::size_t, 2>> pair_images(
     const fs::path& path, const Topics& topics, const std::array<std::vector<BagImage>, 2>& images,
     StereoSequence* sequence) {
-  constexpr double kHalf = 0.5;
-  const std::array stamps{collect_stamps(images[0]), collect_stamps(images[1])};
+  // Shares of the interval. The one of recording times keeps clear of both neighbours.
+  constexpr double kHalf = 0.5, kNear = 0.25;
+  const std::array stamps{collect_stamps(images[0]), collect_stamps(images[1])},
+      log{recorded(images[0]), recorded(images[1])};
   const Duration interval = usual_interval(stamps[0]);
   const Duration most = Duration::seconds(kMaxApart * interval.to_seconds());
   const auto near =
       pair_nearest(stamps[0], stamps[1], Duration::seconds(kHalf * interval.to_seconds()));
   const PairOffset offset = pair_offset(stamps[0], stamps[1], near);
   const bool ambiguous = near.empty() || std::max(offset.median, -offset.median) > most;
-  auto pairs =
-      ambiguous ? pair_by_recording(images, interval) : pair_nearest(stamps[0], stamps[1], most);
+  auto pairs = ambiguous
+                   ? pair_nearest(log[0], log[1], Duration::seconds(kNear * interval.to_seconds()))
+                   : pair_nearest(stamps[0], stamps[1], most);
+  if (ambiguous && 2 * pairs.size() < std::min(images[0].size(), images[1].size())) pairs.clear();
   if (pairs.empty() && !near.empty())
     refuse(path, 0,
            "{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the association of "
@@ -184,7 +162,10 @@ std::vector<std::array<std::size_t, 2>> pair_images(
   const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
   sequence->left_out += alone;
   remark_pairs(topics[0], topics[1], kept, interval, alone, &sequence->remarks);
-  const Duration late = recorded_later(images, pairs) - kept.median;
+  // By how much later right images were recorded than their stamps and the left images imply.
+  const Duration late = log[0].empty() || log[1].empty()
+                            ? -kept.median
+                            : pair_offset(log[0], log[1], pairs).median - kept.median;
   if (std::max(late, -late) > most && !ambiguous)
     sequence->remarks.push_back(fmt::format(
         "the images of a pair of {} and {} were recorded {:.3g} ms further apart than their "
@@ -258,46 +239,27 @@ void remark_left_out(const std::string& name, const BagTopic<Reading>& topic,
       name, topic.unreadable, topic.backwards));
 }
 
-Eigen::Quaterniond to_quaternion(const RosAttitude& a) {
-  const auto& q = a.q_world_body;
-  return {q[3], q[0], q[1], q[2]};
-}
-
-void set_attitude(const Eigen::Quaterniond& q, InsSample* s) {
-  s->q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
-  s->attitude_valid = true;
-}
-
 /// Interpolates the orientation at the fix's time. *next is the index of the first orientation that
 /// is not before the previous fix, and is advanced to this one. Returns false if none is near.
-bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, InsRecord* r) {
-  const Stamp stamp = r->sample.stamp;
-  while (*next < attitudes.size() && attitudes[*next].stamp < stamp) ++*next;
+bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, InsSample* s) {
+  while (*next < attitudes.size() && attitudes[*next].stamp < s->stamp) ++*next;
   if (*next == attitudes.size()) return false;
   const RosAttitude& after = attitudes[*next];
-  if (after.stamp == stamp) {
-    set_attitude(to_quaternion(after), &r->sample);
-  } else {
-    if (*next == 0) return false;
-    const RosAttitude& before = attitudes[*next - 1];
-    if (after.stamp - before.stamp > kMaxGap) return false;
-    const double share =
-        (stamp - before.stamp).to_seconds() / (after.stamp - before.stamp).to_seconds();
-    set_attitude(to_quaternion(before).slerp(share, to_quaternion(after)), &r->sample);
-  }
-  r->sample.tilt_sigma = after.tilt_sigma;
-  r->sample.heading_sigma = after.heading_sigma;
+  const bool exact = after.stamp == s->stamp;
+  if (*next == 0 && !exact) return false;
+  const RosAttitude& before = exact ? after : attitudes[*next - 1];
+  const Duration gap = after.stamp - before.stamp;
+  if (gap > kMaxGap) return false;
+  const auto quaternion = [](const RosAttitude& a) {
+    return Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(a.q_world_body.data()));
+  };
+  const double share = exact ? 1 : (s->stamp - before.stamp).to_seconds() / gap.to_seconds();
+  const Eigen::Quaterniond q = quaternion(before).slerp(share, quaternion(after));
+  s->q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+  s->attitude_valid = true;
+  s->tilt_sigma = after.tilt_sigma;
+  s->heading_sigma = after.heading_sigma;
   return true;
-}
-
-void remark_without_fix(const std::string& name, RecordedIns* ins) {
-  const auto without = std::ranges::count_if(ins->readings, [](const InsRecord& r) {
-    return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
-  });
-  if (without > 0)
-    ins->remarks.push_back(
-        fmt::format("{}: {} of {} samples have no fix: poses are not compared there", name, without,
-                    ins->readings.size()));
 }
 
 RecordedIns combine(const std::string& name, const std::vector<InsRecord>& fixes,
@@ -308,10 +270,16 @@ RecordedIns combine(const std::string& name, const std::vector<InsRecord>& fixes
   for (const InsRecord& fix : fixes) {
     InsRecord& r = ins.readings.emplace_back(fix);
     r.sample.number = ins.readings.size() - 1;
-    if (!attitude_at(attitudes, &next, &r)) ++without;
+    if (!attitude_at(attitudes, &next, &r.sample)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
-  remark_without_fix(name, &ins);
+  const auto no_fix = std::ranges::count_if(ins.readings, [](const InsRecord& r) {
+    return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
+  });
+  if (no_fix > 0)
+    ins.remarks.push_back(
+        fmt::format("{}: {} of {} samples have no fix: poses are not compared there", name, no_fix,
+                    ins.readings.size()));
   if (without > 0)
     ins.remarks.push_back(fmt::format(
         "{}: {} fixes have no orientation of {} within {} ms: poses are not compared there", name,
@@ -372,8 +340,8 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
   if (chosen[0] == chosen[1])
     refuse(path, 0,
            "has one topic selected for left and right images; choose two with --left-topic and "
-           "--right-topic: " +
-               chosen[0]);
+           "--right-topic: {}",
+           chosen[0]);
   StereoSequence sequence;
   sequence.root = path;
   sequence.times = path;
@@ -414,9 +382,9 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
   for (std::size_t k = 0; k < 2; ++k)
     if (images[k].back().image.stamp.ns() == 0)
       refuse(path, 0,
-             chosen[k] +
-                 " has neither stamps (header.stamp is 0) nor recording times; record it again "
-                 "with stamps");
+             "{} has neither stamps (header.stamp is 0) nor recording times; record it again with "
+             "stamps",
+             chosen[k]);
   const auto pairs = pair_images(path, chosen, images, &sequence);
   const std::vector<Stamp> stamps = collect_stamps(images[0]);
   const auto store = std::make_shared<const BagImages>(bag.format, std::move(bag.files), chosen,

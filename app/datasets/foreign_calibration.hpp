@@ -1,8 +1,4 @@
 #pragma once
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
@@ -11,8 +7,8 @@
 ///
 /// One reader handles all: a file's syntax (YAML with or without OpenCV's header, JSON, OpenCV's
 /// XML, an ini) becomes a tree, whose keys are looked up in a vocabulary of other programs' names
-/// (foreign_settings.hpp). The rig follows from the present parts: intrinsics, and the transform in
-/// any of the usual forms (docs/calibration.md).
+/// (foreign_calibration.cpp). The rig follows from the present parts: intrinsics, and the transform
+/// in any of the usual forms (docs/calibration.md).
 namespace vergence::app {
 
 using Remarks = std::vector<std::string>;

@@ -5,9 +5,6 @@
 #include <algorithm>
 #include <cassert>
 #include <chrono>
-#include <optional>
-
-#include <fmt/format.h>
 
 #include "app/datasets/text_file.hpp"
 #include "core/types/bayer.hpp"
@@ -17,11 +14,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-const char* skip_kind(ImageFileStatus status) noexcept {
-  if (status == ImageFileStatus::missing) return "image_missing";
-  if (status == ImageFileStatus::truncated) return "image_truncated";
-  return status == ImageFileStatus::wrong_size ? "image_size" : "image_unreadable";
-}
+/// Kinds of events, by ImageFileStatus.
+constexpr std::array kKinds{"",
+                            "image_missing",
+                            "image_unreadable",
+                            "image_unreadable",
+                            "image_unreadable",
+                            "image_truncated",
+                            "image_unreadable",
+                            "image_size"};
 
 void set_issue(DecodedPair* pair, const char* kind, const std::string& message) {
   pair->kind = kind;
@@ -103,22 +104,17 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   DecodedPair pair;
   pair.frame = index;
   pair.stamp = listed.stamp;
-  if (any_ && listed.stamp <= newest_) {
+  const bool late = newest_ && listed.stamp <= *newest_;
+  if (late || !listed.in_order) {
     set_issue(
-        &pair, "stamp_not_increasing",
-        fmt::format("frame {} skipped: its time {} is not later than {}, the latest before it",
-                    index, format_seconds(listed.stamp.ns()), format_seconds(newest_.ns())));
-    return pair;
-  }
-  if (!listed.in_order) {
-    set_issue(
-        &pair, "stamp_outlier",
-        fmt::format("frame {} skipped: its time {} is later than those of the frames after it",
-                    index, format_seconds(listed.stamp.ns())));
+        &pair, late ? "stamp_not_increasing" : "stamp_outlier",
+        fmt::format(
+            "frame {} skipped: its time {} is {}", index, format_seconds(listed.stamp.ns()),
+            late ? "not later than " + format_seconds(newest_->ns()) + ", the latest before it"
+                 : "later than those of the frames after it"));
     return pair;
   }
   newest_ = listed.stamp;
-  any_ = true;
   std::array<ImageFileStatus, 2> status{};
   if (sequence_.side_by_side) {
     status[0] = load_both(listed.file[0], &workspaces_[0]);
@@ -132,7 +128,7 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
     const std::string name = !listed.file[k].empty() ? listed.file[k]
                              : k == 0                ? "the left image"
                                                      : "the right image";
-    set_issue(&pair, skip_kind(status[k]),
+    set_issue(&pair, kKinds.at(static_cast<std::size_t>(status[k])),
               fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status[k])));
     return pair;
   }

@@ -1,16 +1,8 @@
 #pragma once
-#include <array>
-#include <atomic>
-#include <cstddef>
-#include <cstdint>
-#include <thread>
-#include <vector>
 
-#include "app/datasets/image_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/background_thread.hpp"
 #include "core/memory/frame_pool.hpp"
-#include "core/memory/ring.hpp"
 #include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
@@ -95,9 +87,8 @@ class FrameDecoder {
   // Slots in hand; those of a skipped pair serve the next one.
   std::array<FrameSlot, 2> own_{};
   std::size_t own_count_ = 0;
-  Stamp newest_{};
-  // True if newest_ is valid.
-  bool any_ = false;
+  // Latest stamp of a frame that was not skipped for its stamp.
+  std::optional<Stamp> newest_;
 
   Ring<DecodedPair, kAhead> ring_;
   // Signalled by the decoder for a pair or the end.

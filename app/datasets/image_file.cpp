@@ -4,8 +4,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 
 #include "app/datasets/detail/image_kinds.hpp"
@@ -24,7 +22,10 @@ constexpr off_t kMaxFile = off_t{256} << 20;
 const detail::ImageKind* detect_kind(Bytes bytes) noexcept {
   for (const detail::ImageKind* kind :
        {&detail::kPng, &detail::kJpeg, &detail::kBmp, &detail::kNetpbm})
-    if (kind->is(bytes)) return kind;
+    for (const std::string_view begin : kind->begins)
+      if (std::ranges::equal(bytes.first(std::min(bytes.size(), begin.size())), begin, {}, {},
+                             [](char c) { return static_cast<std::uint8_t>(c); }))
+        return kind;
   return nullptr;
 }
 

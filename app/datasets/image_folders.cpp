@@ -1,16 +1,9 @@
-#include <algorithm>
-#include <array>
-#include <map>
-#include <optional>
 
-#include <fmt/format.h>
 
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/foreign_calibration.hpp"
-#include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/times_file.hpp"
 
@@ -33,37 +26,29 @@ struct Camera {
 };
 using Cameras = std::array<Camera, 2>;
 
-bool present(const fs::path& path) {
-  std::error_code ignored;
-  return fs::exists(path, ignored);
-}
-
 // ---- where the images are
 
-std::vector<std::string> list_entries(const fs::path& folder, bool folders) {
+std::vector<std::string> list_names(const fs::path& folder, bool folders) {
   std::vector<std::string> names;
-  std::error_code ignored;
-  for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored)) {
-    const std::string name = it->path().filename().string();
-    std::error_code other;
-    if (folders ? it->is_directory(other) && !name.starts_with('.') : is_image_name(name))
+  for (const fs::path& entry : entries_in(folder)) {
+    const std::string name = entry.filename().string();
+    std::error_code ignored;
+    if (folders ? fs::is_directory(entry, ignored) && !name.starts_with('.') : is_image_name(name))
       names.push_back(name);
   }
-  std::ranges::sort(names, in_name_order);
   return names;
 }
 
 /// Two directories with the usual names that contain images, directly or in a subdirectory of the
 /// same name.
 std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& above) {
-  for (const auto& [left, right] : stereo_names(list_entries(root / above, true))) {
-    std::vector<std::string> inner = list_entries(root / above / left, true);
+  for (const auto& [left, right] : stereo_names(list_names(root / above, true))) {
+    std::vector<std::string> inner = list_names(root / above / left, true);
     inner.insert(inner.begin(), "");
     for (const std::string& name : inner) {
       const std::string below = name.empty() ? "" : "/" + name;
-      if (!list_entries(root / (above + left + below), false).empty() &&
-          !list_entries(root / (above + right + below), false).empty())
+      if (!list_names(root / (above + left + below), false).empty() &&
+          !list_names(root / (above + right + below), false).empty())
         return Cameras{Camera{above + left + below}, Camera{above + right + below}};
     }
   }
@@ -72,7 +57,7 @@ std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& a
 
 /// Images of both cameras in one folder, distinguished by a word of their names.
 std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& above) {
-  const std::vector<std::string> files = list_entries(root / above, false);
+  const std::vector<std::string> files = list_names(root / above, false);
   const std::array<std::string, 2> sides = side_names(files);
   if (sides[0].empty()) return std::nullopt;
   Cameras cameras;
@@ -95,7 +80,7 @@ std::optional<Cameras> read_cameras(const fs::path& root, const std::string& abo
 std::optional<Cameras> find_cameras(const fs::path& root) {
   std::optional<Cameras> found = read_cameras(root, "");
   if (found) return found;
-  for (const std::string& name : list_entries(root, true)) {
+  for (const std::string& name : list_names(root, true)) {
     auto cameras = read_cameras(root, name + "/");
     if (cameras && found) return std::nullopt;
     if (cameras) found = std::move(cameras);
@@ -107,20 +92,19 @@ std::optional<Cameras> find_cameras(const fs::path& root) {
 std::vector<std::string> list_images(const fs::path& root, const std::string& below) {
   const fs::path folder = root / below;
   require_folder(folder, "images");
-  std::vector<std::string> names = list_entries(folder, false);
+  std::vector<std::string> names = list_names(folder, false);
   if (names.empty()) {
     // Advice by the extension of a file that cannot be read.
     std::string advice;
     std::error_code error;
-    for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
-      if (const fs::path& file = it->path(); file.has_extension() && file.stem() != "")
+    for (const fs::path& file : entries_in(folder, &error))
+      if (file.has_extension() && file.stem() != "")
         advice = fmt::format(
             "; {0} files are not supported: convert them, for example with `mogrify -format png "
             "*{0}`",
             file.extension().string());
-    refuse(folder, 0,
-           error ? "cannot be listed (" + error.message() + "): check its permissions"
-                 : "holds no PNG, JPEG, BMP or PGM image" + advice);
+    if (error) refuse(folder, 0, "cannot be listed ({}): check its permissions", error.message());
+    refuse(folder, 0, "holds no PNG, JPEG, BMP or PGM image{}", advice);
   }
   for (std::string& name : names) name = below.empty() ? name : below + "/" + name;
   return names;
@@ -160,8 +144,7 @@ std::string number_key(const Camera& camera, const std::string& name) {
 }
 
 std::optional<std::size_t> parse_index(const Camera& camera, const std::string& name) {
-  const std::string stem = to_stem(camera, name);
-  const auto n = parse_integer(last_number(stem));
+  const auto n = parse_integer(last_number(to_stem(camera, name)));
   return n && *n >= 0 ? std::optional(static_cast<std::size_t>(*n)) : std::nullopt;
 }
 
@@ -363,38 +346,42 @@ Stamped stamped(const fs::path& root, const Camera& camera, const fs::path& list
 /// Images as named in the lines. Some may be missing, but not all of one side.
 std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<TimesLine>& times,
                                       const Cameras& cameras) {
-  std::vector<StereoPair> pairs(times.size());
-  for (std::size_t i = 0; i < times.size(); ++i)
-    pairs[i] = {times[i].stamp,
-                {named(cameras[0], times[i].name[0]), named(cameras[1], times[i].name[1])}};
+  std::vector<StereoPair> pairs;
+  std::array<bool, 2> any{};
+  for (const TimesLine& line : times) {
+    StereoPair& pair = pairs.emplace_back(line.stamp);
+    for (std::size_t k = 0; k < 2; ++k) {
+      pair.file[k] = named(cameras[k], line.name[k]);
+      any[k] = any[k] || holds(cameras[k], pair.file[k]);
+    }
+  }
   for (std::size_t k = 0; k < 2; ++k)
-    if (std::ranges::none_of(
-            pairs, [&](const StereoPair& pair) { return holds(cameras[k], pair.file[k]); }))
-      refuse(file, 0,
-             "names no existing image; its first name is " + pairs.front().file[k] +
-                 ", the directory has " + cameras[k].names.front());
+    if (!any[k])
+      refuse(file, 0, "names no existing image; its first name is {}, the directory has {}",
+             pairs.front().file[k], cameras[k].names.front());
   return pairs;
 }
 
-/// Numbers of pairs according to their names; empty if a name has none, or without pairs.
-std::optional<std::vector<std::size_t>> parse_indices(const Cameras& cameras,
-                                                      const std::vector<StereoPair>& pairs) {
+/// Numbers of pairs according to their names; empty if a name has none.
+std::vector<std::size_t> parse_indices(const Cameras& cameras,
+                                       const std::vector<StereoPair>& pairs) {
   std::vector<std::size_t> numbers;
   for (const StereoPair& pair : pairs) {
     const std::size_t k = pair.file[0].empty() ? 1 : 0;
     const auto n = parse_index(cameras[k], pair.file[k]);
-    if (!n) return std::nullopt;
+    if (!n) return {};
     numbers.push_back(*n);
   }
-  return numbers.empty() ? std::nullopt : std::optional(numbers);
+  return numbers;
 }
 
 /// Assigns image N to line N, counted from 0 or 1; empty if a number exceeds the lines.
 std::vector<StereoPair> pair_by_number(const std::vector<std::size_t>& numbers,
                                        const std::vector<StereoPair>& pairs, std::size_t lines) {
-  const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
-  const std::size_t first = *most == lines ? 1 : 0;
-  if (*most > lines || *least < first) return {};
+  if (numbers.empty()) return {};
+  const auto [least, most] = std::ranges::minmax(numbers);
+  const std::size_t first = most == lines ? 1 : 0;
+  if (most > lines || least < first) return {};
   std::vector<StereoPair> all(lines);
   for (std::size_t i = 0; i < pairs.size(); ++i) all[numbers[i] - first].file = pairs[i].file;
   return all;
@@ -409,16 +396,16 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
   const std::size_t left = cameras[0].names.size(), right = cameras[1].names.size();
   std::vector<StereoPair> pairs = pair_by_names(cameras).value_or(std::vector<StereoPair>{});
   const auto numbers = parse_indices(cameras, pairs);
-  const bool run = numbers && numbers->back() - numbers->front() + 1 == pairs.size();
-  if (run && numbers->front() > 1 && pairs.size() == times.size())
+  const bool run = !numbers.empty() && numbers.back() - numbers.front() + 1 == pairs.size();
+  if (run && numbers.front() > 1 && pairs.size() == times.size())
     assumptions->push_back(
-        fmt::format("images begin with number {}, that of the first time", numbers->front()));
+        fmt::format("images begin with number {}, that of the first time", numbers.front()));
   // Without names there must be one line per frame, including lost ones.
   const bool whole = pairs.size() == times.size() && !(by_number && !run);
   if (!whole && !by_number && left == right && left == times.size()) {
     pairs = pair_in_order(cameras);
   } else if (!whole && pairs.size() <= times.size()) {
-    pairs = numbers ? pair_by_number(*numbers, pairs, times.size()) : std::vector<StereoPair>{};
+    pairs = pair_by_number(numbers, pairs, times.size());
     if (!pairs.empty() && !by_number)
       assumptions->emplace_back(
           "there are fewer pairs than times: each image gets the line of its number");
@@ -473,8 +460,8 @@ void pair_cameras(const Cameras& cameras, const Lists& lists, StereoSequence* se
                                 sequence);
     if (!pairs)
       refuse(*lists.own[1], 0,
-             "has no stamp close to one of " + lists.own[0]->string() +
-                 "; check that both lists are of the same recording");
+             "has no stamp close to one of {}; check that both lists are of the same recording",
+             lists.own[0]->string());
     sequence->pairs = std::move(*pairs);
     return;
   }
@@ -496,19 +483,6 @@ void pair_cameras(const Cameras& cameras, const Lists& lists, StereoSequence* se
 
 // ---- calibrations
 
-/// Name of a file in the directory that may be a calibration of another program; empty if there is
-/// none.
-std::string other_calibration(const fs::path& folder) {
-  std::error_code ignored;
-  for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored)) {
-    const std::string ending = lower(it->path().extension().string());
-    if (ending == ".yaml" || ending == ".yml" || ending == ".json" || ending == ".xml")
-      return it->path().filename().string();
-  }
-  return "";
-}
-
 void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
                           StereoSequence* sequence) {
   const fs::path& folder = sequence->root;
@@ -521,19 +495,25 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
   for (std::size_t k = 0; k < 2; ++k)
     sensors[k] = (folder / cameras[k].below).parent_path() / "sensor.yaml";
   if (sensors[0] != sensors[1] && present(sensors[0]) && present(sensors[1])) {
-    std::vector<CalibrationText> texts;
-    texts.reserve(sensors.size());
-    for (const fs::path& file : sensors)
-      texts.push_back({file.string(), read_text(file, kLargestYaml)});
-    sequence->calibration = parse_any_calibration(texts, std::nullopt, &sequence->remarks).rig;
+    const auto text = [](const fs::path& file) {
+      return CalibrationText{file.string(), read_text(file, kLargestYaml)};
+    };
+    sequence->calibration = parse_any_calibration({text(sensors[0]), text(sensors[1])},
+                                                  std::nullopt, &sequence->remarks)
+                                .rig;
     sequence->calibration_source = sensors[1].lexically_relative(folder).string();
     return;
   }
-  const std::string other = other_calibration(folder);
+  // A file that may be a calibration of another program.
+  std::string other;
+  for (const fs::path& entry : entries_in(folder))
+    for (const char* ending : {".yaml", ".yml", ".json", ".xml"})
+      if (other.empty() && lower(entry.extension().string()) == ending)
+        other = entry.filename().string();
   refuse(folder, 0,
          "has no calibration.yaml; pass a calibration with --calibration (of vergence, Kalibr, "
-         "ROS, OpenCV or another program), or --focal and --baseline" +
-             (other.empty() ? "" : "; is " + other + " one?"));
+         "ROS, OpenCV or another program), or --focal and --baseline{}",
+         other.empty() ? "" : "; is " + other + " one?");
 }
 
 /// True if the file is a PNG with colours.

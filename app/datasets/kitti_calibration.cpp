@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <map>
-#include <string>
-#include <string_view>
-#include <system_error>
 
-#include <fmt/format.h>
-
+#include "app/config/calibration_checks.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
 
@@ -19,8 +16,7 @@ class Text {
  public:
   /// `without` ends the message about a missing file.
   Text(const std::filesystem::path& file, const char* without) : file_(file) {
-    std::error_code ignored;
-    if (!std::filesystem::exists(file, ignored))
+    if (!detail::present(file))
       refuse(file, 0, "is missing; unpack the calibration of that date there{}", without);
     // In bytes.
     constexpr std::size_t kLargest = std::size_t{1} << 20U;
@@ -70,10 +66,7 @@ class Text {
 
   [[nodiscard]] Transform rigid(const std::string& R, const std::string& T) const {
     const auto t = numbers<3>(T);
-    Transform out;
-    out.R = rotation(R);
-    out.t = {t[0], t[1], t[2]};
-    return out;
+    return {rotation(R), {t[0], t[1], t[2]}};
   }
 
   [[nodiscard]] ImageSize size(const std::string& key) const {

@@ -1,10 +1,7 @@
 #pragma once
-#include <array>
-#include <filesystem>
 #include <optional>
 
 #include "app/datasets/image_file.hpp"
-#include "core/math/se3.hpp"
 #include "core/types/calibration.hpp"
 
 /// KITTI's calib.txt and calib_*.txt: lines `KEY: numbers`; some copies lack the colon. Layout and

@@ -1,16 +1,11 @@
-#include <algorithm>
 #include <cmath>
-#include <numbers>
-
-#include <fmt/format.h>
+#include <ranges>
 
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/kitti_calibration.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/times_file.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
@@ -62,11 +57,6 @@ constexpr int kLocked = 4;
 /// 10 no data, 11 blanked: carried on by inertia.
 bool has_position(int mode) noexcept { return (mode >= 3 && mode <= 9) || mode >= 13; }
 
-FixStatus to_fix_status(int status, int satellites_used, int mode) noexcept {
-  if (status != kLocked) return FixStatus::none;
-  return has_position(mode) && satellites_used != 0 ? FixStatus::fix_3d : FixStatus::dead_reckoning;
-}
-
 int whole(double v) noexcept { return std::abs(v) < 1e6 ? static_cast<int>(std::lround(v)) : -1; }
 
 /// Returns nothing for missing numbers or an invalid position.
@@ -87,7 +77,9 @@ std::optional<InsRecord> parse_packet(std::string_view text) noexcept {
     return std::nullopt;
   const int used = whole(v[satellites]), status = whole(v[navigation_status]),
             mode = whole(v[position_mode]);
-  s.fix = to_fix_status(status, used, mode);
+  s.fix = status != kLocked                 ? FixStatus::none
+          : has_position(mode) && used != 0 ? FixStatus::fix_3d
+                                            : FixStatus::dead_reckoning;
   s.attitude_valid = s.velocity_valid = status == kLocked;
   s.velocity_enu = {v[to_east], v[to_north], v[upward]};
   const Mat3 R =
@@ -124,10 +116,8 @@ Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) 
       continue;
     }
     auto reading = parse_packet(read_text(data / name));
-    if (!reading) {
-      if (out.broken++ == 0) out.first_broken = name;
-      continue;
-    }
+    if (!reading && out.broken++ == 0) out.first_broken = name;
+    if (!reading) continue;
     reading->sample.stamp = lines[i].stamp;
     reading->sample.number = i;
     out.readings.push_back(*reading);
@@ -145,19 +135,18 @@ void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* in
              fmt::format("packets do not have {} numbers and are skipped; the first is {}", kFields,
                          packets.first_broken));
   add_remark(disordered, "stamps do not increase; their packets are skipped");
-  const auto fixed = [](const InsRecord& r) { return r.sample.fix == FixStatus::fix_3d; };
-  add_remark(
-      ins->readings.size() - static_cast<std::size_t>(std::ranges::count_if(ins->readings, fixed)),
-      fmt::format("of {} packets have no satellite fix: poses are not compared there",
-                  ins->readings.size()));
+  const auto without = std::ranges::count_if(
+      ins->readings, [](const InsRecord& r) { return r.sample.fix != FixStatus::fix_3d; });
+  add_remark(static_cast<std::size_t>(without),
+             fmt::format("of {} packets have no satellite fix: poses are not compared there",
+                         ins->readings.size()));
 }
 
 /// True for a directory with a camera's images and their list, or with the INS's packets.
 bool is_drive(const fs::path& folder) {
-  std::error_code ignored;
   for (int camera = 0; camera < 4; ++camera)
-    if (fs::exists(folder / fmt::format("image_{:02d}/timestamps.txt", camera), ignored))
-      return true;
+    if (present(folder / fmt::format("image_{:02d}/timestamps.txt", camera))) return true;
+  std::error_code ignored;
   return fs::is_directory(folder / "oxts", ignored);
 }
 
@@ -193,11 +182,11 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
   if (found.size() > 1) {
     constexpr std::size_t kMaxNamed = 8;
     std::ranges::sort(found);
-    std::string names;
-    for (std::size_t i = 0; i < std::min(kMaxNamed, found.size()); ++i)
-      names += (i > 0 ? ", " : "") + found[i].filename().string();
-    refuse(folder, 0, "holds {} drives ({}{}); name one of them", found.size(), names,
-           found.size() > kMaxNamed ? ", …" : "");
+    std::vector<std::string> names;
+    for (const fs::path& drive : found | std::views::take(kMaxNamed))
+      names.push_back(drive.filename().string());
+    refuse(folder, 0, "holds {} drives ({}{}); name one of them", found.size(),
+           fmt::join(names, ", "), found.size() > kMaxNamed ? ", …" : "");
   }
   std::error_code ignored;
   // `.` and a name that ends in a slash also have a parent directory.
@@ -206,8 +195,7 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
   KittiRawFolders out{found[0], lexical.parent_path()};
   // A drive may be a symbolic link, with its calibration next to the link or next to its target.
   for (const fs::path& other : {out.drive, fs::weakly_canonical(out.drive, ignored).parent_path()})
-    if (!fs::exists(out.calibration / kKittiRawCalibration, ignored) &&
-        fs::exists(other / kKittiRawCalibration, ignored))
+    if (!present(out.calibration / kKittiRawCalibration) && present(other / kKittiRawCalibration))
       out.calibration = other;
   return out;
 }
@@ -217,8 +205,7 @@ RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
   const KittiRawFolders folders = find_kitti_raw(folder);
   RecordedIns ins;
   const fs::path oxts = folders.drive / "oxts", data = oxts / "data";
-  std::error_code ignored;
-  if (!fs::exists(oxts, ignored)) {
+  if (!present(oxts)) {
     ins.remarks.push_back(oxts.string() + ": does not exist; poses are not compared with an INS");
     return ins;
   }

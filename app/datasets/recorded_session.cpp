@@ -1,12 +1,9 @@
 #include "app/datasets/recorded_session.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <map>
-#include <system_error>
 
-#include <fmt/format.h>
-
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
 #include "app/datasets/text_file.hpp"
@@ -59,9 +56,9 @@ std::optional<FrameRecord> read_frame(std::span<const std::uint8_t> bytes) {
   effort.points_percent = in.get<std::uint8_t>();
   effort.window_keyframes = in.get<std::uint8_t>();
   effort.window_steps = in.get<std::uint8_t>();
-  if (effort.points_percent < 1 || effort.points_percent > 100) return std::nullopt;
-  if (!check(bytes, &in) || f.cameras < 2 || f.cameras > kMaxCameras) return std::nullopt;
-  return f;
+  const bool sound = check(bytes, &in) && effort.points_percent >= 1 &&
+                     effort.points_percent <= 100 && f.cameras >= 2 && f.cameras <= kMaxCameras;
+  return sound ? std::optional(f) : std::nullopt;
 }
 
 std::optional<InsRecord> read_reading(std::span<const std::uint8_t> bytes) {
@@ -145,10 +142,8 @@ struct RecordedSession::Reader {
 
   void add_frame(const detail::BagMessage& m) {
     const auto record = read_frame(detail::first_bytes(m, kMaxSmall));
-    if (!record) {
-      ++broken;
-      return;
-    }
+    broken += record ? 0 : 1;
+    if (!record) return;
     if (session->frames_.size() == kMaxFrames)
       refuse(folder, 0, "has a recording of more than {} frames", kMaxFrames);
     RecordedFrame frame{*record, {}, session->readings_.size()};
@@ -165,10 +160,8 @@ struct RecordedSession::Reader {
 
   void add_reading(const detail::BagMessage& m) {
     const auto reading = read_reading(detail::first_bytes(m, kMaxSmall));
-    if (!reading) {
-      ++broken;
-      return;
-    }
+    broken += reading ? 0 : 1;
+    if (!reading) return;
     if (session->readings_.size() == kMaxReadings)
       refuse(folder, 0, "has a recording of more than {} INS samples", kMaxReadings);
     session->readings_.push_back(*reading);
@@ -201,10 +194,9 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
     refuse(folder, 0,
            "has a recording without a complete frame: the run was too short, or the file is "
            "truncated; record again");
-  const auto has_image = [](const RecordedFrame& f) {
-    return std::ranges::any_of(f.images, [](const RecordedImage& i) { return i.offset != 0; });
-  };
-  if (std::ranges::none_of(session.frames_, has_image))
+  if (std::ranges::none_of(session.frames_, [](const RecordedFrame& f) {
+        return std::ranges::any_of(f.images, &RecordedImage::offset);
+      }))
     refuse(folder, 0,
            "has a recording without images; record with record: [images] (docs/session_files.md)");
   if (reader.broken > 0)
@@ -239,10 +231,9 @@ bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::
 }
 
 bool holds_recorded_session(const fs::path& folder) {
-  std::error_code ignored;
-  return fs::exists(folder / "poses.csv", ignored) &&
-         (fs::exists(folder / "drive.mcap", ignored) ||
-          fs::exists(folder / "drive_0.mcap", ignored));
+  using detail::present;
+  return present(folder / "poses.csv") &&
+         (present(folder / "drive.mcap") || present(folder / "drive_0.mcap"));
 }
 
 }  // namespace vergence::app

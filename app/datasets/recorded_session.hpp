@@ -1,13 +1,7 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <vector>
 
 #include "app/datasets/detail/bag_index.hpp"
-#include "app/datasets/recorded_ins.hpp"
+#include "app/datasets/stereo_sequence.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
 

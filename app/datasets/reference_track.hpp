@@ -3,7 +3,6 @@
 #include <optional>
 #include <span>
 
-#include "core/math/se3.hpp"
 #include "core/types/stamped_pose.hpp"
 
 namespace vergence::app {

@@ -1,7 +1,6 @@
 #include "app/datasets/ros_camera.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>

@@ -1,11 +1,8 @@
 #include "app/datasets/session_export.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/image_writer.hpp"
 #include "app/datasets/reference_track.hpp"
@@ -47,31 +44,19 @@ std::string sensor_yaml(const RigCalibration& rig, std::size_t k) {
       radtan && d[4] != 0 ? fmt::format(", {}", d[4]) : "");
 }
 
-std::string projections(const RigCalibration& rig) {
-  std::string text;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Intrinsics& i = rig.intrinsics[k];
-    text += fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", k, i.fx, i.cx,
-                        i.fx * rig.T_camera_left[k].t.x(), i.fy, i.cy);
-  }
-  return text;
-}
-
-/// KITTI cannot store distortion and rotated cameras.
-void check_rectified(const RigCalibration& rig) {
-  const Transform& T = rig.T_camera_left[1];
-  if (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
-      !T.R.isApprox(Mat3::Identity(), 1e-9) || std::abs(T.t.y()) > 1e-9 || std::abs(T.t.z()) > 1e-9)
-    throw InputError(
-        "--format kitti cannot store distortion and rotated cameras, which this rig has; use euroc "
-        "or folder");
-}
-
 /// Writes the images and text files of a layout.
 class Writer {
  public:
   explicit Writer(const ExportRequest& request) : request_(request) {
-    if (request.format == ExportFormat::kitti) check_rectified(request.calibration.rig);
+    const RigCalibration& rig = request.calibration.rig;
+    const Transform& T = rig.T_camera_left[1];
+    if (request.format == ExportFormat::kitti &&
+        (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
+         !T.R.isApprox(Mat3::Identity(), 1e-9) || std::abs(T.t.y()) > 1e-9 ||
+         std::abs(T.t.z()) > 1e-9))
+      throw InputError(
+          "--format kitti cannot store distortion and rotated cameras, which this rig has; use "
+          "euroc or folder");
     for (std::size_t k = 0; k < 2; ++k) make_folder(images(k));
   }
   [[nodiscard]] fs::path image(std::size_t index, Stamp stamp, std::size_t camera) const {
@@ -87,6 +72,7 @@ class Writer {
   /// Writes the text files after all images.
   void finish() const {
     const fs::path& out = request_.out;
+    std::string projections;
     switch (request_.format) {
       case ExportFormat::folder:
         replace_durably(out / "times.txt",
@@ -104,10 +90,16 @@ class Writer {
         }
         break;
       case ExportFormat::kitti:
+        for (std::size_t k = 0; k < 2; ++k) {
+          const Intrinsics& i = request_.calibration.rig.intrinsics[k];
+          const double x = request_.calibration.rig.T_camera_left[k].t.x();
+          projections += fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", k, i.fx, i.cx, i.fx * x,
+                                     i.fy, i.cy);
+        }
         replace_durably(out / "times.txt", lines([this](Stamp stamp) {
                           return format_seconds((stamp - stamps_.front()).ns());
                         }));
-        replace_durably(out / "calib.txt", projections(request_.calibration.rig));
+        replace_durably(out / "calib.txt", projections);
         break;
     }
     write_truth();
@@ -165,34 +157,6 @@ class Writer {
   Trajectory truth_;
 };
 
-bool has_pair(const RecordedFrame& frame) {
-  return frame.images[0].offset != 0 && frame.images[1].offset != 0;
-}
-
-/// First frame with both images.
-const RecordedFrame& first_complete_frame(const RecordedSession& session) {
-  const auto& frames = session.frames();
-  const auto first = std::ranges::find_if(frames, has_pair);
-  if (first == frames.end())
-    throw InputError(
-        "the recording has no frame with both images, so nothing is exported; record with record: "
-        "[images]");
-  return *first;
-}
-
-/// Throws InputError if the calibration is for images of another size.
-void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration) {
-  for (std::size_t k = 0; k < 2; ++k) {
-    const RecordedImage& image = frame.images[k];
-    const Intrinsics& lens = calibration.rig.intrinsics[k];
-    if (image.width != lens.width || image.height != lens.height)
-      throw InputError(fmt::format(
-          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; use the "
-          "calibration that belongs to these images",
-          k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
-  }
-}
-
 /// Returns false if one image of the pair is missing.
 bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
                std::array<std::vector<std::uint8_t>, 2>* pixels) {
@@ -211,18 +175,33 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
                             const std::function<void(std::size_t)>& progress) {
   ExportResult result;
   result.remarks = session.remarks();
-  const RecordedFrame& first = first_complete_frame(session);
-  check_sizes(first, request.calibration);
-  if (first.given.cameras > 2)
+  const auto& frames = session.frames();
+  const auto first = std::ranges::find_if(frames, [](const RecordedFrame& f) {
+    return f.images[0].offset != 0 && f.images[1].offset != 0;
+  });
+  if (first == frames.end())
+    throw InputError(
+        "the recording has no frame with both images, so nothing is exported; record with record: "
+        "[images]");
+  for (std::size_t k = 0; k < 2; ++k) {
+    const RecordedImage& image = first->images[k];
+    const Intrinsics& lens = request.calibration.rig.intrinsics[k];
+    if (image.width != lens.width || image.height != lens.height)
+      throw InputError(fmt::format(
+          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; use the "
+          "calibration that belongs to these images",
+          k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
+  }
+  if (first->given.cameras > 2)
     result.remarks.push_back(fmt::format(
         "{} cameras were recorded; the first two are exported, because the format has only two",
-        first.given.cameras));
+        first->given.cameras));
   request.calibration.rig.cameras = 2;
   Writer writer(request);
   const ReferenceTrack track(request.truth);
   std::array<std::vector<std::uint8_t>, 2> pixels;
   std::size_t done = 0, without_truth = 0;
-  for (const RecordedFrame& frame : session.frames()) {
+  for (const RecordedFrame& frame : frames) {
     progress(done++);
     if (!load_pair(session, frame, &pixels)) {
       ++result.left_out;

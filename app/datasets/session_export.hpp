@@ -1,9 +1,5 @@
 #pragma once
-#include <cstddef>
-#include <filesystem>
 #include <functional>
-#include <string>
-#include <vector>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/recorded_session.hpp"

@@ -1,14 +1,12 @@
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <system_error>
 
-#include <fmt/format.h>
-
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/datasets/times_file.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/so3.hpp"
 
@@ -17,29 +15,17 @@ namespace {
 
 std::optional<std::filesystem::path> find_log(const std::filesystem::path& folder,
                                               std::string_view ending) {
-  std::vector<std::filesystem::path> found;
   std::error_code error;
-  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error))
-    if (it->path().filename().string().ends_with(ending)) found.push_back(it->path());
-  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
-  if (found.empty()) return std::nullopt;
-  if (found.size() > 1) {
-    std::ranges::sort(found);
-    refuse(folder, 0,
-           "holds " + std::to_string(found.size()) + " files that end in " + std::string(ending) +
-               " (" + found[0].filename().string() + ", …); use one directory per sequence");
-  }
-  return found[0];
+  std::vector<std::filesystem::path> found = entries_in(folder, &error);
+  if (error) refuse(folder, 0, "cannot be listed ({}): check its permissions", error.message());
+  std::erase_if(found, [&](const auto& entry) { return !entry.string().ends_with(ending); });
+  if (found.size() > 1)
+    refuse(folder, 0, "holds {} files that end in {} ({}, …); use one directory per sequence",
+           found.size(), ending, found[0].filename().string());
+  return found.empty() ? std::nullopt : std::optional(found[0]);
 }
 
-std::optional<Stamp> parse_stamp(std::string_view seconds, std::string_view microseconds) noexcept {
-  // Maximum number of seconds that 64 bits of nanoseconds hold.
-  constexpr std::int64_t kLatest = 9'000'000'000;
-  const auto s = parse_integer(seconds), us = parse_integer(microseconds);
-  if (!s || !us || *s < 0 || *s > kLatest || *us < 0 || *us > 999'999) return std::nullopt;
-  return Stamp(*s * 1'000'000'000 + *us * 1'000);
-}
+constexpr std::int64_t kMicroseconds = 1'000'000;
 
 constexpr std::string_view kImageLog = "_MultiCamera0.log";
 
@@ -48,11 +34,8 @@ constexpr std::string_view kImageLog = "_MultiCamera0.log";
 RigCalibration published_calibration() {
   RigCalibration rig;
   rig.cameras = 2;
-  for (Intrinsics& lens : rig.intrinsics) {
-    lens.width = 1024;
-    lens.height = 768;
-  }
   Intrinsics &left = rig.intrinsics[0], &right = rig.intrinsics[1];
+  left.width = right.width = 1024, left.height = right.height = 768;
   left.fx = 1246.561673900704, left.fy = 1247.092336797580, left.cx = 532.287936343425,
   left.cy = 383.604069688392;
   right.fx = 1244.805048771648, right.fy = 1245.815687282771, right.cx = 506.635543659909,
@@ -66,23 +49,21 @@ RigCalibration published_calibration() {
   return rig;
 }
 
-/// A log names images with or without their directory; all are in one.
-std::string image_name(const std::string& images, std::string_view path) {
-  return images + "/" + std::string(path.substr(path.find_last_of('/') + 1));
-}
-
 StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
                      std::string_view line, const std::string& images) {
-  constexpr std::size_t kFields = 12;
-  std::array<std::string_view, kFields> f;
-  if (split(line, ' ', f) != kFields)
+  std::array<std::string_view, 12> f;
+  if (split(line, ' ', f) != f.size())
     refuse(log, line_number,
            "is not a line `seconds microseconds width height format` for both cameras with two "
            "image names; check that this is the log of the cameras");
-  const auto stamp = parse_stamp(f[0], f[1]);
-  if (!stamp || !parse_stamp(f[5], f[6]))
+  const auto stamp = read_parts(f[0], f[1], kMicroseconds);
+  if (!stamp || !read_parts(f[5], f[6], kMicroseconds))
     refuse(log, line_number, "does not begin with seconds and microseconds below a million");
-  return {*stamp, {image_name(images, f[10]), image_name(images, f[11])}};
+  // A log names images with or without their directory; all are in one.
+  const auto name = [&](std::string_view path) {
+    return images + "/" + std::string(path.substr(path.find_last_of('/') + 1));
+  };
+  return {*stamp, {name(f[10]), name(f[11])}};
 }
 
 // ---- the INS
@@ -153,12 +134,11 @@ struct Moving {
 };
 
 bool parse_line(std::string_view text, Line* line) noexcept {
-  constexpr std::size_t kFields = 12;
-  std::array<std::string_view, kFields> f;
-  if (split(text, ' ', f) != kFields) return false;
-  const auto stamp = parse_stamp(f[0], f[1]);
-  std::array<double, kFields> v{};
-  for (std::size_t i = 2; i < kFields; ++i)
+  std::array<std::string_view, 12> f;
+  if (split(text, ' ', f) != f.size()) return false;
+  const auto stamp = read_parts(f[0], f[1], kMicroseconds);
+  std::array<double, 12> v{};
+  for (std::size_t i = 2; i < f.size(); ++i)
     if (!parse_number(f[i], &v[i])) return false;
   if (!stamp) return false;
   line->stamp = *stamp;
@@ -175,11 +155,10 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   std::size_t broken = 0, first_broken = 0;
   for (std::string_view raw; lines.next(&raw);) {
     Line line;
-    if (parse_line(raw, &line)) {
+    if (parse_line(raw, &line))
       out.push_back(line);
-    } else if (broken++ == 0) {
+    else if (broken++ == 0)
       first_broken = lines.number();
-    }
   }
   if (out.empty() || broken > 1 + out.size() / kMaxBroken)
     refuse(log, first_broken,
@@ -195,9 +174,9 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
     remarks->push_back(
         fmt::format("{} samples of the INS have stamps that do not increase and are skipped",
                     out.size() - kept.size()));
-  std::vector<Line> in_order;
-  for (const std::size_t i : kept) in_order.push_back(out[i]);
-  return in_order;
+  for (std::size_t i = 0; i < kept.size(); ++i) out[i] = out[kept[i]];
+  out.resize(kept.size());
+  return out;
 }
 
 /// Swaps the columns if latitude exceeds 90 in all lines.
@@ -240,18 +219,6 @@ Mat3 attitude(const Line& line, const Conventions& c) {
          exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) * exp_so3(Vec3(roll, 0, 0));
 }
 
-/// Selects the velocity axes that agree best with the motion of the position.
-void decide_axes(const std::vector<Moving>& moving, Conventions* c) {
-  double least = 1e300;
-  for (const Axes& axes : kAxes) {
-    const Mat3 to_enu = to_matrix(axes);
-    double sum = 0;
-    for (const Moving& m : moving)
-      sum += (to_enu * m.line->velocity - m.motion).head<2>().squaredNorm();
-    if (sum < least) least = sum, c->enu_of_velocity = to_enu, c->axes = axes.phrase;
-  }
-}
-
 /// Selects the angles whose forward axis agrees best with the velocity. The mean cosine is used,
 /// because the vehicle may also drive backwards. On a level path the pitch is that of the MTi-G.
 void decide_angles(const std::vector<Moving>& fast, Conventions* c) {
@@ -285,7 +252,15 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
         "yaw from north counter-clockwise are assumed");
     return c;
   }
-  decide_axes(moving, &c);
+  // The velocity axes that agree best with the motion of the position.
+  double least = 1e300;
+  for (const Axes& axes : kAxes) {
+    const Mat3 to_enu = to_matrix(axes);
+    double sum = 0;
+    for (const Moving& m : moving)
+      sum += (to_enu * m.line->velocity - m.motion).head<2>().squaredNorm();
+    if (sum < least) least = sum, c.enu_of_velocity = to_enu, c.axes = axes.phrase;
+  }
   decide_angles(fast, &c);
   remarks->push_back(fmt::format(
       "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up", c.axes,

@@ -1,18 +1,12 @@
 #include "app/datasets/stereo_sequence.hpp"
 
-#include <algorithm>
 #include <new>
-#include <optional>
 #include <system_error>
-#include <vector>
-
-#include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
-#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -21,8 +15,6 @@
 
 namespace vergence::app {
 namespace {
-
-std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
 
 /// Recording of a session as a sequence of images, with the session's initial calibration and its
 /// INS samples.
@@ -34,9 +26,7 @@ StereoSequence open_session(const std::filesystem::path& folder, const SequenceO
         parse_calibration(session.description().calibration, folder.string()).rig;
     sequence.calibration_source = "the recording";
   }
-  RecordedIns ins;
-  ins.readings = session.readings();
-  sequence.ins = std::make_shared<const RecordedIns>(std::move(ins));
+  sequence.ins = std::make_shared<const RecordedIns>(RecordedIns{session.readings()});
   return sequence;
 }
 
@@ -66,36 +56,28 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
   refuse(folder, 0, "has no reader for its format");
 }
 
-/// Marks the frames whose stamps do not fit, so that one stamp that leaps ahead costs only its own
-/// frame.
-void mark_out_of_order(std::vector<StereoPair>* pairs) {
-  std::vector<Stamp> stamps;
-  stamps.reserve(pairs->size());
-  for (StereoPair& pair : *pairs) {
-    stamps.push_back(pair.stamp);
-    pair.in_order = false;
-  }
-  for (const std::size_t kept : detail::ascending(stamps)) (*pairs)[kept].in_order = true;
-}
-
 /// Checks common to all formats. `source` is the file of the calibration.
 void check(const std::filesystem::path& source, const CalibrationUse& use, StereoSequence* opened) {
   StereoSequence& sequence = *opened;
   check_times(sequence);
-  mark_out_of_order(&sequence.pairs);
+  // One stamp that leaps ahead costs only its own frame.
+  std::vector<Stamp> stamps;
+  for (StereoPair& pair : sequence.pairs) {
+    stamps.push_back(pair.stamp);
+    pair.in_order = false;
+  }
+  for (const std::size_t kept : detail::ascending(stamps)) sequence.pairs[kept].in_order = true;
   apply_use(use, &sequence.calibration);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->message);
   if (sequence.calibration.cameras != 2)
-    refuse(source, 0,
-           "describes " + std::to_string(sequence.calibration.cameras) +
-               " cameras; use a calibration with two");
+    refuse(source, 0, "describes {} cameras; use a calibration with two",
+           sequence.calibration.cameras);
   const Intrinsics &left = sequence.calibration.intrinsics[0],
                    &right = sequence.calibration.intrinsics[1];
   if (left.width != right.width || left.height != right.height)
     refuse(source, 0,
-           "gives the left camera " + text({left.width, left.height}) +
-               " pixels and the right one " + text({right.width, right.height}) +
-               "; both must have one size");
+           "gives the left camera {}x{} pixels and the right one {}x{}; both must have one size",
+           left.width, left.height, right.width, right.height);
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
   find_deep_bits(&sequence);
   // The messages contain names and text from files.
@@ -106,10 +88,8 @@ void check(const std::filesystem::path& source, const CalibrationUse& use, Stere
 /// A directory with bags of both kinds is read as ROS 2, regardless of the order of its entries.
 std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& folder) {
   std::optional<SequenceFormat> found;
-  std::error_code ignored;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored))
-    if (const auto format = bag_format(it->path());
+  for (const auto& entry : detail::entries_in(folder))
+    if (const auto format = bag_format(entry);
         format && found != SequenceFormat::mcap && (!found || *found != SequenceFormat::db3))
       found = format;
   return found;
@@ -123,23 +103,20 @@ constexpr std::size_t kSampledPairs = 5;
 // Used bits of 16.
 constexpr int kFewestBits = 10;
 
-/// Phrase about how to unpack a bag that was compressed as a whole (`drive.mcap.zstd`); empty if it
-/// was not.
-std::string unpack_advice(const std::filesystem::path& file) {
-  struct Packed {
-    std::string_view ending, command;
-  };
+/// Refuses a bag that was compressed as a whole (`drive.mcap.zstd`) with the command that unpacks
+/// it.
+void refuse_packed(const std::filesystem::path& file) {
+  using Packed = std::pair<std::string_view, std::string_view>;
   constexpr std::array kPacked{Packed{".zstd", "zstd -d"},   Packed{".zst", "zstd -d"},
                                Packed{".lz4", "lz4 -d"},     Packed{".gz", "gunzip -k"},
                                Packed{".bz2", "bunzip2 -k"}, Packed{".xz", "unxz -k"},
                                Packed{".zip", "unzip"},      Packed{".7z", "7z x"},
                                Packed{".tar", "tar -xf"},    Packed{".tgz", "tar -xf"}};
   const std::string name = file.filename().string();
-  const auto packed =
-      std::ranges::find_if(kPacked, [&](const Packed& p) { return name.ends_with(p.ending); });
-  if (packed == kPacked.end()) return "";
-  return "is compressed (" + std::string(packed->ending.substr(1)) + "); unpack it with `" +
-         std::string(packed->command) + " " + name + "` and pass the result";
+  for (const auto& [ending, command] : kPacked)
+    if (name.ends_with(ending))
+      refuse(file, 0, "is compressed ({}); unpack it with `{} {}` and pass the result",
+             ending.substr(1), command, name);
 }
 
 }  // namespace
@@ -149,12 +126,9 @@ namespace detail {
 void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold) {
   std::error_code error;
   if (std::filesystem::is_directory(folder, error)) return;
-  refuse(folder, 0,
-         std::filesystem::exists(folder, error)
-             ? std::string("is not a directory; a directory with ") + what_it_should_hold +
-                   " is expected"
-             : std::string("does not exist; a directory with ") + what_it_should_hold +
-                   " is expected");
+  refuse(folder, 0, "{}; a directory with {} is expected",
+         std::filesystem::exists(folder, error) ? "is not a directory" : "does not exist",
+         what_it_should_hold);
 }
 
 }  // namespace detail
@@ -193,10 +167,8 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   if ((has("image_0") && has("image_1")) || (has("image_2") && has("image_3")))
     return SequenceFormat::kitti;
   if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored))
-    if (it->path().filename().string().ends_with("_MultiCamera0.log"))
-      return SequenceFormat::st_lucia;
+  for (const auto& entry : detail::entries_in(folder))
+    if (entry.filename().string().ends_with("_MultiCamera0.log")) return SequenceFormat::st_lucia;
   if (const auto bag = bag_format_within(folder)) return bag;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   if (detail::holds_stereo_images(folder)) return SequenceFormat::folder;
@@ -237,9 +209,8 @@ ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
     if (!pair.file[camera].empty() &&
         image_size(sequence, pair.file[camera], &size) == ImageFileStatus::ok)
       return {sequence.side_by_side ? size.width / 2 : size.width, size.height};
-  refuse(sequence.root, 0,
-         std::string("has no readable image (PNG, JPEG, BMP or PGM) of the ") +
-             (camera == 0 ? "left" : "right") + " camera");
+  refuse(sequence.root, 0, "has no readable image (PNG, JPEG, BMP or PGM) of the {} camera",
+         camera == 0 ? "left" : "right");
 }
 
 void check_times(const StereoSequence& sequence) {
@@ -258,12 +229,10 @@ void check_times(const StereoSequence& sequence) {
   std::vector<double> steps;
   std::size_t backward = 0;
   for (std::size_t i = 1; i < sequence.pairs.size(); ++i) {
-    const double step = (static_cast<double>(sequence.pairs[i].stamp.ns()) -
-                         static_cast<double>(sequence.pairs[i - 1].stamp.ns())) *
-                        1e-9;
-    if (sequence.pairs[i].stamp > sequence.pairs[i - 1].stamp)
-      steps.push_back(step);
-    else if (sequence.pairs[i].stamp < sequence.pairs[i - 1].stamp)
+    const Stamp before = sequence.pairs[i - 1].stamp, now = sequence.pairs[i].stamp;
+    if (now > before)
+      steps.push_back((now - before).to_seconds());
+    else if (now < before)
       ++backward;
   }
   const std::size_t all = sequence.pairs.size() - 1, still = all - backward - steps.size();
@@ -309,11 +278,12 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
       ++(size == requested ? good : bad);
       if (size == requested || !message.empty()) continue;
-      message = (sequence.root / name).string() + ": is " + text(size) +
-                " pixels, but the calibration of this camera (" + sequence.calibration_source +
-                ") is for " + text(requested) +
-                (sequence.side_by_side ? " (twice its width, side by side)" : "") +
-                "; use the calibration that belongs to these images";
+      message = fmt::format(
+          "{}: is {}x{} pixels, but the calibration of this camera ({}) is for {}x{}{}; use the "
+          "calibration that belongs to these images",
+          (sequence.root / name).string(), size.width, size.height, sequence.calibration_source,
+          requested.width, requested.height,
+          sequence.side_by_side ? " (twice its width, side by side)" : "");
     }
   // Single images of another size are skipped as frames.
   if (bad > good) throw InputError(message);
@@ -330,12 +300,12 @@ void find_deep_bits(StereoSequence* sequence) {
       ImageSize size;
       if (name.empty() || image_size(*sequence, name, &size) != ImageFileStatus::ok) continue;
       const auto width = static_cast<std::size_t>(size.width);
-      whole.resize(width * static_cast<std::size_t>(size.height));
-      low.resize(whole.size());
-      if (decode_image(*sequence, name, size, whole.data(), width, 16, &work) !=
-              ImageFileStatus::ok ||
-          decode_image(*sequence, name, size, low.data(), width, kFewestBits, &work) !=
-              ImageFileStatus::ok ||
+      const auto decoded = [&](int bits, std::vector<std::uint8_t>* grey) {
+        grey->resize(width * static_cast<std::size_t>(size.height));
+        return decode_image(*sequence, name, size, grey->data(), width, bits, &work) ==
+               ImageFileStatus::ok;
+      };
+      if (!decoded(16, &whole) || !decoded(kFewestBits, &low) ||
           std::ranges::all_of(low, [](std::uint8_t v) { return v == 0; }))
         continue;
       // The number of bits makes no difference to samples of 8 bits.
@@ -368,25 +338,20 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
     throw InputError(fmt::format("--format \"{}\": unknown format; use auto, {}{}", word,
                                  fmt::join(words, ", "), did_you_mean(word, words)));
   std::error_code ignored;
-  if (const auto bag = bag_format(folder); bag && !std::filesystem::is_directory(folder, ignored))
-    return *bag;
-  if (!std::filesystem::is_directory(folder, ignored))
-    if (const std::string advice = unpack_advice(folder); !advice.empty())
-      refuse(folder, 0, advice);
-  if (!std::filesystem::is_directory(folder, ignored))
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    if (const auto bag = bag_format(folder)) return *bag;
+    refuse_packed(folder);
     refuse(folder, 0, "{}; pass a data-set directory, or a .mcap, .db3 or .bag file",
            std::filesystem::exists(folder, ignored) ? "is a file that is not a bag"
                                                     : "no such directory");
+  }
   if (const auto found = find_format(folder)) return *found;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored))
-    if (const std::string advice = unpack_advice(it->path()); !advice.empty())
-      refuse(it->path(), 0, advice);
+  for (const auto& entry : detail::entries_in(folder)) refuse_packed(entry);
   refuse(folder, 0, "not a known data-set format; expected is one of: {}", kLayouts);
 }
 
 void check_topics(SequenceFormat format, const BagTopics& topics) {
-  if (!is_bag(format) && !topics.empty())
+  if (!is_bag(format) && topics != BagTopics{})
     throw InputError(
         "--left-topic, --right-topic, --ins-topic and --imu-topic select topics of a bag, and DATA "
         "is not a bag; remove them");

@@ -1,18 +1,10 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
-#include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
+#include "drivers/ins.hpp"
 
 /// Recorded stereo sequences as lists of image files with stamps, read by a replay regardless of
 /// the data set's layout.
@@ -30,8 +22,19 @@ enum class SequenceFormat : std::uint8_t {
   session
 };
 
-/// Defined in recorded_ins.hpp.
-struct RecordedIns;
+/// INS data recorded with a sequence, in a common form for all data sets; a replay compares its
+/// poses with it.
+struct RecordedIns {
+  /// Samples with strictly increasing stamps, on the clock of the images.
+  std::vector<InsRecord> readings{};
+  /// Extrinsics p_ins = T_ins_left · p_left published with the data set; empty if there are none.
+  std::optional<Transform> T_ins_left{};
+  /// Files that contain them.
+  std::string mount_source{};
+  /// Messages about skipped or assumed data.
+  std::vector<std::string> remarks{};
+};
+
 namespace detail {
 class BagImages;
 }
@@ -94,9 +97,7 @@ struct BagTopics {
   std::string ins{};
   /// Topic of Imu, with the orientation that belongs to NavSatFix.
   std::string imu{};
-  [[nodiscard]] bool empty() const noexcept {
-    return left.empty() && right.empty() && ins.empty() && imu.empty();
-  }
+  bool operator==(const BagTopics&) const = default;
 };
 
 [[nodiscard]] inline bool is_bag(SequenceFormat format) noexcept {
@@ -161,6 +162,18 @@ struct SequenceOptions {
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format,
                                            const std::filesystem::path& folder,
                                            const SequenceOptions& options = {});
+
+/// Reads the INS of the sequence that open_sequence() opens with the same arguments, if it has
+/// separate files; that of a bag is StereoSequence::ins. Without data, or data outside the
+/// sequence, there are no samples. `mount_wanted` reads the published extrinsics, if any. Uses some
+/// 250 bytes per sample, at most kMaxReadings. Throws InputError for missing or invalid files, or
+/// without a complete sample.
+[[nodiscard]] RecordedIns read_recorded_ins(SequenceFormat format,
+                                            const std::filesystem::path& folder,
+                                            const std::array<int, 2>& cameras, bool mount_wanted);
+
+/// Five hours at 100 Hz.
+inline constexpr std::size_t kMaxReadings = 2'000'000;
 
 /// Size of an image of the sequence, from its header. → as read_image_size()
 [[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

@@ -1,14 +1,10 @@
 #include "app/datasets/times_file.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <ctime>
 #include <ranges>
-#include <vector>
 
+#include "app/datasets/image_file.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/datasets/text_table.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::app {
@@ -67,17 +63,6 @@ std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> time
   return std::nullopt;
 }
 
-/// Parses seconds before the point and whole nanoseconds after it.
-std::optional<Stamp> read_parts(std::string_view text) noexcept {
-  // Maximum that 64 bits of nanoseconds hold.
-  constexpr std::int64_t kMaxSeconds = 9'000'000'000;
-  const std::size_t point = std::min(text.find('.'), text.size());
-  const auto s = parse_integer(text.substr(0, point));
-  const auto ns = parse_integer(text.substr(std::min(point + 1, text.size())));
-  if (!s || !ns || *s < 0 || *s > kMaxSeconds || *ns < 0 || *ns >= kSecond) return std::nullopt;
-  return Stamp(*s * kSecond + *ns);
-}
-
 /// True if the numbers of decimals differ and the maximum is that of nanoseconds.
 bool may_be_parts(std::span<const std::string_view> times) {
   const auto [least, most] =
@@ -124,13 +109,12 @@ TimeColumns find_time_columns(std::span<const Fields> rows) {
     c.time_of_day = c.time + 1;
     return c;
   }
-  constexpr std::int64_t kYear1973 = 100'000'000, kYear5138 = 100'000'000'000,
-                         kNsPerSecond = 1'000'000'000;
+  constexpr std::int64_t kYear1973 = 100'000'000, kYear5138 = 100'000'000'000;
   bool large = false;
   const bool parts = all([&](const Fields& fields, std::ptrdiff_t) {
     const auto s = parse_integer(fields[c.time]), ns = parse_integer(fields[c.time + 1]);
     large = large || (ns && *ns > 1'000'000);
-    return s && ns && *s >= kYear1973 && *s < kYear5138 && *ns >= 0 && *ns < kNsPerSecond;
+    return s && ns && *s >= kYear1973 && *s < kYear5138 && *ns >= 0 && *ns < kSecond;
   });
   if (parts && large) c.nanoseconds = c.time + 1;
   return c;
@@ -142,12 +126,9 @@ std::optional<Stamp> read_time(std::span<const std::string_view> fields, const T
   if (columns.time_of_day)
     return parse_iso_time(std::string(fields[columns.time]) + " " +
                           std::string(fields[*columns.time_of_day]));
-  const auto stamp = read_time(fields[columns.time], form);
-  if (!stamp || !columns.nanoseconds) return stamp;
-  constexpr std::int64_t kFarthest = std::int64_t{1} << 62, kSecond = 1'000'000'000;
-  const auto ns = parse_integer(fields[*columns.nanoseconds]);
-  if (!ns || *ns < 0 || *ns >= kSecond || std::abs(stamp->ns()) > kFarthest) return std::nullopt;
-  return Stamp(stamp->ns() + *ns);
+  return columns.nanoseconds
+             ? read_parts(fields[columns.time], fields[*columns.nanoseconds], kSecond)
+             : read_time(fields[columns.time], form);
 }
 
 TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeUnit> relative) {
@@ -210,10 +191,11 @@ const char* to_string(TimeUnit unit) noexcept {
 }
 
 std::optional<TimeUnit> parse_time_unit(std::string_view word) noexcept {
-  if (word == "s") return TimeUnit::seconds;
-  if (word == "ms") return TimeUnit::milliseconds;
-  if (word == "us") return TimeUnit::microseconds;
-  if (word == "ns") return TimeUnit::nanoseconds;
+  for (const auto& [name, unit] : {std::pair<std::string_view, TimeUnit>{"s", TimeUnit::seconds},
+                                   {"ms", TimeUnit::milliseconds},
+                                   {"us", TimeUnit::microseconds},
+                                   {"ns", TimeUnit::nanoseconds}})
+    if (word == name) return unit;
   return std::nullopt;
 }
 
@@ -271,9 +253,23 @@ TimeForm find_time_form(std::span<const std::string_view> times, std::optional<T
   return form;
 }
 
+std::optional<Stamp> read_parts(std::string_view seconds, std::string_view fraction,
+                                std::int64_t per_second) noexcept {
+  // Maximum that 64 bits of nanoseconds hold.
+  constexpr std::int64_t kMaxSeconds = 9'000'000'000;
+  const auto s = parse_integer(seconds), part = parse_integer(fraction);
+  if (!s || !part || *s < 0 || *s > kMaxSeconds || *part < 0 || *part >= per_second)
+    return std::nullopt;
+  return Stamp(*s * kSecond + *part * (kSecond / per_second));
+}
+
 std::optional<Stamp> read_time(std::string_view text, const TimeForm& form) noexcept {
   if (form.iso) return parse_iso_time(text);
-  if (form.nanoseconds_after_point) return read_parts(text);
+  if (form.nanoseconds_after_point) {
+    const std::size_t point = std::min(text.find('.'), text.size());
+    return read_parts(text.substr(0, point), text.substr(std::min(point + 1, text.size())),
+                      kSecond);
+  }
   const auto ns = parse_decimal(text, static_cast<int>(form.unit));
   return ns ? std::optional(Stamp(*ns)) : std::nullopt;
 }

@@ -1,7 +1,6 @@
 #pragma once
 #include <algorithm>
 #include <array>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -47,6 +46,11 @@ struct TimeForm {
 [[nodiscard]] TimeForm find_time_form(std::span<const std::string_view> times,
                                       std::optional<TimeUnit> given,
                                       TimeUnit relative = TimeUnit::seconds);
+
+/// Seconds since 1970 and whole fractions of a second, `per_second` of which are one; empty if the
+/// texts are others.
+[[nodiscard]] std::optional<Stamp> read_parts(std::string_view seconds, std::string_view fraction,
+                                              std::int64_t per_second) noexcept;
 
 /// Empty if the text is not a time of this format, or exceeds 64 bits.
 [[nodiscard]] std::optional<Stamp> read_time(std::string_view text, const TimeForm& form) noexcept;

@@ -1,22 +1,18 @@
 #include "app/datasets/trajectory_files.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include <numeric>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/datasets/text_table.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::app {
 namespace {
 
 namespace fs = std::filesystem;
+using detail::present;
 
 // Two decimals of a quaternion keep its length within this tolerance, which other columns rarely
 // do.
@@ -28,11 +24,6 @@ constexpr std::int64_t kRowStep = 100'000'000;
 constexpr std::int64_t kMaxPoses = 100'000'000;
 // A larger deviation means that digits were lost, and is reported.
 constexpr double kRounded = 1e-4;
-
-bool present(const fs::path& p) {
-  std::error_code ignored;
-  return fs::exists(p, ignored);
-}
 
 /// Meaning of a row's numbers; the value is their count.
 enum class Layout : std::uint8_t { pose = 7, matrix3x4 = 12, matrix4x4 = 16 };
@@ -86,40 +77,36 @@ bool is_position(const std::string& word) {
 
 /// Columns by the headings, if these name a complete pose.
 std::optional<Columns> columns_of_names(const std::vector<std::string_view>& names) {
-  Columns c;
-  std::array<std::optional<std::size_t>, 3> position;
-  // Columns of x, y, z and w.
-  std::array<std::optional<std::size_t>, 4> quaternion;
+  // Columns of x, y, z and of x, y, z, w of the quaternion.
+  std::array<std::optional<std::size_t>, 7> pose;
   std::optional<std::size_t> exact, seconds, nanoseconds, stamp;
-  const auto set_once = [](std::optional<std::size_t>* place, std::size_t i) {
-    if (!*place) *place = i;
-  };
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::string word = plain(names[i]);
     if (word.empty()) continue;
     const std::size_t axis = std::string_view("xyzw").find(word.back());
+    std::optional<std::size_t>* place = nullptr;
     if (word.ends_with("nsec") || word.ends_with("nsecs") || word.ends_with("nanosec"))
-      set_once(&nanoseconds, i);
+      place = &nanoseconds;
     else if (word.ends_with("secs") || word.ends_with("sec"))
-      set_once(&seconds, i);
+      place = &seconds;
     else if (contains(word, {"headerstamp"}))
-      exact = i;
+      place = &exact;
     else if (contains(word, {"time", "stamp"}) || word == "t" || word == "ts")
-      set_once(&stamp, i);
+      place = &stamp;
     else if (axis < 4 && is_quaternion(word))
-      set_once(&quaternion[axis], i);
+      place = &pose[3 + axis];
     else if (axis < 3 && is_position(word))
-      set_once(&position[axis], i);
+      place = &pose[axis];
+    if (place != nullptr && !*place) *place = i;
   }
   if (exact) stamp = exact;
   if (!stamp || nanoseconds) stamp = seconds ? seconds : stamp;
-  if (!stamp || !position[0] || !position[1] || !position[2] || !quaternion[0] || !quaternion[1] ||
-      !quaternion[2] || !quaternion[3])
+  if (!stamp || !std::ranges::all_of(pose, [](const auto& column) { return column.has_value(); }))
     return std::nullopt;
+  Columns c;
   c.time = TimeColumns{.time = *stamp};
   if (seconds == stamp) c.time->nanoseconds = nanoseconds;
-  for (std::size_t k = 0; k < 3; ++k) c.pose[k] = *position[k];
-  for (std::size_t k = 0; k < 4; ++k) c.pose[3 + k] = *quaternion[k];
+  std::ranges::transform(pose, c.pose.begin(), [](const auto& column) { return *column; });
   // This is their order in `pose`.
   c.order = QuaternionOrder::xyzw;
   return c;
@@ -177,46 +164,36 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
     // A small integer before a matrix is the number of its frame.
     const auto number = parse_integer(fields[0]);
     c.counted = first == 1 && number && *number >= 0 && *number < kMaxPoses;
-    if (c.counted)
-      c.time = TimeColumns{};
-    else if (first > 0)
-      c.time = first > time.last() ? time : TimeColumns{};
+    if (first > 0) c.time = !c.counted && first > time.last() ? time : TimeColumns{};
     return c;
   }
   const auto pose_from = [&c](std::size_t first) {
-    for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = first + k;
+    std::iota(c.pose.begin(), c.pose.end(), first);
+    return c;
   };
   // In a row of eight columns a counter is the stamp.
   for (const TimeColumns& times : {time, TimeColumns{}, TimeColumns{.time = 1}})
     if (n >= times.last() + 8 && is_unit(fields, times.last() + 4)) {
       c.time = times;
-      pose_from(times.last() + 1);
-      return c;
+      return pose_from(times.last() + 1);
     }
   if (n != 7 || !is_unit(fields, 3)) return std::nullopt;
-  pose_from(0);
-  return c;
+  return pose_from(0);
 }
 
 /// First rows of a file, from which the format is inferred.
 struct Sample {
+  explicit Sample(TextTable table) : names(table.names()), separator(table.separator()) {
+    constexpr std::size_t kRows = 1000;
+    while (rows.size() < kRows && table.next())
+      if (!table.fields().empty()) rows.push_back(table.fields());
+    if (!rows.empty()) time = find_time_columns(rows);
+  }
+  std::vector<std::string_view> names;
+  char separator;
   std::vector<std::vector<std::string_view>> rows{};
   TimeColumns time{};
-  std::vector<std::string_view> names{};
-  char separator = ' ';
 };
-
-Sample read_sample(std::string_view text) {
-  constexpr std::size_t kRows = 1000;
-  Sample s;
-  TextTable table(text);
-  s.names = table.names();
-  s.separator = table.separator();
-  while (s.rows.size() < kRows && table.next())
-    if (!table.fields().empty()) s.rows.push_back(table.fields());
-  if (!s.rows.empty()) s.time = find_time_columns(s.rows);
-  return s;
-}
 
 Columns find_columns(const fs::path& file, const Sample& sample, std::size_t first_line) {
   if (auto named = columns_of_names(sample.names)) return *named;
@@ -231,7 +208,7 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
     if (c.first > 0) c.time = TimeColumns{};
   } else if (n >= 8) {
     c.time = TimeColumns{};
-    for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = 1 + k;
+    std::iota(c.pose.begin(), c.pose.end(), std::size_t{1});
   } else {
     refuse(file, first_line,
            "has {} columns; a pose has 8 (stamp tx ty tz qx qy qz qw) or 12 (a 3x4 matrix, row by "
@@ -241,32 +218,26 @@ Columns find_columns(const fs::path& file, const Sample& sample, std::size_t fir
   return c;
 }
 
-/// Returns true if the file is EuRoC ground truth, by its headings or name.
-bool is_euroc_truth(const fs::path& file, const Sample& sample) {
-  return file.filename() == "data.csv" ||
-         std::ranges::any_of(sample.names,
-                             [](std::string_view name) { return plain(name) == "prsrx"; });
-}
-
 /// Keeps the first of the rows that repeat a stamp.
 void sort_by_stamp(Trajectory* poses) {
-  const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; };
-  if (!std::ranges::is_sorted(*poses, earlier)) std::ranges::stable_sort(*poses, earlier);
-  const auto same = [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; };
-  poses->erase(std::unique(poses->begin(), poses->end(), same), poses->end());
+  std::ranges::stable_sort(*poses, {}, &StampedPose::stamp);
+  const auto repeated = std::ranges::unique(*poses, {}, &StampedPose::stamp);
+  poses->erase(repeated.begin(), repeated.end());
 }
 
 /// Reads one file in two passes: its format, then its rows. Memory holds its text and its poses.
 class Reader {
  public:
   Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
-      : file_(file), text_(text), options_(options), sample_(read_sample(text)) {
+      : file_(file), text_(text), options_(options), sample_(TextTable(text)) {
     TextTable table(text);
     if (!table.next())
       refuse(file, 0,
              "has no pose: no row consists of numbers; pass a TUM, KITTI or EuRoC trajectory");
     columns_ = find_columns(file, sample_, table.line());
-    euroc_ = is_euroc_truth(file, sample_);
+    // Its headings or its name show ground truth of EuRoC.
+    euroc_ = file.filename() == "data.csv" ||
+             std::ranges::find(sample_.names, "prsrx", plain) != sample_.names.end();
     find_times();
     find_order();
   }
@@ -354,13 +325,6 @@ class Reader {
     return true;
   }
 
-  /// Returns false if the field has no value. Throws InputError for other text.
-  bool read_field(std::string_view field, std::size_t line, double* value) const {
-    if (parse_number(field, value)) return true;
-    if (is_no_value(field)) return false;
-    refuse(file_, line, "`{}` is not a finite number", field.substr(0, 40));
-  }
-
   bool read_stamp(const std::vector<std::string_view>& fields, std::size_t line, Stamp* stamp) {
     if (!columns_.time) {
       *stamp = Stamp(static_cast<std::int64_t>(rows_) * kRowStep);
@@ -387,13 +351,13 @@ class Reader {
 
   bool read_pose(const std::vector<std::string_view>& fields, std::size_t line, Transform* T) {
     std::array<double, 16> v{};
-    bool there = true;
-    for (std::size_t i = 0; i < columns_.count(); ++i)
-      there = read_field(
-                  fields[columns_.layout == Layout::pose ? columns_.pose[i] : columns_.first + i],
-                  line, &v[i]) &&
-              there;
-    if (!there) return false;
+    for (std::size_t i = 0; i < columns_.count(); ++i) {
+      const std::string_view field =
+          fields[columns_.layout == Layout::pose ? columns_.pose[i] : columns_.first + i];
+      if (is_no_value(field)) return false;
+      if (!parse_number(field, &v[i]))
+        refuse(file_, line, "`{}` is not a finite number", field.substr(0, 40));
+    }
     if (columns_.layout == Layout::pose) {
       const bool w_first = out_.order == QuaternionOrder::wxyz;
       const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
@@ -450,12 +414,11 @@ class Reader {
 
   void add_remarks() {
     auto& remarks = out_.remarks;
-    if (skipped_ > 0)
-      remarks.push_back(fmt::format("{} rows with NaN or a zero quaternion are skipped", skipped_));
-    if (repeated_ > 0)
-      remarks.push_back(fmt::format("{} rows that repeat a stamp are dropped", repeated_));
-    if (moved_ > 0)
-      remarks.push_back(fmt::format("rows are sorted by time, because {} rows went back", moved_));
+    for (const auto& [count, form] :
+         {std::pair{skipped_, "{} rows with NaN or a zero quaternion are skipped"},
+          {repeated_, "{} rows that repeat a stamp are dropped"},
+          {moved_, "rows are sorted by time, because {} rows went back"}})
+      if (count > 0) remarks.push_back(fmt::format(fmt::runtime(form), count));
     if (roughest_ > kRounded)
       remarks.push_back(fmt::format(
           "rotations have few decimals: they deviate from orthonormal by up to {:.1g}", roughest_));
@@ -481,10 +444,6 @@ class Reader {
   TrajectoryFile out_;
 };
 
-fs::path parent_folder(const fs::path& file) {
-  return file.has_parent_path() ? file.parent_path() : fs::path(".");
-}
-
 /// First of these files that exists.
 std::optional<fs::path> first_present(std::initializer_list<fs::path> candidates) {
   for (const fs::path& candidate : candidates)
@@ -505,40 +464,32 @@ void set_times(const fs::path& file, std::span<const Stamp> times, const std::st
   trajectory->timed = true;
 }
 
-void set_times_beside(const fs::path& file, TrajectoryFile* trajectory) {
-  const fs::path folder = parent_folder(file);
-  const auto times_path = first_present(
-      {folder / "times.txt", folder / ".." / "sequences" / file.stem() / "times.txt"});
-  if (!times_path) return;
-  std::vector<Stamp> times;
-  for (const TimesLine& line : read_times_file(*times_path, TimeUnit::seconds).lines)
-    times.push_back(line.stamp);
-  set_times(file, times, times_path->string(), trajectory);
-}
-
-void bring_to_camera(const fs::path& sensor, Trajectory* poses) {
-  const Transform T_body_left = read_body_mount(sensor);
-  for (StampedPose& pose : *poses) pose.T_world_body = pose.T_world_body * T_body_left;
-}
-
 TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options) {
   std::string text = read_text(path);
   put_decimal_points(&text);
   Reader reader(path, text, options);
   TrajectoryFile out = reader.read();
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   if (!out.timed && !options.times.empty())
     set_times(path, options.times, "the drive", &out);
-  else if (!out.timed)
-    set_times_beside(path, &out);
+  else if (const auto list = first_present(
+               {folder / "times.txt", folder / ".." / "sequences" / path.stem() / "times.txt"});
+           !out.timed && list) {
+    std::vector<Stamp> times;
+    for (const TimesLine& line : read_times_file(*list, TimeUnit::seconds).lines)
+      times.push_back(line.stamp);
+    set_times(path, times, list->string(), &out);
+  }
   if (!reader.euroc()) return out;
-  const fs::path folder = parent_folder(path);
-  if (const auto sensor =
-          first_present({folder / ".." / "cam0" / "sensor.yaml", folder / "cam0" / "sensor.yaml"}))
-    bring_to_camera(*sensor, &out.poses);
-  else
+  if (const auto sensor = first_present(
+          {folder / ".." / "cam0" / "sensor.yaml", folder / "cam0" / "sensor.yaml"})) {
+    const Transform T_body_left = read_body_mount(*sensor);
+    for (StampedPose& pose : out.poses) pose.T_world_body = pose.T_world_body * T_body_left;
+  } else {
     out.remarks.emplace_back(
         "this is the ground truth of the body, not of the left camera; put cam0/sensor.yaml of the "
         "data set next to it, or use --estimate-ins-extrinsics");
+  }
   return out;
 }
 

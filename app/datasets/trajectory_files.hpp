@@ -1,10 +1,4 @@
 #pragma once
-#include <filesystem>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "app/datasets/times_file.hpp"
 #include "core/types/stamped_pose.hpp"

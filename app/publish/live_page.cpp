@@ -24,7 +24,7 @@
 #include "app/publish/live_state.hpp"
 // CMake generates this header from app/publish/page/.
 #include "app/publish/page_parts.hpp"
-#include "app/report/style.hpp"
+#include "app/report/page_css.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/memory/ring.hpp"
 #include "drivers/clock.hpp"
@@ -70,8 +70,8 @@ std::string_view page_html() {
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
       "<link rel=\"icon\" href=\"data:,\"><title>vergence</title><style>" +
-      report::palette() + kPageCss + "</style></head>" + kPageBody + "<script>" + kPageScript +
-      "</script></html>\n";
+      std::string(report::kPalette) + kPageCss + "</style></head>" + kPageBody + "<script>" +
+      kPageScript + "</script></html>\n";
   return page;
 }
 

@@ -1,8 +1,5 @@
 #include "app/report/analysis.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -35,35 +32,17 @@ void measure_time(const Session& s, Analysis* a) {
     a->breaks[i] = a->time_s[i] - a->time_s[i - 1] > kWideGap * a->interval_s ? 1 : 0;
 }
 
-void measure_distance(const Session& s, Analysis* a) {
-  const Vec3* last = nullptr;
-  for (const Frame& f : s.frames) {
-    if (f.posed) {
-      if (last != nullptr) a->path_m += (f.T_world_left.t - *last).norm();
-      last = &f.T_world_left.t;
-    }
-    a->distance_m.push_back(a->path_m);
-  }
-}
-
-/// The first time that the drive confirmed the calibration in use.
-const Event* first_verification(const Session& s) {
-  const auto found = std::ranges::find_if(
-      s.events, [](const Event& e) { return e.kind == "calibration_verified"; });
-  return found == s.events.end() ? nullptr : &*found;
-}
-
-/// Frames that only waited for that. What is not confirmed later on, after a knock, is held against
-/// the drive.
+/// Frames that only waited for the first verification of the calibration in use. What is not
+/// confirmed later on, after a knock, is held against the drive.
 void count_waiting(const Session& s, Analysis* a) {
-  const Event* confirmed = first_verification(s);
-  if (confirmed != nullptr && !s.frames.empty())
+  const auto confirmed = std::ranges::find(s.events, "calibration_verified", &Event::kind);
+  const bool ever = confirmed != s.events.end();
+  if (ever && !s.frames.empty())
     a->verified_s = std::clamp(
         seconds_between(s.frames.front().stamp, std::max(s.frames.front().stamp, confirmed->stamp)),
         0.0, a->duration_s);
   for (const Frame& f : s.frames) {
-    if (f.status != PoseStatus::degraded || (confirmed != nullptr && f.stamp > confirmed->stamp))
-      continue;
+    if (f.status != PoseStatus::degraded || (ever && f.stamp > confirmed->stamp)) continue;
     if (f.reason != Reason::uncalibrated && f.reason != Reason::unverified_calibration) continue;
     ++a->waited;
     ++a->waited_by_reason[static_cast<std::size_t>(f.reason)];
@@ -84,25 +63,6 @@ void count_frames(const Session& s, Analysis* a) {
     a->ok_share = static_cast<double>(a->ok) / static_cast<double>(a->read + a->skipped);
 }
 
-std::vector<StampedPose> posed_frames(const Session& s) {
-  std::vector<StampedPose> poses;
-  for (const Frame& f : s.frames)
-    if (f.posed) poses.push_back({f.stamp, f.T_world_left});
-  return poses;
-}
-
-/// The rotation that turns the estimate's bodies onto the reference's, on average: the quaternion
-/// of the summed products, which lie close together at the start of a drive.
-Mat3 mean_rotation(std::span<const StampedPose> estimate, std::span<const StampedPose> reference) {
-  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-  for (std::size_t i = 0; i < estimate.size(); ++i) {
-    const Eigen::Vector4d q =
-        quaternion(reference[i].T_world_body.R * estimate[i].T_world_body.R.transpose()).coeffs();
-    sum += q.dot(sum) < 0 ? Eigen::Vector4d(-q) : q;
-  }
-  return Eigen::Quaterniond(sum).normalized().toRotationMatrix();
-}
-
 /// Aligns the first kAlignment metres of the estimate with the reference: by their attitudes and
 /// mean position, which a straight path determines, too.
 Transform align_start(const MatchedTrajectories& m) {
@@ -110,11 +70,18 @@ Transform align_start(const MatchedTrajectories& m) {
   std::size_t n = 1;
   for (; n < m.reference.size() && stretch < kAlignment; ++n)
     stretch += (m.reference[n].T_world_body.t - m.reference[n - 1].T_world_body.t).norm();
-  const auto estimate = std::span(m.estimate).first(n), reference = std::span(m.reference).first(n);
-  const Mat3 R = mean_rotation(estimate, reference);
+  // The mean of rotations that lie close together is their summed quaternions.
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Eigen::Vector4d q =
+        quaternion(m.reference[i].T_world_body.R * m.estimate[i].T_world_body.R.transpose())
+            .coeffs();
+    sum += q.dot(sum) < 0 ? Eigen::Vector4d(-q) : q;
+  }
+  const Mat3 R = Eigen::Quaterniond(sum).normalized().toRotationMatrix();
   Vec3 shift = Vec3::Zero();
   for (std::size_t i = 0; i < n; ++i)
-    shift += reference[i].T_world_body.t - R * estimate[i].T_world_body.t;
+    shift += m.reference[i].T_world_body.t - R * m.estimate[i].T_world_body.t;
   return {R, shift / static_cast<double>(n)};
 }
 
@@ -154,7 +121,9 @@ void compare_with_reference(const Session& s, const MatchedTrajectories& m, Anal
 }
 
 void add_reference(const Session& s, Analysis* a) {
-  const std::vector<StampedPose> estimate = posed_frames(s);
+  std::vector<StampedPose> estimate;
+  for (const Frame& f : s.frames)
+    if (f.posed) estimate.push_back({f.stamp, f.T_world_left});
   const MatchedTrajectories m = estimate.empty()
                                     ? MatchedTrajectories{}
                                     : associate(estimate, s.reference, EvaluationOptions{});
@@ -171,21 +140,16 @@ void add_reference(const Session& s, Analysis* a) {
   compare_with_reference(s, m, a);
 }
 
-/// After an interruption the trajectory is aligned with ENU again: its positions step there.
-void find_alignments(const Session& s, Analysis* a) {
-  bool placed = false;
+void add_ins(const Session& s, Analysis* a) {
+  a->map_is_enu = true;
+  // After an interruption the trajectory is aligned with ENU again: its positions step there.
+  bool placed = false, compared = false;
   for (const Event& e : s.events) {
     if (e.kind != "enu_alignment") continue;
     const auto next = std::ranges::lower_bound(s.frames, e.stamp, {}, &Frame::stamp);
     if (std::exchange(placed, true) && next != s.frames.end())
       a->map_breaks[static_cast<std::size_t>(next - s.frames.begin())] = 1;
   }
-}
-
-void add_ins(const Session& s, Analysis* a) {
-  a->map_is_enu = true;
-  find_alignments(s, a);
-  bool compared = false;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
     if (f.placed) a->estimate_x[i] = f.enu[0], a->estimate_y[i] = f.enu[1];
@@ -262,20 +226,6 @@ void add_metrics(const Session& s, Analysis* a) {
                             : "";
 }
 
-/// Positions of both at the frames that have both, the INS's in enu.
-MatchedTrajectories positions_with_ins(const Session& s) {
-  constexpr std::size_t kMaxPairs = 20'000;
-  const std::size_t stride = 1 + s.frames.size() / kMaxPairs;
-  MatchedTrajectories m;
-  for (std::size_t i = 0; i < s.frames.size(); i += stride) {
-    const Frame& f = s.frames[i];
-    if (!f.posed || !f.has_ins) continue;
-    m.estimate.push_back({f.stamp, f.T_world_left});
-    m.reference.push_back({f.stamp, {Mat3::Identity(), Vec3(f.ins[0], f.ins[1], f.ins[2])}});
-  }
-  return m;
-}
-
 /// Mean horizontal difference of the two ways over segments of one length, m; nothing when none is
 /// that long.
 std::optional<double> mean_difference(const MatchedTrajectories& m, const Mat3& R,
@@ -300,7 +250,15 @@ std::optional<double> mean_difference(const MatchedTrajectories& m, const Mat3& 
 void drift_by_positions(const Session& s, Analysis* a) {
   a->segment_error = a->drift;
   a->drift.reset();
-  const MatchedTrajectories m = positions_with_ins(s);
+  // Positions of both at the frames that have both, the INS's in enu.
+  constexpr std::size_t kMaxPairs = 20'000;
+  MatchedTrajectories m;
+  for (std::size_t i = 0; i < s.frames.size(); i += 1 + s.frames.size() / kMaxPairs) {
+    const Frame& f = s.frames[i];
+    if (!f.posed || !f.has_ins) continue;
+    m.estimate.push_back({f.stamp, f.T_world_left});
+    m.reference.push_back({f.stamp, {Mat3::Identity(), Vec3(f.ins[0], f.ins[1], f.ins[2])}});
+  }
   if (m.estimate.size() < 3) return;
   const Mat3 R = align(m.estimate, m.reference, AlignmentScale::one).R_reference_estimate;
   std::vector<double> driven{0};
@@ -330,7 +288,12 @@ Analysis analyse(const Session& session) {
   Analysis a;
   measure_time(session, &a);
   a.map_breaks = a.breaks;
-  measure_distance(session, &a);
+  const Vec3* last = nullptr;
+  for (const Frame& f : session.frames) {
+    if (f.posed && last != nullptr) a.path_m += (f.T_world_left.t - *last).norm();
+    if (f.posed) last = &f.T_world_left.t;
+    a.distance_m.push_back(a.path_m);
+  }
   count_frames(session, &a);
   count_waiting(session, &a);
   compare(session, &a);

@@ -1,10 +1,5 @@
 #pragma once
-#include <array>
 #include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/report/session.hpp"
 

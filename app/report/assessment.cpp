@@ -4,10 +4,8 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstddef>
 #include <map>
 #include <optional>
-#include <span>
 
 #include <fmt/format.h>
 
@@ -55,8 +53,6 @@ constexpr std::array<std::string_view, 6> kSkipped{"stamp_not_increasing", "stam
 constexpr const char* kSkippedAdvice =
     "The events name the files: check them, or copy the recording again.";
 
-std::string frames_text(std::size_t n) { return fmt::format("{} frame{}", n, n == 1 ? "" : "s"); }
-
 /// A drive of so many moving frames can confirm its calibration: 36 with a calibration given, 54
 /// from scratch (docs/calibration.md).
 inline constexpr std::size_t kFramesToVerify = 60;
@@ -88,12 +84,6 @@ struct Outages {
   std::optional<Stamp> open{};
 };
 
-/// `camera 1` of `camera 1 is disconnected; …`.
-std::string device_name(const Event& e) {
-  return e.kind.starts_with("trigger_board") ? "the trigger board"
-                                             : e.message.substr(0, e.message.find(" is "));
-}
-
 /// By device, from the events camera_disconnected, camera_reconnected, trigger_board_disconnected
 /// and trigger_board_reconnected.
 std::map<std::string, Outages> outages_of(std::span<const Event> events) {
@@ -102,7 +92,10 @@ std::map<std::string, Outages> outages_of(std::span<const Event> events) {
     const bool begins = e.kind == "camera_disconnected" || e.kind == "trigger_board_disconnected";
     if (!begins && e.kind != "camera_reconnected" && e.kind != "trigger_board_reconnected")
       continue;
-    Outages& o = all[device_name(e)];
+    // `camera 1` of `camera 1 is disconnected; …`.
+    Outages& o =
+        all[e.kind.starts_with("trigger_board") ? "the trigger board"
+                                                : e.message.substr(0, e.message.find(" is "))];
     if (begins && !o.open) {
       ++o.count;
       o.open = e.stamp;
@@ -139,8 +132,6 @@ constexpr double kPercent = 100.0;
 std::string percent(double share) {
   return fmt::format("{:.{}f} %", share * kPercent, share < 0.0995 ? 1 : 0);
 }
-
-bool accepted(const CalibrationRow& row) { return row.accepted; }
 
 std::string capitalised(std::string text) {
   text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
@@ -184,12 +175,10 @@ class Assessor {
   }
 
   [[nodiscard]] std::size_t count(std::string_view kind) const {
-    return static_cast<std::size_t>(
-        std::ranges::count_if(s_.events, [kind](const Event& e) { return e.kind == kind; }));
+    return static_cast<std::size_t>(std::ranges::count(s_.events, kind, &Event::kind));
   }
-  [[nodiscard]] bool any_accepted() const { return std::ranges::any_of(s_.calibrations, accepted); }
-  [[nodiscard]] bool all_posed() const {
-    return std::ranges::all_of(s_.frames, [](const Frame& f) { return f.posed; });
+  [[nodiscard]] bool any_accepted() const {
+    return std::ranges::any_of(s_.calibrations, &CalibrationRow::accepted);
   }
   [[nodiscard]] std::string since_start(Stamp stamp) const {
     const Stamp first = s_.frames.empty() ? stamp : s_.frames.front().stamp;
@@ -227,25 +216,25 @@ class Assessor {
 
   /// Why no calibration was accepted; empty if one was, or there was no attempt.
   [[nodiscard]] std::string rejection() const {
-    std::string why;
-    for (const CalibrationRow& row : s_.calibrations)
-      if (!row.kept && !row.reason.empty()) why = row.reason;
-    return any_accepted() ? "" : why;
+    const auto last = std::find_if(s_.calibrations.rbegin(), s_.calibrations.rend(),
+                                   [](const auto& c) { return !c.kept && !c.reason.empty(); });
+    return any_accepted() || last == s_.calibrations.rend() ? "" : last->reason;
   }
 
   /// No frame is ok. Returns true if that is because the run ended before it could verify its
   /// calibration.
   [[nodiscard]] bool ended_early() const {
-    std::size_t waiting = 0;
-    for (const Frame& f : s_.frames)
-      if (f.status == PoseStatus::degraded && is_waiting(f.reason)) ++waiting;
+    const auto waiting =
+        static_cast<std::size_t>(std::ranges::count_if(s_.frames, [](const Frame& f) {
+          return f.status == PoseStatus::degraded && is_waiting(f.reason);
+        }));
     return waiting > 0 && waiting == a_.degraded && moving_frames() < kFramesToVerify &&
            a_.lost <= a_.read / 10 && a_.skipped <= a_.read;
   }
 
   void assess_frames() {
-    const bool posed = std::ranges::any_of(s_.frames, [](const Frame& f) { return f.posed; });
-    if (!posed && (a_.read == 0 || a_.ok > 0)) return find(Grade::bad, "no frame has a pose");
+    if (std::ranges::none_of(s_.frames, &Frame::posed) && (a_.read == 0 || a_.ok > 0))
+      return find(Grade::bad, "no frame has a pose");
     if (a_.ok == 0) {
       unverified_ = ended_early();
       if (!unverified_) return assess_no_ok_frame();
@@ -277,7 +266,8 @@ class Assessor {
 
   /// A device that never came back ends the run or not; a long outage breaks the path.
   void assess_outages(const std::map<std::string, Outages>& outages) {
-    const bool holes = !all_posed() || std::ranges::find(a_.breaks, 1) != a_.breaks.end();
+    const bool holes = !std::ranges::all_of(s_.frames, &Frame::posed) ||
+                       std::ranges::find(a_.breaks, 1) != a_.breaks.end();
     for (const auto& [device, o] : outages) {
       const std::string was = device + " was disconnected";
       const Stamp end = s_.frames.empty() ? Stamp{} : s_.frames.back().stamp;
@@ -393,20 +383,19 @@ class Assessor {
 
   /// Findings from events about calibrations and lengths.
   void advise_on_events() {
-    const auto first = [this](std::string_view kind) {
-      const auto event =
-          std::ranges::find_if(s_.events, [kind](const Event& e) { return e.kind == kind; });
-      return event == s_.events.end() ? nullptr : &*event;
-    };
-    if (const Event* event = first("calibration_save_failed"))
-      advise("A calibration was not saved: " + event->message + ".");
-    if (const Event* event = first("calibration_contradicted"))
-      find(Grade::care, "the initial calibration does not fit the rig",
-           "Event calibration_contradicted: " + event->message +
-               ". Use the calibration.yaml of this session if it is verified.");
-    if (const Event* event = first("scale_disagrees"))
-      find(Grade::care, "lengths disagree with the INS",
-           "Event scale_disagrees: " + event->message + ".");
+    using Finding = std::array<const char*, 3>;
+    for (const auto& [kind, reason, advice] :
+         {Finding{"calibration_save_failed", "", "A calibration was not saved: {}."},
+          Finding{"calibration_contradicted", "the initial calibration does not fit the rig",
+                  "Event calibration_contradicted: {}. Use the calibration.yaml of this session if "
+                  "it is verified."},
+          Finding{"scale_disagrees", "lengths disagree with the INS",
+                  "Event scale_disagrees: {}."}}) {
+      const auto event = std::ranges::find(s_.events, kind, &Event::kind);
+      if (event == s_.events.end()) continue;
+      advise(fmt::format(fmt::runtime(advice), event->message));
+      if (*reason != 0) find(Grade::care, reason);
+    }
   }
 
   void assess_drift() {
@@ -462,13 +451,14 @@ class Assessor {
   void advise_by_reasons() {
     for (const std::string_view kind : kSkipped)
       if (const std::size_t n = count(kind); n > 0)
-        advise(fmt::format("{} ({} skipped): {}", kind, frames_text(n), kSkippedAdvice));
+        advise(
+            fmt::format("{} ({} frame{} skipped): {}", kind, n, n == 1 ? "" : "s", kSkippedAdvice));
     for (std::size_t i = 1; i < a_.by_reason.size(); ++i) {
       // Frames that were doubted for a moment, or a calibration that was asked for, are no knock.
       if (static_cast<Reason>(i) == Reason::recalibrating && count("rig_changed") == 0) continue;
       if (const std::size_t n = a_.by_reason[i] - a_.waited_by_reason[i]; n > 0)
-        advise(fmt::format("{} ({}): {}", to_string(static_cast<Reason>(i)), frames_text(n),
-                           kAdvice[i]));
+        advise(fmt::format("{} ({} frame{}): {}", to_string(static_cast<Reason>(i)), n,
+                           n == 1 ? "" : "s", kAdvice[i]));
     }
   }
 

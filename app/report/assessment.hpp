@@ -1,10 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "app/report/analysis.hpp"
-#include "app/report/session.hpp"
 
 namespace vergence::app::report {
 

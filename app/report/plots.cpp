@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <string_view>
+#include <limits>
 
 #include <fmt/format.h>
 #include <Eigen/Geometry>
@@ -27,12 +27,6 @@ struct PlotBox {
   }
   [[nodiscard]] double y(double v) const noexcept {
     return bottom - (v - y0) / (y1 - y0) * (bottom - top);
-  }
-  [[nodiscard]] Line line(const Line& data) const {
-    Line placed;
-    placed.reserve(data.size());
-    for (const Point& p : data) placed.push_back({x(p.x), y(p.y)});
-    return placed;
   }
   void draw_time_axis(Svg* svg) const {
     constexpr int kMax = 6;
@@ -74,13 +68,6 @@ struct PlotBox {
 // Number of columns of a curve, two per unit of the drawing, which is sharp on high-resolution
 // screens.
 constexpr int kColumns = 740;
-
-std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
-  std::vector<Line> placed;
-  placed.reserve(lines.size());
-  for (const Line& line : lines) placed.push_back(box.line(line));
-  return placed;
-}
 
 constexpr double kLaneHeight = 21, kBandLeft = 148;
 
@@ -126,31 +113,16 @@ std::vector<Lane> make_lanes(std::span<const Frame> frames) {
   constexpr std::array<const char*, 5> kStateCss{"f-care", "f-third", "f-theirs", "f-ours",
                                                  "f-fourth"};
   std::vector<Lane> lanes;
-  for (std::size_t k = 0; k < kStatusCss.size(); ++k) {
-    const auto status = static_cast<PoseStatus>(k);
-    lanes.push_back({to_string(status), kStatusCss[k],
-                     [=](std::size_t i) { return frames[i].status == status; }});
-  }
-  for (std::size_t k = 0; k < kStateCss.size(); ++k) {
-    const auto state = static_cast<State>(k);
-    if (std::ranges::find(frames, state, &Frame::state) != frames.end())
+  for (std::size_t k = 0; k < kStatusCss.size(); ++k)
+    lanes.push_back({to_string(static_cast<PoseStatus>(k)), kStatusCss[k], [=](std::size_t i) {
+                       return frames[i].status == static_cast<PoseStatus>(k);
+                     }});
+  for (std::size_t k = 0; k < kStateCss.size(); ++k)
+    if (const auto state = static_cast<State>(k);
+        std::ranges::find(frames, state, &Frame::state) != frames.end())
       lanes.push_back({to_string(state), kStateCss[k],
                        [=](std::size_t i) { return frames[i].state == state; }});
-  }
   return lanes;
-}
-
-void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
-  draw_track("events", box, top, svg);
-  double last = -1;
-  for (const Event& e : s.events) {
-    if (s.frames.empty() || e.stamp < s.frames.front().stamp || e.stamp > s.frames.back().stamp)
-      continue;
-    const double at = box.x(seconds_between(s.frames.front().stamp, e.stamp));
-    if (std::abs(at - last) < 1) continue;
-    svg->rect("f-ink", std::clamp(at - 1, box.left, box.right - 2), top + 3, 2, kLaneHeight - 7);
-    last = at;
-  }
 }
 
 /// Value of a calibration parameter, in use from `from` to `to`.
@@ -207,14 +179,6 @@ void draw_calibration(const std::vector<CalibrationValue>& values, const PlotBox
                 box.x(v.from), box.y(v.value), 2.8);
 }
 
-void draw_verification(double at_s, const PlotBox& box, Svg* svg) {
-  const double x = box.x(at_s);
-  svg->line("confirmed", x, box.top, x, box.bottom);
-  const bool near_the_end = x > box.right - 60;
-  svg->text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5),
-            box.top + 11, "verified");
-}
-
 // Sizes in the drawing. kFoot is the room for the scale bar.
 constexpr double kMargin = 16, kFoot = 38, kMin = 190, kMax = 420;
 // Distance in the drawing that is smaller than the line width.
@@ -230,31 +194,11 @@ struct MapScale {
   }
 };
 
-MapScale scale_for(const Eigen::AlignedBox2d& b) {
-  // Minimum extent in m, so that the noise of a vehicle at rest is not enlarged.
-  constexpr double kSmallest = 1;
-  const double width = std::max(b.sizes().x(), kSmallest),
-               depth = std::max(b.sizes().y(), kSmallest);
-  MapScale s;
-  s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
-  s.height = std::clamp(depth * s.per_metre + kMargin + kFoot, kMin, kMax);
-  s.x_middle = b.center().x(), s.y_middle = b.center().y();
-  return s;
-}
-
 void draw_path(const char* css, std::vector<double> x, std::vector<double> y,
                const std::vector<std::uint8_t>& breaks, const MapScale& s, Svg* svg) {
   for (double& v : x) v = s.x(v);
   for (double& v : y) v = s.y(v);
   svg->lines(css, thin(x, y, breaks, kThin, kMaxPoints));
-}
-
-/// Degraded stretches lie over the path in their own colour.
-void draw_degraded(const Analysis& a, std::span<const Frame> frames, const MapScale& s, Svg* svg) {
-  std::vector<double> x = a.estimate_x;
-  for (std::size_t i = 0; i < x.size(); ++i)
-    if (frames[i].status != PoseStatus::degraded) x[i] = kNone;
-  draw_path("curve map-care s-care", x, a.estimate_y, a.map_breaks, s, svg);
 }
 
 void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
@@ -268,45 +212,23 @@ void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
   svg->rect("f-ours", x - 4, y - 4, 8, 8);
 }
 
-void draw_scale_bar(const MapScale& s, Svg* svg) {
-  const auto ticks = nice_ticks(0, 150 / s.per_metre, 2);
-  const double metres = ticks.size() > 1 ? ticks[1] : 1;
-  const double y = s.height - 14, length = metres * s.per_metre;
-  svg->lines("curve s-ink",
-             {{{kMargin, y - 5}, {kMargin, y}, {kMargin + length, y}, {kMargin + length, y - 5}}});
-  const std::string words =
-      metres >= 1000 ? fmt::format("{:g} km", metres / 1000) : fmt::format("{:g} m", metres);
-  svg->text("strong", Anchor::start, kMargin + length + 8, y + 1, words);
-}
-
-void draw_north(const MapScale& s, Svg* svg) {
-  const double x = kPlotWidth - kMargin - 8, y = s.height - 12;
-  svg->polygon("f-ink", {{x, y - 22}, {x + 6, y}, {x, y - 5}, {x - 6, y}});
-  svg->text("strong", Anchor::end, x - 12, y - 2, "north");
-}
-
-}  // namespace
-
 /// From the first frame to the last along x.
-[[nodiscard]] static PlotBox time_box(const Analysis& a) {
+PlotBox time_box(const Analysis& a) {
   PlotBox box;
   // The range is never empty.
   box.x1 = a.duration_s > 0 ? a.duration_s : 1;
   return box;
 }
 
+}  // namespace
+
 std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
                        std::span<const Frame> frames) {
   PlotBox box = time_box(analysis);
-  double low = 0, high = 0;
-  bool any = false;
-  for (const double v : plot.y) {
-    if (!std::isfinite(v)) continue;
-    low = any ? std::min(low, v) : v;
-    high = any ? std::max(high, v) : v;
-    any = true;
-  }
-  if (!any) return {};
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double v : plot.y)
+    if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+  if (low > high) return {};
   box.fit_y(low, high, plot.from_zero);
   Svg svg(kPlotWidth, kPlotHeight, plot.description);
   draw_runs(
@@ -314,8 +236,11 @@ std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
       [&](std::size_t i) { return !frames[i].posed; }, &svg);
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
-  svg.lines(plot.css, on_paper(box, decimate(analysis.time_s, plot.y, analysis.breaks, box.x0,
-                                             box.x1, kColumns)));
+  std::vector<Line> lines =
+      decimate(analysis.time_s, plot.y, analysis.breaks, box.x0, box.x1, kColumns);
+  for (Line& line : lines)
+    for (Point& p : line) p = {box.x(p.x), box.y(p.y)};
+  svg.lines(plot.css, lines);
   return std::move(svg).finish();
 }
 
@@ -338,7 +263,17 @@ std::string bands_plot(const Session& session, const Analysis& analysis) {
     draw_track(std::string(lanes[i].name), box, top, &svg);
     draw_runs(lanes[i].css, box, analysis, top + 3, kLaneHeight - 7, lanes[i].shown, &svg);
   }
-  draw_events(session, box, events_top, &svg);
+  const auto& frames = session.frames;
+  draw_track("events", box, events_top, &svg);
+  double last = -1;
+  for (const Event& e : session.events) {
+    if (frames.empty() || e.stamp < frames.front().stamp || e.stamp > frames.back().stamp) continue;
+    const double at = box.x(seconds_between(frames.front().stamp, e.stamp));
+    if (std::abs(at - last) < 1) continue;
+    svg.rect("f-ink", std::clamp(at - 1, box.left, box.right - 2), events_top + 3, 2,
+             kLaneHeight - 7);
+    last = at;
+  }
   box.draw_time_axis(&svg);
   return std::move(svg).finish();
 }
@@ -360,7 +295,13 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
   Svg svg(kPlotWidth, kPlotHeight, "A calibration parameter over time with its 2 sigma band");
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
-  if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
+  if (analysis.verified_s) {
+    const double x = box.x(*analysis.verified_s);
+    const bool near_the_end = x > box.right - 60;
+    svg.line("confirmed", x, box.top, x, box.bottom);
+    svg.text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5),
+             box.top + 11, "verified");
+  }
   draw_calibration(values, box, &svg);
   return std::move(svg).finish();
 }
@@ -375,16 +316,37 @@ std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
     include(analysis.reference_x[i], analysis.reference_y[i]);
   }
   if (bounds.isEmpty()) return {};
-  const MapScale scale = scale_for(bounds);
+  // Minimum extent in m, so that the noise of a vehicle at rest is not enlarged.
+  constexpr double kSmallest = 1;
+  const double width = std::max(bounds.sizes().x(), kSmallest),
+               depth = std::max(bounds.sizes().y(), kSmallest);
+  MapScale scale;
+  scale.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
+  scale.height = std::clamp(depth * scale.per_metre + kMargin + kFoot, kMin, kMax);
+  scale.x_middle = bounds.center().x(), scale.y_middle = bounds.center().y();
   Svg svg(kPlotWidth, scale.height, "Trajectory seen from above");
   draw_path("curve map-theirs s-theirs", analysis.reference_x, analysis.reference_y,
             analysis.breaks, scale, &svg);
   draw_path("curve map-ours s-ours", analysis.estimate_x, analysis.estimate_y, analysis.map_breaks,
             scale, &svg);
-  draw_degraded(analysis, frames, scale, &svg);
+  // Degraded stretches lie over the path in their own colour.
+  std::vector<double> degraded = analysis.estimate_x;
+  for (std::size_t i = 0; i < degraded.size(); ++i)
+    if (frames[i].status != PoseStatus::degraded) degraded[i] = kNone;
+  draw_path("curve map-care s-care", degraded, analysis.estimate_y, analysis.map_breaks, scale,
+            &svg);
   draw_ends(analysis, scale, &svg);
-  draw_scale_bar(scale, &svg);
-  if (analysis.map_is_enu) draw_north(scale, &svg);
+  const auto ticks = nice_ticks(0, 150 / scale.per_metre, 2);
+  const double metres = ticks.size() > 1 ? ticks[1] : 1;
+  const double foot = scale.height - 14, end = kMargin + metres * scale.per_metre;
+  svg.lines("curve s-ink", {{{kMargin, foot - 5}, {kMargin, foot}, {end, foot}, {end, foot - 5}}});
+  svg.text("strong", Anchor::start, end + 8, foot + 1,
+           metres >= 1000 ? fmt::format("{:g} km", metres / 1000) : fmt::format("{:g} m", metres));
+  if (analysis.map_is_enu) {
+    const double x = kPlotWidth - kMargin - 8, y = scale.height - 12;
+    svg.polygon("f-ink", {{x, y - 22}, {x + 6, y}, {x, y - 5}, {x - 6, y}});
+    svg.text("strong", Anchor::end, x - 12, y - 2, "north");
+  }
   return std::move(svg).finish();
 }
 

@@ -1,9 +1,7 @@
 #pragma once
 #include <span>
-#include <string>
 
 #include "app/report/analysis.hpp"
-#include "app/report/session.hpp"
 
 /// Plots of a session, each a complete <svg> with coordinates in units of its viewBox, kPlotWidth
 /// wide, so that text stays readable on a phone. Decimation keeps extremes; missing values leave

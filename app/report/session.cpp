@@ -1,14 +1,10 @@
 #include "app/report/session.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fstream>
-#include <span>
 #include <type_traits>
-#include <utility>
 
-#include <fmt/format.h>
 #include <Eigen/Geometry>
 
 #include "app/datasets/text_file.hpp"
@@ -80,10 +76,6 @@ void read_part(const fs::path& file, const char* consequence, Session* session, 
   }
 }
 
-std::string lines_text(std::size_t count) {
-  return fmt::format("{} {}", count, count == 1 ? "line" : "lines");
-}
-
 /// Reads the rows of a file line by line, whatever its length. `parse` returns a row, or nothing
 /// for a damaged line. The end of the file without an end of line was left by a killed writer, and
 /// a number that is cut looks like another one, so it is skipped.
@@ -112,14 +104,14 @@ void read_rows(const fs::path& path, const char* consequence, std::vector<Row>* 
         rows->push_back(std::move(*row));
     }
     const std::string file = path.filename().string();
-    const auto report = [&](const std::string& message) {
-      session->missing.push_back(file + ": " + message);
-    };
-    if (damaged > 0) report(lines_text(damaged) + " skipped: damaged");
-    if (disordered > 0)
-      report(lines_text(disordered) + " skipped because the stamp does not increase");
+    for (const auto& [count, why] :
+         {std::pair{damaged, ": damaged"}, {disordered, " because the stamp does not increase"}})
+      if (count > 0)
+        session->missing.push_back(
+            fmt::format("{}: {} line{} skipped{}", file, count, count == 1 ? "" : "s", why));
     if (truncated || in.bad())
-      report("it ends within a line, which is skipped; the session was not closed");
+      session->missing.push_back(
+          file + ": it ends within a line, which is skipped; the session was not closed");
   });
 }
 
@@ -247,12 +239,6 @@ std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path) {
 std::string text_at(const nlohmann::json& json, std::string_view path) {
   const nlohmann::json* at = find_path(json, path);
   return at != nullptr && at->is_string() ? at->get<std::string>() : std::string();
-}
-
-bool is_live(const Session& session) {
-  // Only what devices give has figures of their clocks.
-  return session.summary.is_object() && session.summary.contains("time") &&
-         session.summary["time"].is_object();
 }
 
 Session read_session(const fs::path& folder) {

@@ -1,11 +1,8 @@
 #pragma once
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -85,9 +82,6 @@ struct Session {
 /// Reads the files line by line, without holding one in memory. Throws InputError if `folder` is
 /// not a directory or has no session file.
 [[nodiscard]] Session read_session(const std::filesystem::path& folder);
-
-/// True if it was recorded from devices; false for a replay, or if unknown.
-[[nodiscard]] bool is_live(const Session& session);
 
 /// Finite number of summary.json by its path, such as `metrics.ate_m`; empty for anything else.
 [[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);

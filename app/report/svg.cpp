@@ -15,6 +15,7 @@ namespace vergence::app::report {
 
 namespace {
 
+/// Indices of an unbroken piece of a curve.
 struct Piece {
   std::size_t begin = 0, end = 0;
 };
@@ -25,27 +26,11 @@ std::vector<Piece> pieces_of(std::span<const double> x, std::span<const double> 
   bool open = false;
   for (std::size_t i = 0; i < y.size(); ++i) {
     const bool there = std::isfinite(y[i]) && std::isfinite(x[i]);
-    if (open && there && (breaks.empty() || breaks[i] == 0)) {
-      pieces.back().end = i + 1;
-    } else if (there) {
-      pieces.push_back({i, i + 1});
-    }
+    if (there && (!open || (!breaks.empty() && breaks[i] != 0))) pieces.push_back({i, i});
+    if (there) pieces.back().end = i + 1;
     open = there;
   }
   return pieces;
-}
-
-/// Indices of what stays of the values [begin, end) that share a column.
-void keep_extremes(std::span<const double> x, std::span<const double> y, std::size_t begin,
-                   std::size_t end, Line* line) {
-  std::size_t low = begin, high = begin;
-  for (std::size_t i = begin; i < end; ++i) {
-    if (y[i] < y[low]) low = i;
-    if (y[i] > y[high]) high = i;
-  }
-  std::array<std::size_t, 4> kept{begin, std::min(low, high), std::max(low, high), end - 1};
-  const auto last = std::unique(kept.begin(), kept.end());
-  for (auto k = kept.begin(); k != last; ++k) line->push_back({x[*k], y[*k]});
 }
 
 std::vector<Line> thinned(std::span<const double> x, std::span<const double> y,
@@ -59,24 +44,6 @@ std::vector<Line> thinned(std::span<const double> x, std::span<const double> y,
     lines.push_back(std::move(line));
   }
   return lines;
-}
-
-std::size_t points_in(const std::vector<Line>& lines) {
-  std::size_t n = 0;
-  for (const Line& line : lines) n += line.size();
-  return n;
-}
-
-void append_escaped(std::string* out, std::string_view character) {
-  constexpr std::array<std::pair<char, const char*>, 5> kEntities{
-      {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}}};
-  const char c = character[0];
-  for (const auto& [special, entity] : kEntities)
-    if (c == special) {
-      *out += entity;
-      return;
-    }
-  *out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? " " : character;
 }
 
 // The limit is far outside every drawing.
@@ -119,7 +86,14 @@ std::vector<Line> decimate(std::span<const double> x, std::span<const double> y,
       const std::size_t begin = i;
       const double here = column(x[begin]);
       while (i < piece.end && column(x[i]) == here) ++i;
-      keep_extremes(x, y, begin, i, &line);
+      // The values [begin, i) share a column.
+      const auto values = y.subspan(begin, i - begin);
+      const auto [low, high] = std::ranges::minmax_element(values);
+      std::array kept{begin, begin + static_cast<std::size_t>(std::min(low, high) - values.begin()),
+                      begin + static_cast<std::size_t>(std::max(low, high) - values.begin()),
+                      i - 1};
+      const auto last = std::unique(kept.begin(), kept.end());
+      for (auto k = kept.begin(); k != last; ++k) line.push_back({x[*k], y[*k]});
     }
     lines.push_back(std::move(line));
   }
@@ -133,22 +107,30 @@ std::vector<Line> thin(std::span<const double> x, std::span<const double> y,
   constexpr int kDoublings = 40;
   const std::vector<Piece> pieces = pieces_of(x, y, breaks);
   std::vector<Line> lines = thinned(x, y, pieces, step);
-  for (int i = 0; i < kDoublings && points_in(lines) > most; ++i)
-    lines = thinned(x, y, pieces, step *= 2);
+  const auto points = [&] {
+    std::size_t n = 0;
+    for (const Line& line : lines) n += line.size();
+    return n;
+  };
+  for (int i = 0; i < kDoublings && points() > most; ++i) lines = thinned(x, y, pieces, step *= 2);
   return lines;
 }
 
 std::string escape(std::string_view text, std::size_t most) {
+  constexpr std::string_view kSpecial = "&<>\"'";
+  constexpr std::array kEntities{"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
   std::string out;
-  out.reserve(std::min(text.size(), most) + 16);
   for (std::size_t i = 0; i < text.size();) {
-    const std::size_t n = utf8_length(text.substr(i));
-    if (i + std::max<std::size_t>(n, 1) > most) return out + "…";
+    const std::size_t n = utf8_length(text.substr(i)), bytes = std::max<std::size_t>(n, 1);
+    if (i + bytes > most) return out + "…";
+    const auto c = static_cast<unsigned char>(text[i]);
     if (n == 0)
       out += "\xEF\xBF\xBD";
+    else if (const std::size_t special = kSpecial.find(text[i]); special < kEntities.size())
+      out += kEntities[special];
     else
-      append_escaped(&out, text.substr(i, n));
-    i += std::max<std::size_t>(n, 1);
+      out += c < 0x20 || c == 0x7f ? " " : text.substr(i, n);
+    i += bytes;
   }
   return out;
 }

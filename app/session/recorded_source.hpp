@@ -1,7 +1,6 @@
 #pragma once
 #include <memory>
 
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"

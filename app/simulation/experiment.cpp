@@ -1,8 +1,6 @@
 #include "app/simulation/experiment.hpp"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <fstream>
 #include <iostream>
 
@@ -23,21 +21,19 @@ constexpr double kFailedRatio = 1.2;
 constexpr double kFailedExact = 1e-6;
 
 /// One figure of a level: of all runs that did not fail.
-class Statistic {
- public:
-  void add(double v) { values_.push_back(v); }
+struct Statistic {
+  std::vector<double> values{};
+
+  void add(double v) { values.push_back(v); }
   [[nodiscard]] double mean() const {
-    return values_.empty()
+    return values.empty()
                ? 0
-               : Eigen::Map<const Eigen::ArrayXd>(values_.data(), std::ssize(values_)).mean();
+               : Eigen::Map<const Eigen::ArrayXd>(values.data(), std::ssize(values)).mean();
   }
   [[nodiscard]] double median() const {
-    std::vector<double> values = values_;
-    return values.empty() ? 0 : vergence::median(std::span(values));
+    std::vector<double> sorted = values;
+    return sorted.empty() ? 0 : vergence::median(std::span(sorted));
   }
-
- private:
-  std::vector<double> values_;
 };
 
 struct Level {

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "app/runtime/errors.hpp"
 #include "app/simulation/rig_simulation.hpp"

@@ -193,14 +193,11 @@ SimulatedRig simulate_rig(const SimulationOptions& o, Random& random) {
 }
 
 BundleCapacities capacities_for(const SimulationOptions& o) {
-  const auto n = [](int v) { return static_cast<std::size_t>(v); };
-  BundleCapacities c;
-  c.cameras = n(o.cameras);
-  // The count equals that of parallel_monocular.
-  c.poses = n(o.poses) * n(o.cameras);
-  c.points = n(o.points);
-  c.observations = n(o.poses) * n(o.cameras) * n(o.points);
-  return c;
+  const auto cameras = static_cast<std::size_t>(o.cameras),
+             poses = static_cast<std::size_t>(o.poses) * cameras,
+             points = static_cast<std::size_t>(o.points);
+  // The count of poses equals that of parallel_monocular.
+  return {.cameras = cameras, .poses = poses, .points = points, .observations = poses * points};
 }
 
 }  // namespace vergence

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdlib>
 
-#include "app/datasets/detail/bag_images.hpp"
+#include "app/datasets/detail/bag_index.hpp"
 #include "tests/fuzz/input_errors.hpp"
 #include "tests/support/bag_in_memory.hpp"
 

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <vector>
 
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/fuzz/input_errors.hpp"

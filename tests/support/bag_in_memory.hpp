@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "app/datasets/detail/formats.hpp"
-#include "app/datasets/detail/sqlite_bag.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::test {
@@ -25,7 +24,7 @@ namespace vergence::test {
   if (format == BagFormat::sqlite) {
     const TemporaryFolder folder;
     folder.write(name, {bytes.data(), bytes.size()});
-    files.push_back({name, std::make_unique<SqliteBag>(folder / name)});
+    files.push_back({name, open_sqlite_bag(folder / name)});
   } else {
     files.push_back({name, std::make_unique<MemoryBytes>(view)});
   }

@@ -1,17 +1,59 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "app/datasets/detail/byte_source.hpp"
-
 /// Reads messages of ROS recordings in any container front to back; indexes and summaries are not
 /// used.
 namespace vergence::app::detail {
+
+/// Bytes with random access. read() is thread-safe.
+class ByteSource {
+ public:
+  virtual ~ByteSource() = default;
+  [[nodiscard]] virtual std::uint64_t size() const noexcept = 0;
+  /// Fills `out` from `offset`. Returns false, with `out` undefined, if that fails.
+  [[nodiscard]] virtual bool read(std::uint64_t offset,
+                                  std::span<std::uint8_t> out) const noexcept = 0;
+};
+
+/// File among more than a process may have open: each thread keeps only its last file open.
+class FileBytes final : public ByteSource {
+ public:
+  /// Throws InputError if the file is missing, not regular or cannot be opened.
+  explicit FileBytes(const std::filesystem::path& file);
+  FileBytes(const FileBytes&) = delete;
+  FileBytes& operator=(const FileBytes&) = delete;
+  [[nodiscard]] std::uint64_t size() const noexcept override { return size_; }
+  [[nodiscard]] bool read(std::uint64_t offset,
+                          std::span<std::uint8_t> out) const noexcept override;
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  // Unique in the process.
+  std::uint64_t number_;
+  std::uint64_t size_ = 0;
+};
+
+/// View of bytes, which must outlive it.
+class MemoryBytes final : public ByteSource {
+ public:
+  explicit MemoryBytes(std::span<const std::uint8_t> bytes) noexcept : bytes_(bytes) {}
+  [[nodiscard]] std::uint64_t size() const noexcept override { return bytes_.size(); }
+  [[nodiscard]] bool read(std::uint64_t offset,
+                          std::span<std::uint8_t> out) const noexcept override;
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+};
 
 /// In bytes, packed or unpacked; rosbag and rosbag2 write less than 1 MiB.
 inline constexpr std::uint64_t kMaxChunk = std::uint64_t{64} << 20U;
@@ -88,8 +130,8 @@ struct BagScan {
 
 /// Passes every message to `each`, in the file's order (sqlite: by log time), except incomplete
 /// ones. Of uncompressed chunks only message headers are read. Returns nothing if the file does not
-/// begin as the format requires. Precondition: of sqlite a SqliteBag. Uses at most two times
-/// kMaxChunk, and kMaxChannels names.
+/// begin as the format requires. Precondition: of sqlite one of open_sqlite_bag(). Uses at most two
+/// times kMaxChunk, and kMaxChannels names.
 [[nodiscard]] std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file,
                                               const BagVisitor& each);
 
@@ -112,5 +154,11 @@ struct BagScan {
 [[nodiscard]] std::optional<BagScan> scan_rosbag(const ByteSource& file, const BagVisitor& each);
 [[nodiscard]] bool unpack_rosbag_chunk(const ByteSource& file, std::uint64_t offset,
                                        std::vector<std::uint8_t>* records);
+
+// ROS 2 bags in an SQLite file (.db3), opened read-only, with a write-ahead log (-wal) next to it.
+// A message's bytes have the offset row number · 2^32, so that code which reads files by offset can
+// read them. Opening throws InputError if the file is missing or SQLite cannot open it.
+[[nodiscard]] std::unique_ptr<const ByteSource> open_sqlite_bag(const std::filesystem::path& file);
+[[nodiscard]] std::optional<BagScan> scan_sqlite(const ByteSource& file, const BagVisitor& each);
 
 }  // namespace vergence::app::detail

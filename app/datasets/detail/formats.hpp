@@ -1,10 +1,7 @@
 #pragma once
-#include <array>
-#include <filesystem>
 
 #include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/kitti_calibration.hpp"
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 
 /// Shared parts of the readers of stereo_sequence.hpp.

@@ -1,8 +1,7 @@
 #pragma once
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <span>
+#include <array>
+#include <bit>
 
 #include "app/datasets/image_file.hpp"
 
@@ -37,16 +36,26 @@ using ImageBytes = std::span<const std::uint8_t>;
   return ImageFileStatus::ok;
 }
 
-/// Kind of image files. size() requires that is() is true, decode() that size() is ok; none throws.
+/// Whole number of `count` bytes.
+[[nodiscard]] inline std::uint32_t whole_at(ImageBytes bytes, std::size_t at, std::size_t count,
+                                            std::endian order) noexcept {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    value = value << 8U | bytes[at + (order == std::endian::big ? i : count - 1 - i)];
+  return value;
+}
+
+/// Kind of image files. size() requires that a file begins like this, decode() that size() is ok;
+/// none throws.
 ///
-/// is      Detects the kind by the first bytes.
+/// begins  First bytes of the kind.
 /// size    Reads the size from the first `head` bytes. → ok, truncated, not_an_image
 /// decode  Writes rows of `stride` bytes, colours as 0.299 R + 0.587 G + 0.114 B (or the file's own
 ///         luminance). Grey samples of 16 bits are narrowed() from `deep_bits`; colours keep their
 ///         upper 8 bits. → ok, truncated (incomplete or damaged), undecodable
 struct ImageKind {
   std::size_t head;
-  bool (*is)(ImageBytes) noexcept;
+  std::array<std::string_view, 2> begins;
   ImageFileStatus (*size)(ImageBytes, ImageSize*) noexcept;
   ImageFileStatus (*decode)(ImageBytes, ImageSize, std::uint8_t* out, std::size_t stride,
                             int deep_bits) noexcept;

@@ -1,7 +1,5 @@
 #include "app/datasets/detail/image_kinds.hpp"
 
-#include <algorithm>
-#include <array>
 #include <csetjmp>
 #include <cstdio>
 
@@ -16,7 +14,7 @@ namespace {
 constexpr int kMaxScans = 100;
 
 std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
-  return (std::uint32_t{b[at]} << 8U) | b[at + 1];
+  return whole_at(b, at, 2, std::endian::big);
 }
 
 // Frame headers are SOF0 to SOF15 without DHT, JPG and DAC.
@@ -79,10 +77,6 @@ bool read_rows(Decoder* d, ImageBytes bytes, ImageSize size, std::uint8_t* out,
   return true;
 }
 
-bool is_jpeg(ImageBytes b) noexcept {
-  return b.size() >= 3 && b[0] == 0xff && b[1] == 0xd8 && b[2] == 0xff;
-}
-
 ImageFileStatus jpeg_size(ImageBytes b, ImageSize* size) noexcept {
   std::size_t at = 2;
   while (at + 9 <= b.size()) {
@@ -123,6 +117,6 @@ ImageFileStatus decode_jpeg(ImageBytes bytes, ImageSize size, std::uint8_t* out,
 
 }  // namespace
 
-const ImageKind kJpeg{kJpegHead, is_jpeg, jpeg_size, decode_jpeg};
+const ImageKind kJpeg{kJpegHead, {"\xff\xd8\xff", "\xff\xd8\xff"}, jpeg_size, decode_jpeg};
 
 }  // namespace vergence::app::detail

@@ -1,8 +1,5 @@
-#include "app/datasets/detail/bag_scan.hpp"
 
 #include <algorithm>
-#include <array>
-#include <map>
 
 #include "app/datasets/detail/record_scanner.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
@@ -68,12 +65,6 @@ std::optional<Chunk> find_chunk(const ByteSource& file, const Record& record) {
   return chunk;
 }
 
-MessageEncoding to_encoding(const std::string& name) {
-  return name == "cdr"    ? MessageEncoding::cdr
-         : name == "ros1" ? MessageEncoding::ros1
-                          : MessageEncoding::other;
-}
-
 /// Scan of one file.
 class McapScanner final : RecordScanner<Record> {
  public:
@@ -102,20 +93,17 @@ class McapScanner final : RecordScanner<Record> {
   void read_chunk(const Record& record) {
     const std::uint64_t here = record.content - kRecordHead;
     if (const auto chunk = find_chunk(file_, record))
-      RecordScanner::read_chunk(*chunk, here);
-    else
-      scan_.skip(here, "a chunk whose head contradicts its length");
+      return RecordScanner::read_chunk(*chunk, here);
+    scan_.skip(here, "a chunk whose head contradicts its length");
   }
 
   void read_record(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                    std::uint64_t here) override {
     if (record.opcode == Opcode::message) return read_message(bytes, record, chunk, here);
     if (record.opcode != Opcode::schema && record.opcode != Opcode::channel) return;
-    if (record.size > kMaxDescription) return scan_.skip(here, "a description longer than 1 MiB");
-    std::vector<std::uint8_t> content(static_cast<std::size_t>(record.size));
-    if (!bytes.read(record.content, content))
-      return scan_.skip(here, "a description that cannot be read");
-    RosReader in = little_endian(content);
+    const auto content = description(bytes, record, here);
+    if (!content) return;
+    RosReader in = little_endian(*content);
     const std::uint16_t id = in.get<std::uint16_t>();
     if (record.opcode == Opcode::schema) {
       std::string name = in.text();
@@ -125,7 +113,11 @@ class McapScanner final : RecordScanner<Record> {
       return;
     }
     const std::uint16_t schema = in.get<std::uint16_t>();
-    BagChannel channel{in.text(), "", to_encoding(in.text())};
+    BagChannel channel;
+    channel.topic = in.text();
+    const std::string encoding = in.text();
+    if (encoding == "cdr") channel.encoding = MessageEncoding::cdr;
+    if (encoding == "ros1") channel.encoding = MessageEncoding::ros1;
     if (!in.ok() || channel.topic.size() > kMaxName)
       return scan_.skip(here, "a channel whose lengths contradict each other");
     if (const auto type = types_.find(schema); type != types_.end()) channel.type = type->second;

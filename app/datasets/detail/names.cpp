@@ -7,9 +7,6 @@
 namespace vergence::app::detail {
 namespace {
 
-struct Sides {
-  std::string left, right;
-};
 /// Words for left and right in turns, the more specific ones first: `left/cam0` is left because of
 /// `left`. The last ones are for images in one directory: frame 12 is `000012_0.png` and
 /// `000012_1.png`.
@@ -20,10 +17,10 @@ constexpr const char* kSides =
     "camera2 camera_1 camera_2 image_1 image_2 image1 image2 i1 i2 caml camr imgl imgr lcam rcam l "
     "r c0 c1 0 1";
 
-std::vector<Sides> all_sides() {
-  std::vector<Sides> all;
+std::vector<std::array<std::string, 2>> all_sides() {
+  std::vector<std::array<std::string, 2>> all;
   std::istringstream words(kSides);
-  for (Sides sides; words >> sides.left >> sides.right;) all.push_back(sides);
+  for (std::array<std::string, 2> sides; words >> sides[0] >> sides[1];) all.push_back(sides);
   return all;
 }
 
@@ -84,6 +81,23 @@ bool in_name_order(std::string_view a, std::string_view b) noexcept {
   return a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
+bool present(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
+std::vector<std::filesystem::path> entries_in(const std::filesystem::path& folder,
+                                              std::error_code* error) {
+  std::vector<std::filesystem::path> entries;
+  std::error_code failed;
+  for (std::filesystem::directory_iterator it(folder, failed), end; !failed && it != end;
+       it.increment(failed))
+    entries.push_back(it->path());
+  if (error != nullptr) *error = failed;
+  std::ranges::sort(entries, in_name_order, [](const auto& p) { return p.filename().string(); });
+  return entries;
+}
+
 std::string lower(std::string_view text) {
   std::string small(text);
   std::ranges::transform(small, small.begin(), [](char c) {
@@ -97,14 +111,14 @@ std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::stri
   std::map<std::string, std::string> there;
   for (const std::string& name : names) there.emplace(lower(name), name);
   std::vector<std::array<std::string, 2>> pairs;
-  for (const Sides& sides : all_sides()) {
-    if (is_digit(sides.left[0])) continue;
+  for (const auto& [left, right] : all_sides()) {
+    if (is_digit(left[0])) continue;
     for (const auto& [small, name] : there) {
-      const auto other = replaced(small, sides.left, sides.right);
+      const auto other = replaced(small, left, right);
       const auto found = other ? there.find(*other) : there.end();
-      const bool paired =
-          std::ranges::any_of(pairs, [&name = name](const auto& pair) { return pair[0] == name; });
-      if (found != there.end() && !paired) pairs.push_back({name, found->second});
+      if (found != there.end() &&
+          std::ranges::find(pairs, name, [](const auto& pair) { return pair[0]; }) == pairs.end())
+        pairs.push_back({name, found->second});
     }
   }
   return pairs;
@@ -117,21 +131,19 @@ std::optional<std::string> without_side(const std::string& name, const std::stri
 std::array<std::string, 2> side_names(const std::vector<std::string>& files) {
   std::array<std::string, 2> best;
   std::size_t most = 0;
-  for (const Sides& sides : all_sides()) {
+  for (const auto& sides : all_sides()) {
     std::array<std::size_t, 2> of{};
     for (const std::string& file : files) {
-      const std::string small = lower(file);
-      const bool left = replaced(small, sides.left, "").has_value(),
-                 right = replaced(small, sides.right, "").has_value();
-      if (left != right) ++of[left ? 0 : 1];
+      const bool left = without_side(file, sides[0]).has_value();
+      if (left != without_side(file, sides[1]).has_value()) ++of[left ? 0 : 1];
     }
     // A directory of one camera also has some names that look like sides. Numbers are the weakest
     // evidence.
     if (std::min(of[0], of[1]) <= most || 10 * (of[0] + of[1]) < 9 * files.size() ||
-        (is_digit(sides.left[0]) && (most > 0 || files.size() < 3)))
+        (is_digit(sides[0][0]) && (most > 0 || files.size() < 3)))
       continue;
     most = std::min(of[0], of[1]);
-    best = {sides.left, sides.right};
+    best = sides;
   }
   return best;
 }

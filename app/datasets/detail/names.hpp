@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -27,6 +28,13 @@ namespace vergence::app::detail {
 /// `left/2.png` before `left/10.png`. A strict order: of equal numbers the one with fewer digits
 /// comes first.
 [[nodiscard]] bool in_name_order(std::string_view a, std::string_view b) noexcept;
+
+/// True if the file or directory exists and can be reached.
+[[nodiscard]] bool present(const std::filesystem::path& path);
+/// Entries of a directory in the order of their names; empty if it cannot be listed, for the reason
+/// in *error.
+[[nodiscard]] std::vector<std::filesystem::path> entries_in(const std::filesystem::path& folder,
+                                                            std::error_code* error = nullptr);
 
 /// Converts to lower case.
 [[nodiscard]] std::string lower(std::string_view text);

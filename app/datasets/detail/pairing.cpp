@@ -1,11 +1,10 @@
 #include "app/datasets/detail/pairing.hpp"
 #include "core/math/robust.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
-#include <numeric>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -20,34 +19,23 @@ std::int64_t apart(Stamp a, Stamp b) {
   return static_cast<std::int64_t>(std::min(later - earlier, kMax));
 }
 
-/// Stamps ordered by time.
-class Sorted {
- public:
-  explicit Sorted(std::span<const Stamp> stamps) : stamps_(stamps), order_(stamps.size()) {
-    std::iota(order_.begin(), order_.end(), std::size_t{0});
-    std::ranges::stable_sort(order_,
-                             [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
-  }
-  /// Index of the nearest stamp; the earlier one of two. Precondition: there is one.
-  [[nodiscard]] std::size_t nearest(Stamp to) const {
-    const auto after = std::lower_bound(order_.begin(), order_.end(), to,
-                                        [&](std::size_t i, Stamp s) { return stamps_[i] < s; });
-    if (after == order_.begin()) return *after;
-    const std::size_t before = *(after - 1);
-    return after == order_.end() || apart(stamps_[before], to) <= apart(stamps_[*after], to)
-               ? first_of(before)
-               : *after;
-  }
+/// First index of every stamp.
+using IndexByStamp = std::map<Stamp, std::size_t>;
 
- private:
-  /// Returns the first of the images that share the stamp of image i.
-  [[nodiscard]] std::size_t first_of(std::size_t i) const {
-    return *std::lower_bound(order_.begin(), order_.end(), stamps_[i],
-                             [&](std::size_t k, Stamp s) { return stamps_[k] < s; });
-  }
-  std::span<const Stamp> stamps_;
-  std::vector<std::size_t> order_;
-};
+IndexByStamp index_stamps(std::span<const Stamp> stamps) {
+  IndexByStamp index;
+  for (std::size_t i = 0; i < stamps.size(); ++i) index.emplace(stamps[i], i);
+  return index;
+}
+
+/// Index of the nearest stamp; the earlier one of two. Precondition: there is one.
+std::size_t nearest(const IndexByStamp& stamps, Stamp to) {
+  const auto after = stamps.lower_bound(to);
+  if (after == stamps.begin()) return after->second;
+  const auto before = std::prev(after);
+  const bool earlier = after == stamps.end() || apart(before->first, to) <= apart(after->first, to);
+  return (earlier ? before : after)->second;
+}
 
 template <typename T>
 T at_share(std::vector<T> values, double share) {
@@ -71,10 +59,10 @@ std::vector<std::array<std::size_t, 2>> pair_nearest(std::span<const Stamp> left
                                                      std::span<const Stamp> right, Duration most) {
   std::vector<std::array<std::size_t, 2>> pairs;
   if (left.empty() || right.empty()) return pairs;
-  const Sorted of_left(left), of_right(right);
+  const IndexByStamp of_left = index_stamps(left), of_right = index_stamps(right);
   for (std::size_t l = 0; l < left.size(); ++l) {
-    const std::size_t r = of_right.nearest(left[l]);
-    if (apart(left[l], right[r]) <= most.ns() && of_left.nearest(right[r]) == l)
+    const std::size_t r = nearest(of_right, left[l]);
+    if (apart(left[l], right[r]) <= most.ns() && nearest(of_left, right[r]) == l)
       pairs.push_back({l, r});
   }
   return pairs;

@@ -2,8 +2,6 @@
 
 #include <png.h>
 
-#include <algorithm>
-#include <array>
 #include <csetjmp>
 #include <cstring>
 
@@ -12,12 +10,7 @@ namespace {
 
 // Size of the signature and the whole IHDR chunk, in bytes.
 constexpr std::size_t kPngHead = 33;
-constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-
-std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
-  return (std::uint32_t{b[at]} << 24U) | (std::uint32_t{b[at + 1]} << 16U) |
-         (std::uint32_t{b[at + 2]} << 8U) | b[at + 3];
-}
+constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
 
 struct Source {
   ImageBytes bytes;
@@ -101,15 +94,10 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
   return true;
 }
 
-bool is_png(ImageBytes b) noexcept {
-  return b.size() >= kSignature.size() &&
-         std::equal(kSignature.begin(), kSignature.end(), b.begin());
-}
-
 ImageFileStatus png_size(ImageBytes b, ImageSize* size) noexcept {
-  if (b.size() < kPngHead) return ImageFileStatus::truncated;
-  if (std::memcmp(&b[12], "IHDR", 4) != 0) return ImageFileStatus::truncated;
-  return accept_size(u32(b, 16), u32(b, 20), size);
+  if (b.size() < kPngHead || std::memcmp(&b[12], "IHDR", 4) != 0) return ImageFileStatus::truncated;
+  const auto side = [&](std::size_t at) { return whole_at(b, at, 4, std::endian::big); };
+  return accept_size(side(16), side(20), size);
 }
 
 ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
@@ -124,6 +112,6 @@ ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, 
 
 }  // namespace
 
-const ImageKind kPng{kPngHead, is_png, png_size, decode_png};
+const ImageKind kPng{kPngHead, {kSignature, kSignature}, png_size, decode_png};
 
 }  // namespace vergence::app::detail

@@ -1,10 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <map>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "app/datasets/detail/bag_scan.hpp"
 
@@ -46,6 +41,17 @@ class RecordScanner {
     if (const std::string why = unpack(file_, chunk, &records_); !why.empty())
       return scan_.skip(here, why);
     read_records(MemoryBytes(records_), 0, records_.size(), here, here);
+  }
+
+  /// Content of a record that describes a channel; empty, with the record skipped, if unreadable.
+  [[nodiscard]] std::optional<std::vector<std::uint8_t>> description(const ByteSource& bytes,
+                                                                     const Record& record,
+                                                                     std::uint64_t here) {
+    std::vector<std::uint8_t> content(
+        static_cast<std::size_t>(std::min<std::uint64_t>(record.size, kMaxDescription + 1)));
+    if (content.size() <= kMaxDescription && bytes.read(record.content, content)) return content;
+    scan_.skip(here, "a description longer than 1 MiB or unreadable");
+    return std::nullopt;
   }
 
   /// Passes a message on if its channel is described.

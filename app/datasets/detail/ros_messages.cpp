@@ -1,9 +1,6 @@
 #include "app/datasets/detail/ros_messages.hpp"
 
-#include <array>
 #include <cmath>
-#include <string_view>
-#include <vector>
 
 #include "app/datasets/detail/image_kinds.hpp"
 #include "app/datasets/detail/names.hpp"
@@ -58,13 +55,6 @@ constexpr double kUnknownHeight = 1000;
 double sigma(double a, double b) noexcept {
   const double variance = (a + b) / 2;
   return a >= 0 && b >= 0 && variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : 0;
-}
-
-bool make_unit(std::array<double, 4>* q) noexcept {
-  const double length = std::hypot(std::hypot((*q)[0], (*q)[1]), std::hypot((*q)[2], (*q)[3]));
-  if (!(std::abs(length - 1) <= kUnitLength)) return false;
-  for (double& v : *q) v /= length;
-  return true;
 }
 
 }  // namespace
@@ -208,7 +198,10 @@ std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> messa
   attitude.q_world_body = in.doubles<4>();
   // In rad² about x, y, z; the first is −1 without an orientation.
   const auto covariance = in.doubles<9>();
-  if (!in.ok() || covariance[0] < 0 || !make_unit(&attitude.q_world_body)) return std::nullopt;
+  auto& q = attitude.q_world_body;
+  const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+  if (!in.ok() || covariance[0] < 0 || !(std::abs(length - 1) <= kUnitLength)) return std::nullopt;
+  for (double& v : q) v /= length;
   attitude.tilt_sigma = sigma(covariance[0], covariance[4]);
   attitude.heading_sigma = sigma(covariance[8], covariance[8]);
   return attitude;

@@ -1,13 +1,7 @@
 #pragma once
 #include <array>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <span>
-#include <string>
 
 #include "app/datasets/detail/bag_scan.hpp"
-#include "app/datasets/image_file.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "core/types/time.hpp"
 #include "drivers/ins.hpp"

@@ -1,11 +1,7 @@
 #pragma once
 #include <array>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <cstring>
-#include <span>
-#include <string>
 #include <type_traits>
 
 #include "app/datasets/detail/bag_scan.hpp"
@@ -18,7 +14,15 @@ namespace vergence::app::detail {
 /// are checked against the available bytes before allocation.
 class RosReader {
  public:
-  RosReader(std::span<const std::uint8_t> bytes, MessageEncoding encoding) noexcept;
+  RosReader(std::span<const std::uint8_t> bytes, MessageEncoding encoding) noexcept
+      : bytes_(bytes),
+        cdr_(encoding == MessageEncoding::cdr),
+        ok_(encoding != MessageEncoding::other) {
+    if (!cdr_) return;
+    begin_ = at_ = 4;
+    ok_ = bytes.size() >= 4 && bytes[0] == 0 && bytes[1] <= 1;
+    little_ = ok_ && bytes[1] == 1;
+  }
 
   template <typename T>
   [[nodiscard]] T get() noexcept {
@@ -44,9 +48,25 @@ class RosReader {
     for (double& v : values) v = get<double>();
     return values;
   }
-  [[nodiscard]] std::string text();
+  [[nodiscard]] std::string text() {
+    // In CDR the length includes the final 0.
+    const auto length = get<std::uint32_t>();
+    ok_ = ok_ && length <= bytes_.size() - at_;
+    if (!ok_) return "";
+    const auto* begin = reinterpret_cast<const char*>(bytes_.data() + at_);
+    at_ += length;
+    return length == 0 ? "" : std::string(begin, cdr_ ? length - 1 : length);
+  }
   /// Reads a std_msgs/Header.
-  [[nodiscard]] Stamp header();
+  [[nodiscard]] Stamp header() {
+    // ROS 1 headers begin with the publisher's sequence number.
+    if (!cdr_) (void)get<std::uint32_t>();
+    // Seconds are signed in ROS 2 and unsigned in ROS 1.
+    const auto seconds = get<std::uint32_t>(), ns = get<std::uint32_t>();
+    (void)text();
+    return Stamp(
+        (cdr_ ? std::int64_t{static_cast<std::int32_t>(seconds)} : seconds) * 1'000'000'000 + ns);
+  }
   [[nodiscard]] bool ok() const noexcept { return ok_; }
   /// Position relative to the message's first byte.
   [[nodiscard]] std::size_t position() const noexcept { return at_; }
@@ -58,38 +78,5 @@ class RosReader {
   std::size_t begin_ = 0;
   std::size_t at_ = 0;
 };
-
-inline RosReader::RosReader(std::span<const std::uint8_t> bytes, MessageEncoding encoding) noexcept
-    : bytes_(bytes), cdr_(encoding == MessageEncoding::cdr) {
-  ok_ = encoding != MessageEncoding::other;
-  if (!cdr_) return;
-  begin_ = at_ = 4;
-  ok_ = bytes.size() >= 4 && bytes[0] == 0 && bytes[1] <= 1;
-  little_ = ok_ && bytes[1] == 1;
-}
-
-inline std::string RosReader::text() {
-  // In CDR the length includes the final 0.
-  const auto length = get<std::uint32_t>();
-  if (!ok_ || length > bytes_.size() - at_) {
-    ok_ = false;
-    return "";
-  }
-  const auto* begin = reinterpret_cast<const char*>(bytes_.data() + at_);
-  at_ += length;
-  return length == 0 ? "" : std::string(begin, cdr_ ? length - 1 : length);
-}
-
-inline Stamp RosReader::header() {
-  // ROS 1 headers begin with the publisher's sequence number.
-  if (!cdr_) (void)get<std::uint32_t>();
-  // Seconds are signed in ROS 2 and unsigned in ROS 1.
-  const auto seconds = get<std::uint32_t>();
-  const auto ns = get<std::uint32_t>();
-  (void)text();
-  return Stamp((cdr_ ? std::int64_t{static_cast<std::int32_t>(seconds)} : std::int64_t{seconds}) *
-                   1'000'000'000 +
-               ns);
-}
 
 }  // namespace vergence::app::detail

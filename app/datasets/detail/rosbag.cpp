@@ -1,8 +1,5 @@
-#include "app/datasets/detail/bag_scan.hpp"
 
 #include <algorithm>
-#include <array>
-#include <string_view>
 
 #include "app/datasets/detail/record_scanner.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
@@ -166,11 +163,11 @@ class RosbagScanner final : RecordScanner<Record> {
   }
 
   void read_connection(const ByteSource& bytes, const Record& record, std::uint64_t here) {
-    if (record.size > kMaxDescription) return scan_.skip(here, "a description longer than 1 MiB");
-    std::vector<std::uint8_t> data(record.size);
+    const auto data = description(bytes, record, here);
     Header about;
-    if (!bytes.read(record.content, data) || !parse_fields(data, &about) || about.type.empty() ||
-        record.header.topic.empty() || !record.header.connection)
+    if (!data) return;
+    if (!parse_fields(*data, &about) || about.type.empty() || record.header.topic.empty() ||
+        !record.header.connection)
       return scan_.skip(here, "a connection without a topic or a type");
     if (channels_.size() >= kMaxChannels) return scan_.skip(here, "one connection too many");
     channels_.try_emplace(

@@ -1,17 +1,46 @@
-#include "app/datasets/detail/sqlite_bag.hpp"
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <sqlite3.h>
 
 #include <map>
-#include <string>
+#include <mutex>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
 namespace {
+
+/// ROS 2 bag in an SQLite file (.db3), opened read-only. A message's bytes have the offset row
+/// number · 2^32, so that code which reads files by offset can read it.
+class SqliteBag final : public ByteSource {
+ public:
+  /// Throws InputError if the file is missing or SQLite cannot open it. Also reads a write-ahead
+  /// log (-wal) next to it.
+  explicit SqliteBag(const std::filesystem::path& file);
+  ~SqliteBag() override;
+  SqliteBag(const SqliteBag&) = delete;
+  SqliteBag& operator=(const SqliteBag&) = delete;
+
+  [[nodiscard]] std::uint64_t size() const noexcept override;
+  [[nodiscard]] bool read(std::uint64_t offset,
+                          std::span<std::uint8_t> out) const noexcept override;
+  /// Same as scan_bag(). Empty if it is no SQLite file, or has no tables of a bag.
+  [[nodiscard]] std::optional<BagScan> scan(const BagVisitor& each) const;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const noexcept;
+    void operator()(sqlite3_blob* blob) const noexcept;
+  };
+
+  std::unique_ptr<sqlite3, Close> database_;
+  // Guards the members below and all accesses to the database.
+  mutable std::mutex mutex_;
+  mutable std::unique_ptr<sqlite3_blob, Close> blob_;
+  // Row of the blob.
+  mutable std::uint64_t row_ = 0;
+};
 
 // The lower bits are the offset in a row's bytes, the upper ones the row.
 constexpr unsigned kRowBits = 32;
@@ -30,35 +59,22 @@ std::string to_uri(const std::filesystem::path& file) {
   return uri + (ignored || log == 0 ? "?mode=ro&immutable=1" : "?mode=ro");
 }
 
-class Statement {
- public:
-  Statement(sqlite3* database, const char* sql) noexcept {
-    if (sqlite3_prepare_v2(database, sql, -1, &statement_, nullptr) != SQLITE_OK)
-      statement_ = nullptr;
-  }
-  ~Statement() { sqlite3_finalize(statement_); }
-  Statement(const Statement&) = delete;
-  Statement& operator=(const Statement&) = delete;
+using Statement = std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)>;
 
-  [[nodiscard]] bool ok() const noexcept { return statement_ != nullptr; }
-  /// Returns SQLITE_ROW, SQLITE_DONE or an error.
-  [[nodiscard]] int step() noexcept { return sqlite3_step(statement_); }
-  [[nodiscard]] std::int64_t integer(int column) noexcept {
-    return sqlite3_column_int64(statement_, column);
-  }
-  [[nodiscard]] std::string text(int column) {
-    const auto* bytes = sqlite3_column_text(statement_, column);
-    const int size = sqlite3_column_bytes(statement_, column);
-    return bytes == nullptr
-               ? std::string()
-               : std::string(reinterpret_cast<const char*>(bytes), static_cast<std::size_t>(size));
-  }
+/// Null if the database has no such tables.
+Statement prepare(sqlite3* database, const char* sql) noexcept {
+  sqlite3_stmt* statement = nullptr;
+  (void)sqlite3_prepare_v2(database, sql, -1, &statement, nullptr);
+  return {statement, sqlite3_finalize};
+}
 
- private:
-  sqlite3_stmt* statement_ = nullptr;
-};
-
-}  // namespace
+std::string text(const Statement& row, int column) {
+  const auto* bytes = sqlite3_column_text(row.get(), column);
+  return bytes == nullptr
+             ? ""
+             : std::string(reinterpret_cast<const char*>(bytes),
+                           static_cast<std::size_t>(sqlite3_column_bytes(row.get(), column)));
+}
 
 void SqliteBag::Close::operator()(sqlite3* database) const noexcept { sqlite3_close(database); }
 void SqliteBag::Close::operator()(sqlite3_blob* blob) const noexcept { sqlite3_blob_close(blob); }
@@ -111,28 +127,28 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
   constexpr std::int64_t kMaxRow = std::int64_t{1} << (62 - kRowBits);
   BagScan scan;
   std::map<std::int64_t, BagChannel> channels;
-  {
-    Statement topics(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
-    if (!topics.ok()) return std::nullopt;
-    while (topics.step() == SQLITE_ROW && channels.size() < kMaxChannels)
-      if (std::string name = topics.text(1); name.size() <= kMaxName)
-        channels.try_emplace(
-            topics.integer(0),
-            BagChannel{std::move(name), plain_type(topics.text(2)),
-                       topics.text(3) == "cdr" ? MessageEncoding::cdr : MessageEncoding::other});
-  }
-  Statement messages(database_.get(),
-                     "SELECT id, topic_id, timestamp, length(data), typeof(data) FROM messages "
-                     "ORDER BY timestamp, id");
-  if (!messages.ok()) return std::nullopt;
+  const Statement topics =
+      prepare(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
+  const Statement messages =
+      prepare(database_.get(),
+              "SELECT id, topic_id, timestamp, length(data), typeof(data) FROM messages "
+              "ORDER BY timestamp, id");
+  if (!topics || !messages) return std::nullopt;
+  while (sqlite3_step(topics.get()) == SQLITE_ROW && channels.size() < kMaxChannels)
+    if (std::string name = text(topics, 1); name.size() <= kMaxName)
+      channels.try_emplace(
+          sqlite3_column_int64(topics.get(), 0),
+          BagChannel{std::move(name), plain_type(text(topics, 2)),
+                     text(topics, 3) == "cdr" ? MessageEncoding::cdr : MessageEncoding::other});
+  const auto integer = [&](int column) { return sqlite3_column_int64(messages.get(), column); };
   int status = SQLITE_ROW;
-  while ((status = messages.step()) == SQLITE_ROW) {
-    const std::int64_t row = messages.integer(0), size = messages.integer(3);
-    const auto channel = channels.find(messages.integer(1));
+  while ((status = sqlite3_step(messages.get())) == SQLITE_ROW) {
+    const std::int64_t row = integer(0), size = integer(3);
+    const auto channel = channels.find(integer(1));
     if (channel == channels.end()) {
       ++scan.orphans;
     } else if (row <= 0 || row >= kMaxRow || size > static_cast<std::int64_t>(kMaxChunk) ||
-               messages.text(4) != "blob") {
+               text(messages, 4) != "blob") {
       scan.skip(0, "a row that is not a message, or is longer than 64 MiB");
     } else {
       ++scan.messages;
@@ -140,13 +156,23 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
             {BagPlace::kNoChunk, static_cast<std::uint64_t>(row) << kRowBits,
              static_cast<std::uint32_t>(size)},
             this,
-            messages.integer(2)});
+            integer(2)});
     }
   }
   scan.finished = true;
   if (status != SQLITE_DONE)
     scan.skip(0, std::string("where SQLite reports: ") + sqlite3_errstr(status));
   return scan;
+}
+
+}  // namespace
+
+std::unique_ptr<const ByteSource> open_sqlite_bag(const std::filesystem::path& file) {
+  return std::make_unique<SqliteBag>(file);
+}
+
+std::optional<BagScan> scan_sqlite(const ByteSource& file, const BagVisitor& each) {
+  return dynamic_cast<const SqliteBag&>(file).scan(each);
 }
 
 }  // namespace vergence::app::detail

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "app/checkerboard/checkerboard.hpp"
+#include "app/checkerboard/board_detector.hpp"
 #include "core/camera/camera.hpp"
 
 namespace vergence::test {

@@ -6,8 +6,7 @@
 
 #include <opencv2/aruco.hpp>
 
-#include "app/checkerboard/aprilgrid.hpp"
-#include "app/checkerboard/charuco.hpp"
+#include "app/checkerboard/board_detector.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/unit/app/checkerboard/board_scene.hpp"
 

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <vector>
 
-#include "app/config/calibration_covariance.hpp"
+#include "app/config/calibration_checks.hpp"
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/refusal.hpp"

@@ -6,7 +6,6 @@
 
 #include <fmt/ranges.h>
 
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/so3.hpp"

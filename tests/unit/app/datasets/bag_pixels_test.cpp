@@ -3,7 +3,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/datasets/detail/bag_images.hpp"
+#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/types/bayer.hpp"
 #include "tests/support/bag_in_memory.hpp"

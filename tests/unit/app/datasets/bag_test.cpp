@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "app/datasets/detail/bag_images.hpp"
+#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "tests/support/refusal.hpp"

@@ -1,4 +1,4 @@
-#include "app/datasets/detail/byte_source.hpp"
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <gtest/gtest.h>
 

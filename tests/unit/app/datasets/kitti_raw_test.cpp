@@ -5,7 +5,6 @@
 #include <numbers>
 #include <vector>
 
-#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/times_file.hpp"
 #include "core/comparison/comparison.hpp"

@@ -11,7 +11,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/image_file.hpp"
-#include "app/datasets/recorded_ins.hpp"
+#include "app/datasets/stereo_sequence.hpp"
 #include "core/math/random.hpp"
 #include "core/types/bayer.hpp"
 #include "tests/support/refusal.hpp"

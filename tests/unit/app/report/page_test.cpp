@@ -1,5 +1,3 @@
-#include "app/report/page.hpp"
-
 #include "app/report/report.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/support/session_writer.hpp"
