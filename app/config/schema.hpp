@@ -20,6 +20,8 @@ struct Key {
   std::string unit;
   /// Both are permitted; for a text they limit its length in bytes.
   double least = 0, most = 0;
+  /// Description for users who do not know the key.
+  std::string meaning;
   std::function<void(Configuration&, const KeyValue&)> set;
   std::function<KeyValue(const Configuration&)> get;
   /// Permitted values of a text; empty if any.
@@ -29,6 +31,7 @@ struct Key {
 /// Group of keys (the name before the first dot), or the keys without a group (empty name).
 struct Group {
   std::string name;
+  std::string meaning;
   std::vector<Key> keys;
   /// Prefix such as `cameras.` if keys continue with an item's number, which the documentation
   /// shows as N for item 0. Empty if it is no list.
@@ -48,9 +51,7 @@ struct Group {
 /// Range such as `50 … 1000` or `hold, estimate`.
 [[nodiscard]] std::string range_text(const Key& key);
 
-/// docs/configuration.md with default, type, unit and range of every key as they are here; the rest
-/// of the document, with the meaning of the keys, is kept. Rows of unknown keys are left
-/// out, keys without a row come last.
-[[nodiscard]] std::string refresh_document(const std::string& document);
+/// Text of docs/configuration.md behind its opening.
+[[nodiscard]] std::string configuration_tables();
 
 }  // namespace vergence::app
