@@ -172,7 +172,8 @@ Json recalibrations_json(const SessionTotals& totals) {
 }
 
 /// Null where nothing was counted.
-Json counters_json(const std::vector<std::pair<std::string, std::uint64_t>>& counters) {
+template <class Counters>
+Json counters_json(const Counters& counters) {
   Json json;
   for (const auto& [name, count] : counters) json[name] = count;
   return json;
