@@ -482,15 +482,7 @@ class SessionRunner {
     if (newest_number_ && rig.number > *newest_number_ + 1)
       counts_.missing += rig.number - *newest_number_ - 1;
     newest_number_ = rig.number;
-    ++counts_.read;
-    ++(sample.status == PoseStatus::ok         ? counts_.ok
-       : sample.status == PoseStatus::degraded ? counts_.degraded
-                                               : counts_.lost);
-    if (sample.status != PoseStatus::lost) {
-      const Vec3& position = sample.T_world_left.t;
-      if (newest_position_) counts_.path_m += (position - *newest_position_).norm();
-      newest_position_ = position;
-    }
+    counts_.add(sample);
     FrameReport r;
     r.pose = sample;
     r.counts = counts_;
@@ -534,7 +526,6 @@ class SessionRunner {
   // Used by the estimator's thread only.
   FrameCounts counts_{};
   std::optional<std::uint64_t> newest_number_{};
-  std::optional<Vec3> newest_position_{};
   // True after the first frame.
   bool delivering_ = false;
 
