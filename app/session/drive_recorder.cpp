@@ -120,11 +120,11 @@ std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
 
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
-  o.files.topics = topics(facts.begin.file);
+  o.topics = topics(facts.begin.file);
   o.queues = {queue_bytes(c, facts), kPulseQueue};
-  o.files.preamble = {{session_topic, description(c, facts)}};
+  o.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
-  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
+  o.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
   o.when_full = facts.when_full;
   return o;
 }
