@@ -9,7 +9,6 @@
 #include "app/checkerboard/calibrate_session.hpp"
 #include "app/checkerboard/coverage.hpp"
 #include "app/datasets/image_writer.hpp"
-#include "app/devices/capture_result.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/nearest.hpp"

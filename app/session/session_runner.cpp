@@ -264,7 +264,7 @@ class SessionRunner {
       input.evaluation = evaluate(totals.trajectory, reference, summary_evaluation_options());
     if (comparison_) {
       input.comparison = comparison_->counters();
-      input.earth = comparison_->earth(facts_.ins->mount_source);
+      input.enu = comparison_->enu_json(facts_.ins->mount_source);
     }
     input.calibrated = estimator_.calibrated();
     input.online = options_.online;
@@ -400,8 +400,8 @@ class SessionRunner {
     (void)std::fflush(stdout);
   }
   void log_kept_calibrations() noexcept {
-    for (CalibrationWriter::Outcome outcome; calibrations_->next(&outcome);)
-      log_.log(outcome.event, outcome.failed);
+    for (EventRecord event; calibrations_->next(&event);)
+      log_.log(event, event.kind == std::string_view("calibration_save_failed"));
   }
 
   [[nodiscard]] bool next(SourceItem* item) noexcept {

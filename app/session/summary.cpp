@@ -293,7 +293,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
       {"lines", totals.lost_lines},        {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
-  json["enu"] = input.earth ? enu_json(*input.earth) : Json();
+  json["enu"] = input.enu;
   json["time"] = input.time;
   json["truth"] = truth_json(input.truth, input);
   json["schema_version"] = kSchemaVersion;

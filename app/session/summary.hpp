@@ -72,8 +72,8 @@ struct SummaryInput {
   std::vector<std::pair<std::string, std::uint64_t>> devices{};
   /// Counters of the comparison with an INS.
   std::vector<std::pair<std::string, std::uint64_t>> comparison{};
-  /// Present with an INS.
-  std::optional<EnuMetrics> earth{};
+  /// Null without an INS.
+  nlohmann::ordered_json enu{};
   std::optional<TruthMetrics> truth{};
   /// Assumptions about the recording.
   std::vector<std::string> assumptions{};
