@@ -31,26 +31,19 @@ DeviceStatus SoftwareTrigger::configure(const TriggerConfiguration& requested,
 DeviceStatus SoftwareTrigger::start(Notifier* ready) noexcept {
   if (!(rate_ > 0)) return DeviceStatus::bad_configuration;
   if (thread_.joinable()) return DeviceStatus::ok;
+  const std::lock_guard lock(mutex_);
   try {
-    {
-      const std::lock_guard lock(mutex_);
-      stop_ = false;
-      ready_ = ready;
-    }
-    running_ = true;
     thread_ = std::thread([this] { pace(); });
   } catch (const std::exception&) {
-    running_ = false;
     return DeviceStatus::failed;
   }
+  stop_ = false;
+  ready_ = ready;
   ++starts_;
   return DeviceStatus::ok;
 }
 
 DeviceStatus SoftwareTrigger::wait(Duration limit, Pulse* pulse) noexcept {
-  if (ring_.pop(pulse)) return DeviceStatus::ok;
-  if (!running_) return DeviceStatus::stopped;
-  if (limit <= Duration{}) return DeviceStatus::timeout;
   std::unique_lock lock(mutex_);
   (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
                           [this] { return !ring_.empty() || stop_; });
@@ -64,7 +57,6 @@ void SoftwareTrigger::stop() noexcept {
     stop_ = true;
     ready_ = nullptr;
   }
-  running_ = false;
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
 }

@@ -47,12 +47,11 @@ class SoftwareTrigger final : public TriggerDevice {
   double rate_ = 0;
   std::mutex mutex_;
   std::condition_variable changed_;
-  // Guarded by mutex_.
-  bool stop_ = false;
+  // Guarded by mutex_. True unless the thread runs.
+  bool stop_ = true;
   // Guarded by mutex_.
   Notifier* ready_ = nullptr;
   Ring<Pulse, 64> ring_;
-  std::atomic<bool> running_{false};
   std::atomic<std::uint64_t> pulses_{0}, overruns_{0}, starts_{0};
   std::thread thread_;
 };

@@ -170,8 +170,8 @@ std::span<std::uint8_t> Recording::begin(std::size_t queue, std::size_t topic, S
     freed_.wait(seen);
   }
   if (q.open.empty()) {
-    counts_.dropped.fetch_add(1, std::memory_order_relaxed);
-    if (bulky) counts_.dropped_images.fetch_add(1, std::memory_order_relaxed);
+    ++counts_.dropped;
+    if (bulky) ++counts_.dropped_images;
     return {};
   }
   return q.open.subspan(McapMessageHead::kSize);
@@ -226,7 +226,7 @@ void Recording::drain(bool at_once, bool last) noexcept {
       continue;
     }
     if (!last) return make_room(at_once);
-    counts_.lost.fetch_add(batch.messages, std::memory_order_relaxed);
+    counts_.lost += batch.messages;
     release(batch);
   }
 }
@@ -266,7 +266,7 @@ void Recording::release(const Batch& batch) noexcept {
 
 void Recording::drop_oldest(RecordRing* ring) noexcept {
   ring->release(read_head(ring->waiting()).record_size());
-  counts_.lost.fetch_add(1, std::memory_order_relaxed);
+  ++counts_.lost;
 }
 
 /// While the disk accepts nothing, the oldest messages are dropped in favour of new ones.
@@ -287,11 +287,10 @@ bool Recording::store(const Batch& batch) noexcept {
     return false;
   }
   if (std::exchange(failing_, false))
-    (void)notices_.push(
-        {Notice::Kind::good_again, 0, counts_.lost.load(std::memory_order_relaxed), number_});
-  counts_.messages.fetch_add(batch.messages, std::memory_order_relaxed);
-  counts_.bytes.fetch_add(file_.size() - before, std::memory_order_relaxed);
-  counts_.chunks.fetch_add(1, std::memory_order_relaxed);
+    (void)notices_.push({Notice::Kind::good_again, 0, counts_.lost, number_});
+  counts_.messages += batch.messages;
+  counts_.bytes += file_.size() - before;
+  ++counts_.chunks;
   return true;
 }
 
@@ -305,7 +304,7 @@ void Recording::end_file() noexcept {
 void Recording::record_unwritten() noexcept {
   const McapFile::Unwritten missing = file_.pop_unwritten();
   if (missing.messages == 0) return;
-  counts_.lost.fetch_add(missing.messages, std::memory_order_relaxed);
+  counts_.lost += missing.messages;
   (void)notices_.push({Notice::Kind::unwritten, -missing.error, missing.messages, number_});
 }
 
@@ -314,7 +313,7 @@ int Recording::open_file() noexcept {
     fail(-error);
     return error;
   }
-  counts_.files.fetch_add(1, std::memory_order_relaxed);
+  ++counts_.files;
   preamble_due_ = !preamble_.empty();
   return 0;
 }
@@ -403,14 +402,13 @@ std::string Recording::message(const Notice& n) const {
 }
 
 RecordingCounters Recording::counters() const noexcept {
-  RecordingCounters c;
-  const auto get = [](const std::atomic<std::uint64_t>& v) {
-    return v.load(std::memory_order_relaxed);
-  };
-  c.messages = get(counts_.messages), c.bytes = get(counts_.bytes);
-  c.chunks = get(counts_.chunks), c.files = get(counts_.files);
-  c.dropped = get(counts_.dropped), c.dropped_images = get(counts_.dropped_images);
-  c.lost = get(counts_.lost);
+  RecordingCounters c{.messages = counts_.messages,
+                      .bytes = counts_.bytes,
+                      .chunks = counts_.chunks,
+                      .files = counts_.files,
+                      .dropped = counts_.dropped,
+                      .dropped_images = counts_.dropped_images,
+                      .lost = counts_.lost};
   for (const auto& q : queues_) {
     c.queue_bytes += q->ring.capacity();
     c.queue_high_water += q->ring.high_water();

@@ -442,13 +442,11 @@ class SessionRunner {
   /// Handles requests of viewers.
   void poll_requests(Stamp stamp) noexcept {
     if (request_.requests == nullptr) return;
-    constexpr auto kOrder = std::memory_order_relaxed;
     SessionRequests& requests = *request_.requests;
-    if (requests.recalibrate.exchange(false, kOrder) && facts_.on_request)
+    if (requests.recalibrate.exchange(false) && facts_.on_request)
       request_recalibration(stamp, "a recalibration was requested on the live page");
-    if (requests.mark.exchange(false, kOrder))
-      log_.log(stamp, "mark", "marked on the live page", true);
-    if (requests.stop_recording.exchange(false, kOrder) && recording_) {
+    if (requests.mark.exchange(false)) log_.log(stamp, "mark", "marked on the live page", true);
+    if (requests.stop_recording.exchange(false) && recording_) {
       log_.log(stamp, "recording_stopped", "recording stopped on the live page; the run continues",
                true);
       recording_->stop();
