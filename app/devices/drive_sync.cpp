@@ -199,13 +199,10 @@ void check_exposures(const Configuration& c, int cameras) {
 Duration max_jitter(const CameraSettings& s) {
   // Uncertainties in µs.
   constexpr double kOwnClock = 20, kHostClock = 1000;
-  const double us = s.stamp_jitter_us > 0 ? s.stamp_jitter_us
-                    : s.driver == "v4l2"  ? kHostClock
-                                          : kOwnClock;
-  return Duration::nanoseconds(std::llround(us * 1e3));
+  return microseconds(s.stamp_jitter_us > 0 ? s.stamp_jitter_us
+                      : s.driver == "v4l2"  ? kHostClock
+                                            : kOwnClock);
 }
-
-Duration microseconds(double us) { return Duration::nanoseconds(std::llround(us * 1e3)); }
 
 /// The MTi-G-700/710 marks the reading that each pulse left with.
 bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find('7') != std::string::npos; }

@@ -1,5 +1,6 @@
 #pragma once
 #include <atomic>
+#include <cmath>
 #include <condition_variable>
 #include <cstdint>
 #include <mutex>
@@ -55,6 +56,11 @@ class SoftwareTrigger final : public TriggerDevice {
   std::atomic<std::uint64_t> pulses_{0}, overruns_{0}, starts_{0};
   std::thread thread_;
 };
+
+/// To the nearest nanosecond.
+[[nodiscard]] inline Duration microseconds(double us) {
+  return Duration::nanoseconds(std::llround(us * 1e3));
+}
 
 /// Returns the pairing options. Checks that the configured devices support `sync.mode`.
 [[nodiscard]] SyncOptions sync_options(const Configuration& configuration, int cameras);

@@ -456,10 +456,10 @@ ExitCode run_drive(const RunRequest& request) {
   // Signals are handled before the simulated world is rendered, which takes seconds.
   const SignalGuard signals;
   try {
-    const auto source = with_plain_errors([&] { return std::make_unique<LiveSource>(request); });
+    LiveSource source(request);
     // A signal may arrive while devices are opened, which takes seconds.
     if (const auto stopped = signals.stop_code()) return *stopped;
-    return run_session(*source, request.configuration, request.session, signals);
+    return run_session(source, request.configuration, request.session, signals);
   } catch (const DeviceError&) {
     // After a stop by the user a missing device is no error.
     if (const auto stopped = signals.stop_code()) return *stopped;

@@ -542,11 +542,9 @@ ExitCode replay_recording(const ReplayRequest& request) {
   RecordedSession session = RecordedSession::open(request.data);
   check_start(request, session.frames().size());
   auto other = other_beginning(request, session);
-  const auto source = with_plain_errors([&] {
-    return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
-  });
+  SessionSource source(request, std::move(session), std::move(other));
   const SignalGuard signals;
-  return run_session(*source, request.configuration, request.session, signals);
+  return run_session(source, request.configuration, request.session, signals);
 }
 
 }  // namespace
@@ -593,11 +591,9 @@ ExitCode run_replay(const ReplayRequest& request) {
   const SignalGuard signals;
   if (request.calibrate_first) calibrate_unknown(request, signals, &sequence, &begin);
   if (const auto stopped = signals.stop_code()) return *stopped;
-  const auto source = with_plain_errors([&] {
-    return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
-                                            std::move(truth), std::move(ins));
-  });
-  return run_session(*source, request.configuration, request.session, signals);
+  RecordedSource source(request, std::move(sequence), std::move(begin), std::move(truth),
+                        std::move(ins));
+  return run_session(source, request.configuration, request.session, signals);
 }
 
 }  // namespace vergence::app

@@ -556,9 +556,7 @@ class SessionRunner {
 
 ExitCode run_session(FrameSource& source, const Configuration& configuration,
                      const SessionOptions& options, const SignalGuard& signals) {
-  const auto runner = with_plain_errors(
-      [&] { return std::make_unique<SessionRunner>(source, configuration, options, signals); });
-  return runner->run();
+  return std::make_unique<SessionRunner>(source, configuration, options, signals)->run();
 }
 
 }  // namespace vergence::app
