@@ -85,11 +85,8 @@ void McapMessageHead::write(std::span<std::uint8_t, kSize> out) const noexcept {
   ByteWriter w(out);
   w.put(static_cast<std::uint8_t>(Opcode::message));
   w.put(static_cast<std::uint64_t>(kSize - kRecordHead) + content);
-  w.put(channel);
-  w.put(sequence);
-  w.put(log_time);
   // The publish time equals the time of measurement.
-  w.put(log_time);
+  w.put(channel).put(sequence).put(log_time).put(log_time);
 }
 
 McapMessageHead McapMessageHead::read(std::span<const std::uint8_t, kSize> in) noexcept {
@@ -163,10 +160,7 @@ int McapFile::create(const char* path) noexcept {
   counts_ = {};
   Appender out(this);
   out.bytes(kMagic.data(), kMagic.size());
-  out.record(Opcode::header, [this](ByteWriter* w) {
-    w->text("ros2");
-    w->text(library_);
-  });
+  out.record(Opcode::header, [this](ByteWriter* w) { w->text("ros2").text(library_); });
   write_schemas(&out);
   write_channels(&out);
   out.flush();
@@ -181,10 +175,8 @@ int McapFile::create(const char* path) noexcept {
 void McapFile::write_schemas(Appender* out) const noexcept {
   for (std::size_t i = 0; i < topics_.size(); ++i)
     out->record(Opcode::schema, [&](ByteWriter* w) {
-      w->put(static_cast<std::uint16_t>(i + 1));
-      w->text(topics_[i].type);
-      w->text("ros2msg");
-      w->text(topics_[i].definition);
+      const McapTopic& t = topics_[i];
+      w->put(static_cast<std::uint16_t>(i + 1)).text(t.type).text("ros2msg").text(t.definition);
     });
 }
 
@@ -192,13 +184,10 @@ void McapFile::write_channels(Appender* out) const noexcept {
   for (std::size_t i = 0; i < topics_.size(); ++i)
     out->record(Opcode::channel, [&](ByteWriter* w) {
       constexpr std::string_view kQos = "offered_qos_profiles";
-      w->put(static_cast<std::uint16_t>(i + 1));
-      w->put(static_cast<std::uint16_t>(i + 1));
-      w->text(topics_[i].topic);
-      w->text("cdr");
-      w->put(static_cast<std::uint32_t>(8 + kQos.size() + topics_[i].qos.size()));
-      w->text(kQos);
-      w->text(topics_[i].qos);
+      const auto id = static_cast<std::uint16_t>(i + 1);
+      const std::string& qos = topics_[i].qos;
+      w->put(id).put(id).text(topics_[i].topic).text("cdr");
+      w->put(static_cast<std::uint32_t>(8 + kQos.size() + qos.size())).text(kQos).text(qos);
     });
 }
 
@@ -256,12 +245,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   ByteWriter w(head);
   w.put(static_cast<std::uint8_t>(Opcode::chunk));
   w.put(static_cast<std::uint64_t>(kChunkHead - kRecordHead) + chunk.records);
-  w.put(chunk.start);
-  w.put(chunk.end);
-  w.put(chunk.records);
-  w.put(crc);
-  w.text("");
-  w.put(chunk.records);
+  w.put(chunk.start).put(chunk.end).put(chunk.records).put(crc).text("").put(chunk.records);
   chunk.offset = end_;
   chunk.length = kChunkHead + chunk.records;
 
@@ -276,7 +260,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
       const std::size_t size_at = out->size();
       out->put(std::uint32_t{0});
       for (const Entry& e : entries_)
-        if (mine(e)) out->put(e.log_time), out->put(e.offset);
+        if (mine(e)) out->put(e.log_time).put(e.offset);
       out->overwrite(size_at, static_cast<std::uint32_t>(out->size() - size_at - 4));
     });
   }
@@ -324,42 +308,28 @@ void McapFile::write_statistics(Appender* out) const noexcept {
   out->record(Opcode::statistics, [this](ByteWriter* w) {
     std::uint64_t messages = 0;
     for (const std::uint64_t n : counts_) messages += n;
-    w->put(messages);
-    // Number of schemas.
-    w->put(static_cast<std::uint16_t>(topics_.size()));
-    // Number of channels.
-    w->put(static_cast<std::uint32_t>(topics_.size()));
-    // Number of attachments.
-    w->put(std::uint32_t{0});
-    // Number of metadata records.
-    w->put(std::uint32_t{0});
-    w->put(static_cast<std::uint32_t>(chunks_.size()));
-    w->put(first_);
-    w->put(last_);
-    w->put(static_cast<std::uint32_t>(10 * topics_.size()));
+    const auto topics = static_cast<std::uint32_t>(topics_.size());
+    // Numbers of schemas, channels, attachments, metadata records and chunks.
+    w->put(messages).put(static_cast<std::uint16_t>(topics)).put(topics);
+    w->put(std::uint32_t{0}).put(std::uint32_t{0}).put(static_cast<std::uint32_t>(chunks_.size()));
+    w->put(first_).put(last_).put(10 * topics);
     for (std::size_t i = 0; i < topics_.size(); ++i)
-      w->put(static_cast<std::uint16_t>(i + 1)), w->put(counts_[i]);
+      w->put(static_cast<std::uint16_t>(i + 1)).put(counts_[i]);
   });
 }
 
 void McapFile::write_chunk_indexes(Appender* out) const noexcept {
   for (const ChunkIndex& chunk : chunks_)
     out->record(Opcode::chunk_index, [&](ByteWriter* w) {
-      w->put(chunk.start);
-      w->put(chunk.end);
-      w->put(chunk.offset);
-      w->put(chunk.length);
+      w->put(chunk.start).put(chunk.end).put(chunk.offset).put(chunk.length);
       const std::size_t size_at = w->size();
       w->put(std::uint32_t{0});
       for (std::size_t i = 0; i < topics_.size(); ++i)
         if (chunk.index[i] != kNone)
-          w->put(static_cast<std::uint16_t>(i + 1)),
-              w->put(chunk.offset + chunk.length + chunk.index[i]);
+          w->put(static_cast<std::uint16_t>(i + 1))
+              .put(chunk.offset + chunk.length + chunk.index[i]);
       w->overwrite(size_at, static_cast<std::uint32_t>(w->size() - size_at - 4));
-      w->put(std::uint64_t{chunk.index_length});
-      w->text("");
-      w->put(chunk.records);
-      w->put(chunk.records);
+      w->put(std::uint64_t{chunk.index_length}).text("").put(chunk.records).put(chunk.records);
     });
 }
 
@@ -384,17 +354,13 @@ int McapFile::finish() noexcept {
   for (std::size_t i = 0; i < kGroups.size(); ++i)
     if (starts[i + 1] > starts[i])
       out.record(Opcode::summary_offset, [&](ByteWriter* w) {
-        w->put(static_cast<std::uint8_t>(kGroups[i]));
-        w->put(starts[i]);
-        w->put(starts[i + 1] - starts[i]);
+        w->put(static_cast<std::uint8_t>(kGroups[i])).put(starts[i]).put(starts[i + 1] - starts[i]);
       });
   // The checksum covers the footer up to itself.
   std::array<std::uint8_t, kRecordHead + 16> footer{};
   ByteWriter w(footer);
-  w.put(static_cast<std::uint8_t>(Opcode::footer));
-  w.put(std::uint64_t{20});
-  w.put(summary);
-  w.put(offsets);
+  w.put(static_cast<std::uint8_t>(Opcode::footer)).put(std::uint64_t{20});
+  w.put(summary).put(offsets);
   out.bytes(footer.data(), footer.size());
   const std::uint32_t crc = out.crc();
   out.bytes(&crc, sizeof crc);
