@@ -44,8 +44,6 @@ class ExposureControl final : public FrameObserver {
                   const exposure::ExposureOptions& options, const ExposureSetting& start,
                   bool at_once);
   ~ExposureControl() override { settle(); }
-  ExposureControl(const ExposureControl&) = delete;
-  ExposureControl& operator=(const ExposureControl&) = delete;
 
   void on_frame(std::size_t k, const Frame& frame) noexcept override;
   /// Ends the thread. Called by the owner after the last frame; may be called twice.

@@ -123,9 +123,6 @@ class LivePage final : public SessionObserver {
     thread_.join();
   }
 
-  LivePage(const LivePage&) = delete;
-  LivePage& operator=(const LivePage&) = delete;
-
   void on_start(const SessionStart& start) noexcept override {
     start_ = start;
     started_ = true;

@@ -38,8 +38,6 @@ class RecordRing {
   /// `bytes` is rounded up to whole pages.
   explicit RecordRing(std::size_t bytes);
   ~RecordRing();
-  RecordRing(const RecordRing&) = delete;
-  RecordRing& operator=(const RecordRing&) = delete;
 
   /// Memory for a record of `size` bytes; empty if there is no room. Invalid after the next begin()
   /// unless committed.
@@ -151,8 +149,6 @@ class Recording {
   /// `folder` must exist.
   Recording(const std::filesystem::path& folder, const Options& options);
   ~Recording();
-  Recording(const Recording&) = delete;
-  Recording& operator=(const Recording&) = delete;
 
   /// Memory for a message of at most `most` bytes; empty if it is dropped, which is counted.
   /// `bulky` marks an image, which leaves room for a thousand small messages.

@@ -206,8 +206,6 @@ class Program {
   ~Program() {
     while (!calls_.empty()) answer({false, "vergence-ros2 is stopping"});
   }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
 
   ExitCode run() {
     const SignalGuard signals;
