@@ -11,6 +11,7 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/errors.hpp"
+#include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
 
@@ -37,11 +38,19 @@ struct Recorder::Files {
   std::vector<LineFile*> all;
 };
 
+namespace {
+
+// Bytes of a line in which every character of an event's message is escaped as \uXXXX.
+constexpr std::size_t kLongestLine = 2048;
+
+}  // namespace
+
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options),
       files_(std::make_unique<Files>(folder, options)),
       newest_(options.first),
       thread_(options.when_full) {
+  line_.reserve(kLongestLine);
   for (LineFile* file : files_->all) {
     memory_ += file->pending();
     file->append(files_->head(file));
@@ -64,6 +73,7 @@ void Recorder::begin() {
   // Writes the headers of the tables.
   flush();
   flushed_ = written_back_ = std::chrono::steady_clock::now();
+  AllocationGuard::seal_thread();
 }
 
 /// Null: nothing waits, so that lines go to the files at once; else once a second.
@@ -86,7 +96,8 @@ void Recorder::write(const InsRecord& reading) {
 
 void Recorder::write(const EventRecord& e) {
   totals_->add(e);
-  files_->events.append(format_event(e));
+  format_event(e, &line_);
+  files_->events.append(line_);
 }
 
 void Recorder::write(const FrameReport& r) {
@@ -141,15 +152,16 @@ void Recorder::record_disk(const LineFile* failed, int fault) {
   if (!disk_full_)
     return write(EventRecord(newest_, "disk_recovered", "lines are written again; {} were lost",
                              lost_lines()));
-  const std::string why = std::strerror(fault);
-  {
-    const std::lock_guard lock(mutex_);
-    errors_.push_back(
-        fmt::format("{}: cannot be written ({}); the session continues and writing is retried "
-                    "every {} s; check the disk",
-                    failed->path().string(), why, kRetry.count()));
-  }
-  write(EventRecord(newest_, "disk_full", "the session's files cannot be written ({})", why));
+  // strerror() may allocate.
+  const char* words = ::strerrordesc_np(fault);
+  if (words == nullptr) words = "unknown error";
+  ErrorMessage message{};
+  (void)fmt::format_to_n(message.begin(), message.size() - 1,
+                         "{}: cannot be written ({}); the session continues and writing is retried "
+                         "every {} s; check the disk",
+                         failed->path().native(), words, kRetry.count());
+  (void)error_messages_.push(message);
+  write(EventRecord(newest_, "disk_full", "the session's files cannot be written ({})", words));
 }
 
 std::uint64_t Recorder::lost_lines() const {
@@ -159,8 +171,11 @@ std::uint64_t Recorder::lost_lines() const {
 }
 
 std::vector<std::string> Recorder::pop_errors() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(errors_, {});
+  std::vector<std::string> messages;
+  for (ErrorMessage c; error_messages_.pop(&c);) messages.emplace_back(c.data());
+  messages.insert(messages.end(), errors_.begin(), errors_.end());
+  errors_.clear();
+  return messages;
 }
 
 /// The trajectories, from the session's own files: nothing that grows with the drive waits in

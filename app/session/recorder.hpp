@@ -1,11 +1,11 @@
 #pragma once
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <variant>
 #include <vector>
@@ -15,6 +15,7 @@
 #include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
+#include "core/memory/ring.hpp"
 
 namespace vergence::app {
 
@@ -29,8 +30,9 @@ namespace vergence::app {
 ///
 /// Records reach the files within a second, so a killed session keeps its lines. Stamps are printed
 /// as integers. Equal records give equal bytes.
-/// Threads  One producer calls on_…(), any thread pop_errors(), the owner close() after both.
-/// Memory   Bounded for any length of the run; with keep_trajectory close() reads the trajectories
+/// Threads  One producer calls on_…(), one consumer pop_errors(), the owner close() after both. The
+///          recorder's thread is sealed.
+/// Memory   Fixed for any length of the run; with keep_trajectory close() reads the trajectories
 ///          back from their files.
 /// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live). INS
 ///          samples leave room for poses and events.
@@ -86,6 +88,8 @@ class Recorder final : public SessionObserver {
   void pretend(Stamp stamp);
   void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
+  // Null-terminated text, truncated at the end of the array.
+  using ErrorMessage = std::array<char, 512>;
   void read_back();
 
   struct Files;
@@ -102,8 +106,9 @@ class Recorder final : public SessionObserver {
   std::chrono::steady_clock::time_point retry_due_{};
 
   std::chrono::steady_clock::time_point flushed_{}, written_back_{};
-  // Guards errors_.
-  std::mutex mutex_;
+  // If full, the newest messages are lost.
+  Ring<ErrorMessage, 16> error_messages_;
+  // Errors of close().
   std::vector<std::string> errors_;
   // Counted by the producer.
   std::uint64_t dropped_records_ = 0, dropped_readings_ = 0;

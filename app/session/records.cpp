@@ -9,10 +9,9 @@
 #include <iterator>
 #include <numbers>
 
-#include <nlohmann/json.hpp>
-
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/terminal_text.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -166,6 +165,42 @@ void append_field(std::string* line, std::string_view text) {
   for (const char c : text) *line += c == ',' || c == '\n' || c == '"' ? ';' : c;
 }
 
+void append_text(std::string* line, std::string_view text) {
+  constexpr std::string_view kReplacement = "\xef\xbf\xbd";
+  *line += '"';
+  while (!text.empty()) {
+    const std::size_t n = utf8_length(text);
+    const char c = text.front();
+    if (n == 0)
+      *line += kReplacement;
+    else if (c == '"' || c == '\\')
+      (*line += '\\') += c;
+    else if (static_cast<unsigned char>(c) < 0x20)
+      fmt::format_to(std::back_inserter(*line), "\\u{:04x}", static_cast<unsigned>(c));
+    else
+      *line += text.substr(0, n);
+    text.remove_prefix(n == 0 ? 1 : n);
+  }
+  *line += '"';
+}
+
+void append_value(std::string* line, std::int64_t value) {
+  fmt::format_to(std::back_inserter(*line), "{}", value);
+}
+
+/// The shortest digits that read back the same; always recognisable as a number with a point.
+void append_value(std::string* line, double value) {
+  if (!std::isfinite(value)) {
+    *line += "null";
+    return;
+  }
+  const std::size_t begin = line->size();
+  fmt::format_to(std::back_inserter(*line), "{}", value);
+  if (line->find_first_of(".e", begin) == std::string::npos) *line += ".0";
+}
+
+void append_value(std::string* line, const char* value) { append_text(line, value); }
+
 }  // namespace
 
 void FrameCounts::add(const PoseSample& sample) noexcept {
@@ -310,16 +345,23 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   *line += '\n';
 }
 
-std::string format_event(const EventRecord& event) {
-  using Json = nlohmann::ordered_json;
-  Json fields = Json::object();
-  for (const EventField& f : event.fields)
-    if (f.name != nullptr) std::visit([&](auto value) { fields[f.name] = value; }, f.value);
-  const Json line{{"stamp_ns", event.stamp.ns()},
-                  {"kind", event.kind},
-                  {"message", event.message.data()},
-                  {"fields", fields}};
-  return line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+void format_event(const EventRecord& event, std::string* line) {
+  line->clear();
+  fmt::format_to(std::back_inserter(*line), "{{\"stamp_ns\":{},\"kind\":", event.stamp.ns());
+  append_text(line, event.kind);
+  *line += ",\"message\":";
+  append_text(line, event.message.data());
+  *line += ",\"fields\":{";
+  bool any = false;
+  for (const EventField& f : event.fields) {
+    if (f.name == nullptr) continue;
+    if (any) *line += ',';
+    any = true;
+    append_text(line, f.name);
+    *line += ':';
+    std::visit([line](auto value) { append_value(line, value); }, f.value);
+  }
+  *line += "}}\n";
 }
 
 }  // namespace vergence::app

@@ -181,7 +181,8 @@ void format_tum(Stamp stamp, const Transform& T, std::string* line);
 void format_calibration(const CalibrationRecord& calibration, int k, std::string* line);
 
 /// Formats a line of events.jsonl with its end: `stamp_ns`, `kind`, `message`, `fields`. Invalid
-/// UTF-8, as in file names, becomes U+FFFD to keep the JSON valid.
-[[nodiscard]] std::string format_event(const EventRecord& event);
+/// UTF-8, as in file names, becomes U+FFFD to keep the JSON valid. Allocates only if *line is too
+/// small.
+void format_event(const EventRecord& event, std::string* line);
 
 }  // namespace vergence::app

@@ -14,9 +14,8 @@ struct LibraryAllocations {
 };
 
 /// Between a drive's first frame and its last no thread has allocated, by its `summary`
-/// (summary.json), but `library`'s and those that write messages, JSON and YAML: the caller's, the
-/// one that writes the session's files, the one that keeps calibrations and the one that watches
-/// the others.
+/// (summary.json), but `library`'s and those that write messages and YAML: the caller's, the one
+/// that keeps calibrations and the one that watches the others.
 inline void expect_no_heap_but_of(const LibraryAllocations& library,
                                   const nlohmann::json& summary) {
   const auto& threads = summary.at("memory").at("allocations_by_thread");
@@ -25,9 +24,7 @@ inline void expect_no_heap_but_of(const LibraryAllocations& library,
   ASSERT_TRUE(threads.contains("vergence-estim")) << threads.dump();
 #endif
   for (const auto& [name, count] : threads.items()) {
-    if (name == "vergence" || name == "vergence-record" || name == "vergence-state" ||
-        name == "vergence-watch")
-      continue;
+    if (name == "vergence" || name == "vergence-state" || name == "vergence-watch") continue;
     EXPECT_LE(count.get<std::uint64_t>(), name == library.thread ? library.most : 0U)
         << name << " of " << threads.dump();
   }
