@@ -42,7 +42,7 @@ namespace {
 
 void declare_out(CLI::App& command, CalibrateOptions& o) {
   add_option(command, "--out", o.out, "Calibration file to write", "FILE", "Output")->required();
-  command.add_flag("--force", o.force, "Overwrite an existing file")->group("Output");
+  add_flag(command, "--force", o.force, "Overwrite an existing file", "Output");
 }
 
 /// The options that `target` and `live` share.
@@ -68,12 +68,12 @@ void declare_board(CLI::App& command, CalibrateOptions& o) {
              "Calibration")
       ->check(one_of({"radtan", "equidistant"}))
       ->capture_default_str();
-  command.add_flag("--k3", o.sixth_order, "radtan: also estimate k3")->group("Calibration");
+  add_flag(command, "--k3", o.sixth_order, "radtan: also estimate k3", "Calibration");
   add_option(command, "--baseline", o.baseline, "Measured baseline in metres, for comparison", "M",
              "Calibration")
       ->check(in_range(0.001, 100, "metres"));
   declare_out(command, o);
-  command.add_flag("--json", o.json, "Print JSON instead of tables")->group("Output");
+  add_flag(command, "--json", o.json, "Print JSON instead of tables", "Output");
   o.common.declare_quiet(command);
 }
 
@@ -139,7 +139,7 @@ void declare_convert(CLI::App& command, CalibrateOptions& o) {
   add_option(command, "--to", o.to,
              "Format of OUT: vergence, kalibr, ros, opencv [by the name of OUT]", "NAME", "Output")
       ->check(one_of({"vergence", "kalibr", "ros", "opencv"}));
-  command.add_flag("--force", o.force, "Overwrite existing files")->group("Output");
+  add_flag(command, "--force", o.force, "Overwrite existing files", "Output");
   add_option(command, "--size", o.size, "Image size in pixels, if an OpenCV file has none: 640x480",
              "NxN", "Input");
   command.footer(

@@ -41,7 +41,7 @@ void CommonOptions::declare_set(CLI::App& command) {
 }
 
 void CommonOptions::declare_quiet(CLI::App& command) {
-  command.add_flag("--quiet", quiet, "Print no progress line")->group("Output");
+  add_flag(command, "--quiet", quiet, "Print no progress line", "Output");
 }
 
 void CommonOptions::declare(CLI::App& command) {
@@ -55,9 +55,9 @@ void CommonOptions::declare(CLI::App& command) {
 }
 
 void declare_session_options(CLI::App& command, bool* memory, bool* page) {
-  command.add_flag("--print-memory", *memory, "Print memory use per component")->group("Output");
-  command.add_flag("--live-page", *page, "Serve the live page at publish.http [127.0.0.1:8080]")
-      ->group("Output");
+  add_flag(command, "--print-memory", *memory, "Print memory use per component", "Output");
+  add_flag(command, "--live-page", *page, "Serve the live page at publish.http [127.0.0.1:8080]",
+           "Output");
 }
 
 void declare_image_topics(CLI::App& command, std::string* left, std::string* right) {

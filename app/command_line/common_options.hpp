@@ -37,6 +37,12 @@ CLI::Option* add_option(CLI::App& command, const char* name, Value& value, const
   return command.add_option(name, value, help)->type_name(type)->group(group);
 }
 
+/// Declares a flag in the same way.
+inline CLI::Option* add_flag(CLI::App& command, const char* name, bool& value, const char* help,
+                             const char* group = "Options") {
+  return command.add_flag(name, value, help)->group(group);
+}
+
 /// Accepts one of the values, and names them in the help and in the message for another one.
 [[nodiscard]] CLI::Validator one_of(std::vector<std::string> values);
 

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -143,6 +144,11 @@ ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands
       throw InputError("standard output cannot be written; check the free space of the disk");
     return code;
   } catch (const InputError& error) {
+    print_error(error.what());
+  } catch (const std::invalid_argument& error) {
+    // The core rejects inconsistent options and rigs by these two.
+    print_error(error.what());
+  } catch (const std::length_error& error) {
     print_error(error.what());
   } catch (const DeviceError& error) {
     print_error(error.what());

@@ -92,14 +92,10 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
              "Lens model for --focal: radtan, or equidistant (fisheye)", "NAME", "Calibration")
       ->check(one_of({"radtan", "equidistant"}))
       ->capture_default_str();
-  command
-      ->add_flag("--from-scratch", a->request.from_scratch,
-                 "Ignore known extrinsics; estimate them online")
-      ->group("Calibration");
-  command
-      ->add_flag("--calibrate-first", a->request.calibrate_first,
-                 "Calibrate from the whole sequence, then run (3 passes)")
-      ->group("Calibration");
+  add_flag(*command, "--from-scratch", a->request.from_scratch,
+           "Ignore known extrinsics; estimate them online", "Calibration");
+  add_flag(*command, "--calibrate-first", a->request.calibrate_first,
+           "Calibrate from the whole sequence, then run (3 passes)", "Calibration");
   command->footer(
       "Example: vergence replay FOLDER --focal 458 --baseline 0.11 --out sessions/first\n" +
       std::string(kSessionExitCodes));

@@ -40,10 +40,8 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "--out", a->request.session.out,
              "Session directory; must not exist, or be empty", "DIR", "Output")
       ->required();
-  command
-      ->add_flag("--fast", a->request.fast,
-                 "Simulated rig only: run faster than real time, drop nothing")
-      ->group("Simulation");
+  add_flag(*command, "--fast", a->request.fast,
+           "Simulated rig only: run faster than real time, drop nothing", "Simulation");
   add_option(*command, "--fault", a->request.faults,
              "Simulated rig only: inject a fault, e.g. \"knock@42 pitch_deg=0.2\"; repeatable",
              "\"KIND@SECONDS …\"", "Simulation")
@@ -51,10 +49,8 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "--duration", a->request.duration_s, "Stop after this many seconds",
              "SECONDS", "Input")
       ->check(in_range(1e-3, 86400, "seconds"));
-  command
-      ->add_flag("--from-scratch", a->request.calibration.from_scratch,
-                 "Ignore known extrinsics; estimate them online")
-      ->group("Calibration");
+  add_flag(*command, "--from-scratch", a->request.calibration.from_scratch,
+           "Ignore known extrinsics; estimate them online", "Calibration");
   add_option(*command, "--calibration", a->request.calibration.file,
              "Initial calibration (vergence, Kalibr, ROS, OpenCV)", "FILE", "Calibration");
   add_option(*command, "--record", a->record,

@@ -64,20 +64,11 @@ CameraMasks::CameraMasks(const Configuration& c, const RigCalibration& rig) {
     if (static_cast<int>(k) >= rig.cameras)
       throw InputError(fmt::format("{}: the rig has {} cameras, numbered from 0; remove this mask",
                                    key, rig.cameras));
-    Image& image = images_[k];
-    image.width = rig.intrinsics[k].width;
-    image.height = rig.intrinsics[k].height;
-    image.pixels =
-        read_mask(key, find_beside(c.folder, c.cameras[k].mask), {image.width, image.height});
+    const Intrinsics& lens = rig.intrinsics[k];
+    pixels_[k] =
+        read_mask(key, find_beside(c.folder, c.cameras[k].mask), {lens.width, lens.height});
+    views_[k] = {pixels_[k].data(), lens.width, lens.height, lens.width};
   }
-}
-
-std::array<ImageView, kMaxCameras> CameraMasks::views() const noexcept {
-  std::array<ImageView, kMaxCameras> views{};
-  for (std::size_t k = 0; k < kMaxCameras; ++k)
-    if (!images_[k].pixels.empty())
-      views[k] = {images_[k].pixels.data(), images_[k].width, images_[k].height, images_[k].width};
-  return views;
 }
 
 }  // namespace vergence::app

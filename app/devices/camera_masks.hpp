@@ -21,14 +21,12 @@ class CameraMasks {
   CameraMasks(const Configuration& configuration, const RigCalibration& rig);
 
   /// Masks by camera: pixels of value 0 are not used. Empty if the camera has no mask.
-  [[nodiscard]] std::array<ImageView, kMaxCameras> views() const noexcept;
+  [[nodiscard]] const std::array<ImageView, kMaxCameras>& views() const noexcept { return views_; }
 
  private:
-  struct Image {
-    int width = 0, height = 0;
-    std::vector<std::uint8_t> pixels;
-  };
-  std::array<Image, kMaxCameras> images_{};
+  std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;
+  // Views of pixels_.
+  std::array<ImageView, kMaxCameras> views_{};
 };
 
 }  // namespace vergence::app

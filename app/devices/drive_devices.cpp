@@ -71,11 +71,11 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
   }
   check_drive(c);
   mock_ = make_mock_drive(c, faults, !fast, duration_s);
-  for (int k = 0; k < mock_.rig->cameras(); ++k) cameras_.push_back(&mock_.rig->camera(k));
-  if (mock_.has_ins) ins_ = &mock_.rig->ins();
-  trigger_ = &mock_.rig->trigger();
-  sync_ = sync_options(c, mock_.rig->cameras());
-  frames_ = mock_.rig->pulses(c.trigger.rate);
+  for (int k = 0; k < mock_->cameras(); ++k) cameras_.push_back(&mock_->camera(k));
+  if (c.ins.driver == "mock") ins_ = &mock_->ins();
+  trigger_ = &mock_->trigger();
+  sync_ = sync_options(c, mock_->cameras());
+  frames_ = mock_->pulses(c.trigger.rate);
 }
 
 void DriveDevices::open_real(const Configuration& c) {
@@ -111,10 +111,10 @@ Acquisition::Options DriveDevices::acquisition_options() const {
 }
 
 std::span<const mock::Fault> DriveDevices::faults() const noexcept {
-  if (mock_.rig == nullptr) return {};
-  return mock_.rig->truth().faults();
+  if (mock_ == nullptr) return {};
+  return mock_->truth().faults();
 }
 
-HostStamp DriveDevices::start() const noexcept { return mock_.rig ? mock_.rig->start() : start_; }
+HostStamp DriveDevices::start() const noexcept { return mock_ ? mock_->start() : start_; }
 
 }  // namespace vergence::app

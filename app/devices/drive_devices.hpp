@@ -40,7 +40,7 @@ class DriveDevices {
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
 
   /// Null for real devices.
-  [[nodiscard]] const mock::MockRig* mock() const noexcept { return mock_.rig.get(); }
+  [[nodiscard]] const mock::MockRig* mock() const noexcept { return mock_.get(); }
   /// Faults scheduled in the mock.
   [[nodiscard]] std::span<const mock::Fault> faults() const noexcept;
   /// Start of the run; in real time the simulated rig sets it when started.
@@ -49,13 +49,13 @@ class DriveDevices {
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   /// Image memory of simulated cameras; unknown for real ones.
   [[nodiscard]] std::size_t image_bytes() const noexcept {
-    return mock_.rig ? mock_.rig->image_bytes() : 0;
+    return mock_ ? mock_->image_bytes() : 0;
   }
 
  private:
   void open_real(const Configuration& configuration);
 
-  MockDrive mock_;
+  std::unique_ptr<mock::MockRig> mock_;
   std::vector<OpenedCamera> opened_;
   std::unique_ptr<InsDevice> opened_ins_;
   std::unique_ptr<TriggerDevice> software_;

@@ -31,26 +31,19 @@ DeviceStatus SoftwareTrigger::configure(const TriggerConfiguration& requested,
 DeviceStatus SoftwareTrigger::start(Notifier* ready) noexcept {
   if (!(rate_ > 0)) return DeviceStatus::bad_configuration;
   if (thread_.joinable()) return DeviceStatus::ok;
+  const std::lock_guard lock(mutex_);
   try {
-    {
-      const std::lock_guard lock(mutex_);
-      stop_ = false;
-      ready_ = ready;
-    }
-    running_ = true;
     thread_ = std::thread([this] { pace(); });
   } catch (const std::exception&) {
-    running_ = false;
     return DeviceStatus::failed;
   }
+  stop_ = false;
+  ready_ = ready;
   ++starts_;
   return DeviceStatus::ok;
 }
 
 DeviceStatus SoftwareTrigger::wait(Duration limit, Pulse* pulse) noexcept {
-  if (ring_.pop(pulse)) return DeviceStatus::ok;
-  if (!running_) return DeviceStatus::stopped;
-  if (limit <= Duration{}) return DeviceStatus::timeout;
   std::unique_lock lock(mutex_);
   (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
                           [this] { return !ring_.empty() || stop_; });
@@ -64,7 +57,6 @@ void SoftwareTrigger::stop() noexcept {
     stop_ = true;
     ready_ = nullptr;
   }
-  running_ = false;
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
 }
@@ -207,13 +199,10 @@ void check_exposures(const Configuration& c, int cameras) {
 Duration max_jitter(const CameraSettings& s) {
   // Uncertainties in µs.
   constexpr double kOwnClock = 20, kHostClock = 1000;
-  const double us = s.stamp_jitter_us > 0 ? s.stamp_jitter_us
-                    : s.driver == "v4l2"  ? kHostClock
-                                          : kOwnClock;
-  return Duration::nanoseconds(std::llround(us * 1e3));
+  return microseconds(s.stamp_jitter_us > 0 ? s.stamp_jitter_us
+                      : s.driver == "v4l2"  ? kHostClock
+                                            : kOwnClock);
 }
-
-Duration microseconds(double us) { return Duration::nanoseconds(std::llround(us * 1e3)); }
 
 /// The MTi-G-700/710 marks the reading that each pulse left with.
 bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find('7') != std::string::npos; }

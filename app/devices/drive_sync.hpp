@@ -1,5 +1,6 @@
 #pragma once
 #include <atomic>
+#include <cmath>
 #include <condition_variable>
 #include <cstdint>
 #include <mutex>
@@ -47,15 +48,19 @@ class SoftwareTrigger final : public TriggerDevice {
   double rate_ = 0;
   std::mutex mutex_;
   std::condition_variable changed_;
-  // Guarded by mutex_.
-  bool stop_ = false;
+  // Guarded by mutex_. True unless the thread runs.
+  bool stop_ = true;
   // Guarded by mutex_.
   Notifier* ready_ = nullptr;
   Ring<Pulse, 64> ring_;
-  std::atomic<bool> running_{false};
   std::atomic<std::uint64_t> pulses_{0}, overruns_{0}, starts_{0};
   std::thread thread_;
 };
+
+/// To the nearest nanosecond.
+[[nodiscard]] inline Duration microseconds(double us) {
+  return Duration::nanoseconds(std::llround(us * 1e3));
+}
 
 /// Returns the pairing options. Checks that the configured devices support `sync.mode`.
 [[nodiscard]] SyncOptions sync_options(const Configuration& configuration, int cameras);

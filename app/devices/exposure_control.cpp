@@ -1,7 +1,5 @@
 #include "app/devices/exposure_control.hpp"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -37,26 +35,18 @@ ExposureControl::ExposureControl(std::vector<CameraDevice*> cameras, int width, 
       controller_(options, start),
       at_once_(at_once) {
   applied_.fill(start);
-  if (!at_once_) thread_ = std::thread([this] { work(); });
-}
-
-ExposureControl::~ExposureControl() { settle(); }
-
-void ExposureControl::settle() noexcept {
-  stop_.store(true, std::memory_order_release);
-  wake_.signal();
-  if (thread_.joinable()) thread_.join();
+  if (at_once_) return;
+  thread_.start(
+      "vergence-expose", [] {},
+      [this](const ExposureSetting* requested) {
+        if (requested == nullptr) return;
+        set_all(*requested);
+        under_way_.store(false, std::memory_order_release);
+      });
 }
 
 ExposureCounters ExposureControl::counters() const noexcept {
-  ExposureCounters c;
-  c.changes = changes_.load();
-  c.refused = refused_.load();
-  c.unequal = unequal_.load();
-  c.again = again_.load();
-  c.unsupported = unsupported_.load();
-  c.newest = controller_.setting();
-  return c;
+  return {changes_, refused_, unequal_, again_, unsupported_, controller_.setting()};
 }
 
 void ExposureControl::on_frame(std::size_t k, const Frame& frame) noexcept {
@@ -98,9 +88,7 @@ void ExposureControl::ask(const ExposureSetting& requested) noexcept {
     return;
   }
   under_way_.store(true, std::memory_order_release);
-  // The queue has room, because only one request is pending at a time.
-  (void)requests_.push(requested);
-  wake_.signal();
+  (void)thread_.post(requested);
 }
 
 void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
@@ -120,20 +108,6 @@ void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
               !alike_gain(actual.gain_db, applied_[0].gain_db);
   }
   if (unequal) unequal_.fetch_add(1, std::memory_order_relaxed);
-}
-
-void ExposureControl::work() noexcept {
-  (void)pthread_setname_np(pthread_self(), "vergence-expose");
-  for (ExposureSetting requested;;) {
-    const WakeEvent::Ticket seen = wake_.ticket();
-    if (stop_.load(std::memory_order_acquire)) return;
-    if (!requests_.pop(&requested)) {
-      wake_.wait(seen);
-      continue;
-    }
-    set_all(requested);
-    under_way_.store(false, std::memory_order_release);
-  }
 }
 
 }  // namespace vergence::app

@@ -2,14 +2,12 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <thread>
 #include <vector>
 
-#include "core/memory/ring.hpp"
+#include "app/runtime/queue_thread.hpp"
 #include "core/types/calibration.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/camera.hpp"
-#include "drivers/common/wake_event.hpp"
 #include "drivers/exposure/brightness.hpp"
 #include "drivers/exposure/exposure_controller.hpp"
 
@@ -45,20 +43,17 @@ class ExposureControl final : public FrameObserver {
   ExposureControl(std::vector<CameraDevice*> cameras, int width, int height, const ImageView& mask,
                   const exposure::ExposureOptions& options, const ExposureSetting& start,
                   bool at_once);
-  ~ExposureControl() override;
-  ExposureControl(const ExposureControl&) = delete;
-  ExposureControl& operator=(const ExposureControl&) = delete;
+  ~ExposureControl() override { settle(); }
 
   void on_frame(std::size_t k, const Frame& frame) noexcept override;
   /// Ends the thread. Called by the owner after the last frame; may be called twice.
-  void settle() noexcept;
+  void settle() noexcept { thread_.stop(); }
   [[nodiscard]] ExposureCounters counters() const noexcept;
 
  private:
   [[nodiscard]] bool is_without(std::size_t k, const Frame& frame) noexcept;
   void ask(const ExposureSetting& requested) noexcept;
   void set_all(const ExposureSetting& requested) noexcept;
-  void work() noexcept;
 
   std::vector<CameraDevice*> cameras_;
   exposure::BrightnessMeter meter_;
@@ -76,11 +71,10 @@ class ExposureControl final : public FrameObserver {
   // Values applied by each camera. Used by the changing thread, and by others while no change is
   // pending.
   std::array<ExposureSetting, kMaxCameras> applied_{};
-  Ring<ExposureSetting, 4> requests_;
-  std::atomic<bool> under_way_{false}, stop_{false}, unsupported_{false};
+  std::atomic<bool> under_way_{false}, unsupported_{false};
   std::atomic<std::uint64_t> changes_{0}, refused_{0}, unequal_{0}, again_{0};
-  WakeEvent wake_;
-  std::thread thread_;
+  // Has room, because only one request is pending at a time.
+  QueueThread<ExposureSetting, 4> thread_{WhenFull::drop};
 };
 
 }  // namespace vergence::app

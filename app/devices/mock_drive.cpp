@@ -1,7 +1,6 @@
 #include "app/devices/mock_drive.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -43,10 +42,6 @@ void configured(DeviceStatus status, const std::string& what) {
     throw InputError(what + " cannot be configured: " + std::string(to_string(status)));
 }
 
-Duration trigger_delay(const Configuration& c, std::size_t k) {
-  return Duration::nanoseconds(std::llround(c.cameras[k].trigger_delay_us * 1e3));
-}
-
 }  // namespace
 
 void check_drive(const Configuration& c) {
@@ -57,57 +52,50 @@ void check_drive(const Configuration& c) {
   (void)trigger_configuration(c, camera_count(c));
 }
 
-MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults,
-                          bool real_time, std::optional<double> duration_s, bool raw) {
-  MockDrive drive;
+std::unique_ptr<mock::MockRig> make_mock_drive(const Configuration& c,
+                                               const std::vector<std::string>& more_faults,
+                                               bool real_time, std::optional<double> duration_s) {
   const RigCalibration rig = mounted_rig(c);
   const std::vector<mock::Fault> faults = all_faults(c, more_faults);
-  try {
-    mock::WorldOptions world;
-    world.seed = static_cast<std::uint64_t>(c.mock.seed);
-    world.texture_detail = c.mock.texture_detail;
-    world.hill_deg = c.mock.hill_deg;
-    mock::DriveOptions way;
-    way.kind = c.mock.drive;
-    way.seed = world.seed;
-    way.speed = c.mock.speed;
-    way.suspension = c.mock.suspension;
-    way.vibration = c.mock.vibration;
-    way.stop_s = c.mock.stop_s;
-    // The INS sits where the configuration says: p_ins = T_ins_left p_left.
-    const Transform T_body_left = mock::default_T_body_left();
-    const Transform T_body_ins = T_body_left * comparison_options(c).T_ins_left.inverse();
-    auto truth = std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(world),
-                                                        way, rig, T_body_left, T_body_ins, faults);
-    mock::MockRigOptions o;
-    o.real_time = real_time;
-    o.seed = world.seed;
-    o.pattern = c.mock.pattern;
-    o.raw = raw;
-    o.noise = c.mock.noise != 0;
-    o.blur_samples = c.mock.blur_samples;
-    o.ideal_ins = c.mock.ins == MockSettings::Ins::ideal;
-    o.clock_drift_ppm = c.mock.clock_drift_ppm;
-    // Only a board is asked for pauses, which the reports announce.
-    o.reports_read = c.sync.mode == SyncMode::board;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
-      o.trigger_delay[k] = trigger_delay(c, k);
-    o.exposures_follow = exposes_by_itself(c);
-    if (duration_s) o.duration = Duration::seconds(*duration_s);
-    drive.rig = std::make_unique<mock::MockRig>(std::move(truth), o);
-  } catch (const std::invalid_argument& e) {
-    throw InputError(e.what());
-  }
+  mock::WorldOptions world;
+  world.seed = static_cast<std::uint64_t>(c.mock.seed);
+  world.texture_detail = c.mock.texture_detail;
+  world.hill_deg = c.mock.hill_deg;
+  mock::DriveOptions way;
+  way.kind = c.mock.drive;
+  way.seed = world.seed;
+  way.speed = c.mock.speed;
+  way.suspension = c.mock.suspension;
+  way.vibration = c.mock.vibration;
+  way.stop_s = c.mock.stop_s;
+  // The INS sits where the configuration says: p_ins = T_ins_left p_left.
+  const Transform T_body_left = mock::default_T_body_left();
+  const Transform T_body_ins = T_body_left * comparison_options(c).T_ins_left.inverse();
+  auto truth = std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(world),
+                                                      way, rig, T_body_left, T_body_ins, faults);
+  mock::MockRigOptions o;
+  o.real_time = real_time;
+  o.seed = world.seed;
+  o.pattern = c.mock.pattern;
+  o.noise = c.mock.noise != 0;
+  o.blur_samples = c.mock.blur_samples;
+  o.ideal_ins = c.mock.ins == MockSettings::Ins::ideal;
+  o.clock_drift_ppm = c.mock.clock_drift_ppm;
+  // Only a board is asked for pauses, which the reports announce.
+  o.reports_read = c.sync.mode == SyncMode::board;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    o.trigger_delay[k] = microseconds(c.cameras[k].trigger_delay_us);
+  o.exposures_follow = exposes_by_itself(c);
+  if (duration_s) o.duration = Duration::seconds(*duration_s);
+  auto mock = std::make_unique<mock::MockRig>(std::move(truth), o);
   for (int k = 0; k < rig.cameras; ++k) {
     CameraConfiguration requested = camera_configuration(c, static_cast<std::size_t>(k));
     requested.trigger = CameraTrigger::hardware;
-    configured(drive.rig->camera(k).configure(requested, nullptr), fmt::format("cameras.{}", k));
+    configured(mock->camera(k).configure(requested, nullptr), fmt::format("cameras.{}", k));
   }
-  configured(drive.rig->trigger().configure(trigger_configuration(c, rig.cameras), nullptr),
-             "trigger");
-  drive.has_ins = c.ins.driver == "mock";
-  if (drive.has_ins) configured(drive.rig->ins().configure(c.ins.rate, nullptr), "ins");
-  return drive;
+  configured(mock->trigger().configure(trigger_configuration(c, rig.cameras), nullptr), "trigger");
+  if (c.ins.driver == "mock") configured(mock->ins().configure(c.ins.rate, nullptr), "ins");
+  return mock;
 }
 
 Duration stamp_grid(const Configuration& c) noexcept {
@@ -119,8 +107,8 @@ std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configu
                                          Stamp start) {
   std::vector<StampedPose> poses;
   for (const Duration pulse : rig.pulse_times()) {
-    const Duration middle =
-        pulse + trigger_delay(c, 0) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
+    const Duration middle = pulse + microseconds(c.cameras[0].trigger_delay_us) +
+                            Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
     poses.push_back({start + middle, rig.truth().camera_in_enu(0, middle)});
   }
   return poses;

@@ -14,15 +14,12 @@ namespace vergence::app {
 /// Checks that a run with these devices is possible.
 void check_drive(const Configuration& configuration);
 
-struct MockDrive {
-  std::unique_ptr<mock::MockRig> rig;
-  bool has_ins = false;
-};
-/// Makes world, trajectory and devices, configured and ready to start. Adds `faults` to the
-/// configuration's. With `raw`, cameras with a Bayer pattern output the mosaic.
-[[nodiscard]] MockDrive make_mock_drive(const Configuration& configuration,
-                                        const std::vector<std::string>& faults, bool real_time,
-                                        std::optional<double> duration_s, bool raw = false);
+/// Makes world, trajectory and devices, configured and ready to start; the INS only if its driver
+/// is `mock`. Adds `faults` to the configuration's.
+[[nodiscard]] std::unique_ptr<mock::MockRig> make_mock_drive(const Configuration& configuration,
+                                                             const std::vector<std::string>& faults,
+                                                             bool real_time,
+                                                             std::optional<double> duration_s);
 
 /// Resolution of the session's stamps: with `mock.pattern: gbrg` whole microseconds, the resolution
 /// of a St Lucia log.

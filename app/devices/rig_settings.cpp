@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <numbers>
 
 #include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
 #include "app/config/calibration_file.hpp"
+#include "app/devices/drive_sync.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
 #include "core/math/random.hpp"
 
 namespace vergence::app {
@@ -73,8 +76,6 @@ void add_calibration_error(const CalibrationErrorSettings& e, RigCalibration* ri
 }
 
 Vec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
-Duration microseconds(double us) { return Duration::seconds(us * 1e-6); }
 
 }  // namespace
 
@@ -182,6 +183,24 @@ CameraConfiguration camera_configuration(const Configuration& c, std::size_t k) 
   requested.pixel_format = s.pixel_format;
   requested.options = s.options;
   return requested;
+}
+
+Configuration capture_configuration(const Configuration& configuration) {
+  Configuration c = configuration;
+  if (c.sync.mode != SyncMode::ins_syncout) c.ins.driver = "none";
+  return c;
+}
+
+std::vector<std::string> camera_names(const Configuration& c, int cameras) {
+  std::vector<std::string> names;
+  for (int k = 0; k < cameras; ++k) {
+    std::string name = c.cameras[static_cast<std::size_t>(k)].name;
+    std::ranges::replace_if(
+        name, [](unsigned char ch) { return std::isalnum(ch) == 0 && ch != '_' && ch != '-'; },
+        '_');
+    names.push_back(name.empty() ? "camera" + std::to_string(k) : name);
+  }
+  return distinct_names(names);
 }
 
 }  // namespace vergence::app

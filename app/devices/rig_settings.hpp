@@ -43,4 +43,13 @@ void check_cameras(const Configuration& configuration);
 [[nodiscard]] CameraConfiguration camera_configuration(const Configuration& configuration,
                                                        std::size_t k);
 
+/// Configuration for capturing images, which needs only the cameras and their trigger. The INS may
+/// be absent, so it is removed unless its SyncOut makes the pulses.
+[[nodiscard]] Configuration capture_configuration(const Configuration& configuration);
+
+/// Names of the cameras for files and messages: those of the configuration (letters, digits, `_`
+/// and `-`, everything else becomes `_`), or `camera0` …; each is unique.
+[[nodiscard]] std::vector<std::string> camera_names(const Configuration& configuration,
+                                                    int cameras);
+
 }  // namespace vergence::app

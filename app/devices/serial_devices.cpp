@@ -26,23 +26,30 @@ void require_configured(const std::string& title, DeviceStatus status, const std
 
 namespace {
 
-/// Why a device on a serial port cannot be opened. `error`: the driver's message, may be empty.
-std::string serial_open_error(const std::string& who, DeviceStatus status,
-                              const std::string& error) {
-  switch (status) {
-    case DeviceStatus::busy:
-      return fmt::format(
-          "{} is in use by another program; end that program (ModemManager opens new ports: "
-          "vergence devices --write-udev)",
-          who);
-    case DeviceStatus::no_permission:
-      return fmt::format(
-          "{} cannot be opened: permission denied; add the user to group dialout, and log in again",
-          who);
-    default:
-      return fmt::format("{} cannot be used: {}", who,
-                         error.empty() ? std::string(to_string(status)) : error);
-  }
+/// Refuses a device on a serial port that cannot be opened. `error`: the driver's message, may be
+/// empty.
+void require_opened(bool opened, std::string who, const std::string& port, DeviceStatus status,
+                    const std::string& error) {
+  if (opened) return;
+  if (!port.empty()) who += " on " + port;
+  refuse_device(
+      status,
+      who + (status == DeviceStatus::busy
+                 ? " is in use by another program; end that program (ModemManager opens new ports: "
+                   "vergence devices --write-udev)"
+             : status == DeviceStatus::no_permission
+                 ? " cannot be opened: permission denied; add the user to group dialout, and log "
+                   "in again"
+                 : " cannot be used: " + (error.empty() ? std::string(to_string(status)) : error)));
+}
+
+/// Requires that a device was configured, and passes on what was not applied as requested.
+template <class Device>
+void require_configured(const std::string& title, const Device& device, DeviceStatus status,
+                        std::vector<std::string>* remarks) {
+  app::require_configured(title, status, device.last_error());
+  if (const std::string remark = device.remark(); !remark.empty())
+    remarks->push_back(title + ": " + remark);
 }
 
 /// The drivers of real INS by their name in the configuration, which the schema has checked.
@@ -71,16 +78,11 @@ std::unique_ptr<InsDevice> open_ins(const InsSettings& settings,
   if (settings.driver == "none") return nullptr;
   const std::unique_ptr<InsDriver> driver = make_ins_driver(settings);
   DeviceStatus status = DeviceStatus::ok;
-  std::unique_ptr<InsDevice> device = driver->open(settings.port, &status);
-  if (device == nullptr)
-    refuse_device(
-        status, serial_open_error(fmt::format("ins: the {} INS{}", settings.driver,
-                                              settings.port.empty() ? "" : " on " + settings.port),
-                                  status, driver->last_error()));
-  status = device->configure(settings.rate, nullptr);
-  require_configured(ins_title(device->info()), status, device->last_error());
-  if (const std::string remark = device->remark(); !remark.empty())
-    remarks->push_back(ins_title(device->info()) + ": " + remark);
+  auto device = driver->open(settings.port, &status);
+  require_opened(device != nullptr, fmt::format("ins: the {} INS", settings.driver), settings.port,
+                 status, driver->last_error());
+  require_configured(ins_title(device->info()), *device, device->configure(settings.rate, nullptr),
+                     remarks);
   return device;
 }
 
@@ -97,16 +99,11 @@ std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings&
   options.ins = settings.ins;
   trigger_board::Driver driver(options);
   DeviceStatus status = DeviceStatus::ok;
-  std::unique_ptr<trigger_board::Device> board = driver.open_board(settings.port, &status);
-  if (board == nullptr)
-    refuse_device(status,
-                  serial_open_error("trigger: the trigger board" +
-                                        (settings.port.empty() ? "" : " on " + settings.port),
-                                    status, driver.last_error()));
-  status = board->configure(pulses, nullptr);
-  require_configured(board_title(board->info()), status, board->last_error());
-  if (const std::string remark = board->remark(); !remark.empty())
-    remarks->push_back(board_title(board->info()) + ": " + remark);
+  auto board = driver.open_board(settings.port, &status);
+  require_opened(board != nullptr, "trigger: the trigger board", settings.port, status,
+                 driver.last_error());
+  require_configured(board_title(board->info()), *board, board->configure(pulses, nullptr),
+                     remarks);
   return board;
 }
 

@@ -1,25 +1,29 @@
 #include "app/devices/snap_session.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/image_writer.hpp"
-#include "app/devices/capture_result.hpp"
 #include "app/devices/drive_devices.hpp"
+#include "app/devices/image_check.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/runtime/version.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
@@ -46,13 +50,14 @@ class Snap {
         configuration_(capture_configuration(request.configuration)),
         names_(camera_names(request.configuration, camera_count(request.configuration))) {}
   ExitCode run() {
-    const CaptureResult capture = attempt();
+    open();
+    capture();
     if (!sets_.empty()) write_report();
-    return verdict(capture);
+    return verdict();
   }
 
  private:
-  [[nodiscard]] CaptureResult attempt() {
+  void open() {
     const Configuration& c = configuration_;
     // A mock: in virtual time, as long as the sets need and a second more.
     const std::optional<double> duration =
@@ -60,21 +65,70 @@ class Snap {
     devices_ = std::make_unique<DriveDevices>(c, std::vector<std::string>{}, is_mock(c), duration);
     trigger_ = is_mock(c) ? "mock" : to_string(c.cameras[0].trigger);
     for (const std::string& remark : devices_->remarks()) add_remark(remark);
-    CaptureOptions o;
-    o.count = request_.count;
-    o.limit = Duration::seconds(request_.wait_s);
-    o.skip = is_mock(c) || c.cameras[0].trigger == CameraTrigger::hardware ? 0 : 2;
-    return capture_sets(*devices_, o, signals_, [this](const CapturedSet& set) { keep(set); });
+    delivered_.assign(names_.size(), 0);
+    disconnected_.assign(names_.size(), false);
+  }
+  /// Starts the devices, keeps complete sets and stops the devices. Uses only the pulses of the
+  /// INS, if it makes them.
+  void capture() {
+    Acquisition::Options o = devices_->acquisition_options();
+    const HostMoment now = moment_now();
+    o.tie_stamp = now.day;
+    o.tie_host = devices_->mock() != nullptr ? devices_->start() : now.host;
+    Acquisition source(devices_->cameras(), devices_->ins(), devices_->trigger(), o);
+    start_acquisition(&source);
+    {
+      using Clock = std::chrono::steady_clock;
+      const std::chrono::nanoseconds limit(Duration::seconds(request_.wait_s).ns());
+      std::atomic<Clock::time_point> until{Clock::now() + limit};
+      // Ends the stream when nothing has come for too long, or a signal has.
+      const std::jthread watchdog([&](const std::stop_token& done) {
+        constexpr auto kPollInterval = std::chrono::milliseconds(50);
+        while (!done.stop_requested() && !signals_.stop_requested() && Clock::now() < until.load())
+          std::this_thread::sleep_for(kPollInterval);
+        source.stop();
+      });
+      // The first exposures after a start by software may have old settings.
+      int skipped =
+          is_mock(configuration_) || configuration_.cameras[0].trigger == CameraTrigger::hardware
+              ? 0
+              : 2;
+      for (Acquired item; !complete() && source.next(&item);) {
+        if (const auto* event = std::get_if<DeviceEvent>(&item)) on_event(*event);
+        const auto* frame = std::get_if<AcquiredFrame>(&item);
+        if (frame == nullptr) continue;
+        for (std::size_t k = 0; k < names_.size(); ++k)
+          delivered_[k] += frame->set.present[k] ? 1 : 0;
+        if (frame->set.complete && skipped-- <= 0) {
+          keep(*frame);
+          until = Clock::now() + limit;
+        }
+        source.release(*frame);
+      }
+    }
+    source.stop();
+    for (Acquired item; source.next(&item);)
+      if (const auto* frame = std::get_if<AcquiredFrame>(&item)) source.release(*frame);
+    source.join();
+  }
+  void on_event(const DeviceEvent& event) {
+    const auto k = static_cast<std::size_t>(event.camera);
+    if (event.kind == DeviceEvent::Kind::camera_disconnected) disconnected_[k] = true;
+    if (event.kind == DeviceEvent::Kind::camera_reconnected) disconnected_[k] = false;
+  }
+  [[nodiscard]] bool complete() const {
+    return sets_.size() == static_cast<std::size_t>(request_.count);
   }
   void add_remark(const std::string& message) {
     remarks_.push_back(message);
     warn(message);
   }
-  void keep(const CapturedSet& set) {
+  void keep(const AcquiredFrame& frame) {
+    const RigFrame& set = frame.rig;
     std::vector<ImageStatistics> statistics;
     Json images = Json::array();
-    for (std::size_t k = 0; k < set.images.size(); ++k) {
-      const std::string file = file_name(k, set.index);
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      const std::string file = file_name(k, sets_.size());
       write_png(request_.out / file, set.images[k]);
       const ImageStatistics f = image_statistics(set.images[k]);
       statistics.push_back(f);
@@ -104,19 +158,19 @@ class Snap {
       findings.push_back({{"unusable", r.unusable}, {"message", r.message}});
       warn(r.message);
     }
-    if (set.proof == SyncProof::ambiguous)
+    if (frame.set.proof == SyncProof::ambiguous)
       warn("the stamps of the cameras do not agree; simultaneous exposure is not verified");
     sets_.push_back({{"stamp_ns", set.stamp.ns()},
                      {"stamp_error_ms", rounded(set.stamp_error.to_seconds() * kMilli, 4)},
                      {"spread_ms", rounded(set.spread.to_seconds() * kMilli, 4)},
-                     {"proof", to_string(set.proof)},
+                     {"proof", to_string(frame.set.proof)},
                      {"images", images},
                      {"findings", findings}});
   }
   [[nodiscard]] std::vector<ImageIssue> check(
-      const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const {
+      const RigFrame& set, const std::vector<ImageStatistics>& statistics) const {
     std::vector<ImageIssue> remarks = evaluate_images(names_, statistics);
-    for (std::size_t k = 1; k < set.images.size(); ++k)
+    for (std::size_t k = 1; k < names_.size(); ++k)
       for (std::size_t i = 0; i < k; ++i)
         if (are_identical(set.images[i], set.images[k]))
           remarks.push_back({true, fmt::format("{} and {} are identical images; if one camera is "
@@ -124,15 +178,15 @@ class Snap {
                                                names_[i], names_[k])});
     return remarks;
   }
-  [[nodiscard]] std::string file_name(std::size_t camera, int set) const {
+  [[nodiscard]] std::string file_name(std::size_t camera, std::size_t set) const {
     return request_.count == 1 ? names_[camera] + ".png"
                                : fmt::format("{}_{:04}.png", names_[camera], set);
   }
-  void print(const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const {
+  void print(const RigFrame& set, const std::vector<ImageStatistics>& statistics) const {
     std::size_t width = 6;
     for (const std::string& name : names_) width = std::max(width, name.size());
-    const std::string title = request_.count == 1 ? "camera" : fmt::format("set {}", set.index);
-    if (set.index == 0 || request_.count > 1)
+    const std::string title = request_.count == 1 ? "camera" : fmt::format("set {}", sets_.size());
+    if (sets_.empty() || request_.count > 1)
       std::cout << fmt::format(
           "{:<{}}  {:>6} {:>8} {:>8} {:>8} {:>9}  {}\n", title, width, "mean", "contrast",
           "white %", "black %", "sharpness",
@@ -142,7 +196,7 @@ class Snap {
       std::cout << fmt::format("{:<{}}  {:>6.1f} {:>8.1f} {:>8.2f} {:>8.2f} {:>9.1f}  {}\n",
                                names_[k], width, f.mean, f.contrast, kPercent * f.saturated,
                                kPercent * f.dark, f.sharpness,
-                               (request_.out / file_name(k, set.index)).string());
+                               (request_.out / file_name(k, sets_.size())).string());
     }
     std::cout.flush();
   }
@@ -160,20 +214,18 @@ class Snap {
       throw InputError(file.string() +
                        ": cannot be written; check the free space and the permissions");
   }
-  [[nodiscard]] ExitCode verdict(const CaptureResult& capture) const {
-    if (capture.end == CaptureResult::End::interrupted)
-      return signals_.stop_code().value_or(ExitCode::interrupted);
-    if (capture.end == CaptureResult::End::done)
-      return unusable_ ? ExitCode::not_usable : ExitCode::done;
+  [[nodiscard]] ExitCode verdict() const {
+    if (complete()) return unusable_ ? ExitCode::not_usable : ExitCode::done;
+    if (const auto stopped = signals_.stop_code()) return *stopped;
     bool silent = false;
-    for (std::size_t k = 0; k < capture.delivered.size(); ++k) {
-      if (capture.delivered[k] > 0) continue;
+    for (std::size_t k = 0; k < delivered_.size(); ++k) {
+      if (delivered_[k] > 0) continue;
       silent = true;
       warn(fmt::format(
           "{} {}; check its cable, its power and its trigger ({}.trigger; `free` needs no pulse)",
           camera_title(names_[k], devices_->cameras()[k]->info()),
-          capture.disconnected[k] ? "is disconnected"
-                                  : fmt::format("sent no image within {:g} s", request_.wait_s),
+          disconnected_[k] ? "is disconnected"
+                           : fmt::format("sent no image within {:g} s", request_.wait_s),
           fmt::format("cameras.{}", k)));
     }
     if (!silent)
@@ -182,7 +234,7 @@ class Snap {
           "are not triggered together need sync.mode: approximate_time and a sync.tolerance_ms of "
           "half their period",
           sets_.empty() ? "no images within the tolerance" : "too few within the tolerance",
-          capture.sets, request_.count));
+          sets_.size(), request_.count));
     return ExitCode::device_failed;
   }
 
@@ -195,6 +247,10 @@ class Snap {
   std::vector<std::string> remarks_;
   Json sets_ = Json::array();
   bool unusable_ = false;
+  // Images by camera, also those of incomplete sets.
+  std::vector<std::uint64_t> delivered_;
+  // Cameras that are disconnected.
+  std::vector<bool> disconnected_;
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "core/types/image.hpp"
@@ -20,7 +21,23 @@ namespace vergence::app {
 class FrameImages {
  public:
   /// Copies the images if requested. If true, finish() must follow, now or later.
-  bool copy(const RigFrame& frame) noexcept;
+  bool copy(const RigFrame& frame) noexcept {
+    if (owner_.load(std::memory_order_acquire) != Owner::estimator) return false;
+    for (std::size_t k = 0; k < kImages; ++k) {
+      images_[k] = {};
+      const ImageView image = static_cast<int>(k) < frame.cameras ? frame.images[k] : ImageView{};
+      const auto width = static_cast<std::size_t>(image.width);
+      if (image.empty() || width * static_cast<std::size_t>(image.height) > pixels_[k].size())
+        continue;
+      std::uint8_t* out = pixels_[k].data();
+      for (int y = 0; y < image.height; ++y, out += width) std::memcpy(out, image.row(y), width);
+      images_[k] = {pixels_[k].data(), image.width, image.height, image.width};
+    }
+    frame_ = frame.number;
+    stamp_ = frame.stamp;
+    owner_.store(Owner::copy, std::memory_order_relaxed);
+    return true;
+  }
   /// True while a copy waits for finish().
   [[nodiscard]] bool copying() const noexcept {
     return owner_.load(std::memory_order_relaxed) == Owner::copy;
@@ -29,7 +46,11 @@ class FrameImages {
 
   /// Requests the next frame unless one is requested or available. `image_bytes` is the size of the
   /// largest camera; larger images are skipped.
-  void want(std::size_t image_bytes);
+  void want(std::size_t image_bytes) {
+    if (owner_.load(std::memory_order_acquire) != Owner::none) return;
+    for (std::vector<std::uint8_t>& pixels : pixels_) pixels.resize(image_bytes);
+    owner_.store(Owner::estimator, std::memory_order_release);
+  }
   /// True if a frame is available; it stays until done().
   [[nodiscard]] bool ready() const noexcept {
     return owner_.load(std::memory_order_acquire) == Owner::reader;

@@ -1,7 +1,6 @@
 #include "app/publish/http_server.hpp"
 
 #include <microhttpd.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -12,8 +11,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
-#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 namespace {
@@ -75,28 +72,22 @@ HttpDecision decide_action(HttpRoute route, const HttpRequest& r,
 }
 
 FileDescriptor listen_at(const HostPort& address) {
-  const auto refuse = [&](const char* why, const char* what_to_do) {
-    throw InputError(fmt::format("publish.http: the live page cannot be served at {} ({}); {}",
-                                 address.text(), why, what_to_do));
+  const auto refused = [&](const char* why, const char* what_to_do) {
+    return InputError(fmt::format("publish.http: the live page cannot be served at {} ({}); {}",
+                                  address.text(), why, what_to_do));
   };
-  addrinfo hints{}, *found = nullptr;
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE;
-  if (const int error =
-          ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
-      error != 0)
-    refuse(::gai_strerror(error), "use an address of this machine");
+  const auto found = resolve(address, SOCK_STREAM, [&](const char* reason) {
+    return refused(reason, "use an address of this machine");
+  });
   FileDescriptor socket(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   constexpr int kOn = 1;
   (void)::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &kOn, sizeof kOn);
-  const bool listens = socket && ::bind(socket.get(), found->ai_addr, found->ai_addrlen) == 0 &&
-                       ::listen(socket.get(), kBacklog) == 0;
-  const int error = errno;
-  ::freeaddrinfo(found);
-  if (!listens)
-    refuse(std::strerror(error),
-           error == EADDRINUSE ? "another program uses the port; choose another one"
-                               : "use an address of this machine and a port of 1024 or above");
+  if (!socket || ::bind(socket.get(), found->ai_addr, found->ai_addrlen) != 0 ||
+      ::listen(socket.get(), kBacklog) != 0)
+    throw refused(std::strerror(errno),
+                  errno == EADDRINUSE
+                      ? "another program uses the port; choose another one"
+                      : "use an address of this machine and a port of 1024 or above");
   return socket;
 }
 

@@ -79,8 +79,6 @@ class HttpServer {
   /// `page` is the HTML, which must outlive the server.
   HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page, Handler handler);
   ~HttpServer();
-  HttpServer(const HttpServer&) = delete;
-  HttpServer& operator=(const HttpServer&) = delete;
 
   /// Waits for clients, at most `timeout`, and serves them.
   void step(std::chrono::milliseconds timeout);

@@ -35,7 +35,7 @@ LinePublisher::LinePublisher(std::unique_ptr<LineSocket> socket, SessionRequests
 LinePublisher::~LinePublisher() { stop(); }
 
 void LinePublisher::stop() noexcept {
-  stop_.store(true, std::memory_order_release);
+  stop_ = true;
   wake();
   if (thread_.joinable()) thread_.join();
 }
@@ -44,11 +44,11 @@ void LinePublisher::wake() noexcept { (void)::eventfd_write(wake_.get(), 1); }
 
 void LinePublisher::on_start(const SessionStart& start) noexcept {
   start_ = start;
-  started_.store(true, std::memory_order_release);
+  started_ = true;
 }
 
 void LinePublisher::on_pose(const FrameReport& report) noexcept {
-  if (!reports_.push(report)) dropped_.fetch_add(1, std::memory_order_relaxed);
+  if (!reports_.push(report)) ++dropped_;
   wake();
 }
 
@@ -61,21 +61,20 @@ void LinePublisher::on_enu_alignment(const EnuAlignment& alignment,
 
 void LinePublisher::on_calibration(const CalibrationRecord& calibration) noexcept {
   if (!calibration.accepted) return;
-  if (calibration.decided) verified_.store(calibration.verified, std::memory_order_relaxed);
+  if (calibration.decided) verified_ = calibration.verified;
   (void)calibrations_.push(calibration);
   wake();
 }
 
 void LinePublisher::on_reading(const InsRecord& reading) noexcept {
-  fix_.store(reading.sample.fix, std::memory_order_relaxed);
-  sample_ns_.store(monotonic_now().ns(), std::memory_order_relaxed);
+  fix_ = reading.sample.fix;
+  sample_ns_ = monotonic_now().ns();
 }
 
 void LinePublisher::on_event(const EventRecord& event) noexcept {
   const std::string_view kind = event.kind;
   const bool verified = kind == "calibration_verified";
-  if (verified || kind == "calibration_contradicted" || kind == "rig_changed")
-    verified_.store(verified, std::memory_order_relaxed);
+  if (verified || kind == "calibration_contradicted" || kind == "rig_changed") verified_ = verified;
 }
 
 void LinePublisher::work() noexcept {
@@ -84,8 +83,8 @@ void LinePublisher::work() noexcept {
   // where the system permits.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   for (;;) {
-    const bool last = stop_.load(std::memory_order_acquire);
-    const bool begun = started_.load(std::memory_order_acquire);
+    const bool last = stop_;
+    const bool begun = started_;
     drain();
     const HostStamp now = monotonic_now();
     if (begun && now >= status_due_) send_status(now);
@@ -116,7 +115,7 @@ void LinePublisher::send(const FrameReport& report) {
   const std::optional<ClockTie>& tie = start_.tie;
   std::optional<double> age_ms;
   if (tie) age_ms = (tie->stamp_at(monotonic_now()) - pose.stamp).to_seconds() * 1e3;
-  write_pose_line(pose, in_enu, age_ms, dropped_.load(std::memory_order_relaxed), &line_);
+  write_pose_line(pose, in_enu, age_ms, dropped_, &line_);
   socket_->send(line_);
   ++lines_;
   const HostStamp sent = monotonic_now();
@@ -131,11 +130,11 @@ void LinePublisher::send_status(HostStamp now) {
   status.frame = newest_;
   if (newest_) status.silent_s = (now - newest_->estimated).to_seconds();
   status.calibrated = !calibration_line_.empty();
-  status.verified = verified_.load(std::memory_order_relaxed);
+  status.verified = verified_;
   status.aligned = alignment_.has_value();
-  status.dropped = dropped_.load(std::memory_order_relaxed);
-  if (const std::int64_t ns = sample_ns_.load(std::memory_order_relaxed); ns != 0)
-    status.ins = {fix_.load(std::memory_order_relaxed), (now - HostStamp(ns)).to_seconds()};
+  status.dropped = dropped_;
+  if (const std::int64_t ns = sample_ns_; ns != 0)
+    status.ins = {fix_, (now - HostStamp(ns)).to_seconds()};
   socket_->send(status_line(status));
 }
 
@@ -168,7 +167,7 @@ LineResponse LinePublisher::answer(std::string_view request) {
   if (name != "recalibrate" && name != "images")
     return refuse(R"(unknown request; send {"request": "recalibrate"} or )"
                   R"({"request": "images", "rate_hz": 5})");
-  if (!started_.load(std::memory_order_acquire))
+  if (!started_)
     return refuse("the session has not started yet; repeat the request after the first pose");
   if (name == "images") {
     constexpr double kMaxRate = 200;
@@ -182,7 +181,7 @@ LineResponse LinePublisher::answer(std::string_view request) {
     return refuse(
         "this session cannot be recalibrated on request; use a live session with "
         "calibration.online: on");
-  requests_->recalibrate.store(true, std::memory_order_relaxed);
+  requests_->recalibrate = true;
   return {response_line(name, true, "recalibration starts at the next frame"), {}};
 }
 
@@ -192,7 +191,7 @@ std::vector<std::pair<std::string, std::uint64_t>> LinePublisher::counters() {
   const auto us = [](double ms) { return static_cast<std::uint64_t>(ms * 1e3 + 0.5); };
   std::vector<std::pair<std::string, std::uint64_t>> out{
       {"lines", lines_},
-      {"lines_dropped", dropped_.load(std::memory_order_relaxed)},
+      {"lines_dropped", dropped_},
       {"lines_sent", c.sent},
       {"lines_refused", c.refused},
       {"images_sent", c.images},

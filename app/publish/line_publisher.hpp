@@ -36,8 +36,6 @@ class LinePublisher final : public SessionObserver {
                 const calibration::CalibrationOptions& options);
   /// Sends the remaining lines, then ends the thread.
   ~LinePublisher() override;
-  LinePublisher(const LinePublisher&) = delete;
-  LinePublisher& operator=(const LinePublisher&) = delete;
 
   void on_start(const SessionStart& start) noexcept override;
   void on_frame(const RigFrame& frame) noexcept override {

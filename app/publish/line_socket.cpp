@@ -1,6 +1,5 @@
 #include "app/publish/line_socket.hpp"
 
-#include <netdb.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -277,23 +276,16 @@ class UnixLineSocket final : public LineSocket {
 class UdpLineSocket final : public LineSocket {
  public:
   UdpLineSocket(const HostPort& address, std::string_view key) {
-    addrinfo hints{}, *found = nullptr;
-    hints.ai_socktype = SOCK_DGRAM;
-    const int error =
-        ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
-    if (error != 0)
-      throw InputError(
+    const auto found = resolve(address, SOCK_DGRAM, [&](const char* reason) {
+      return InputError(
           fmt::format("{}: the host {} is unknown ({}); write its IP address, e.g. 127.0.0.1:{}",
-                      key, address.host, ::gai_strerror(error), address.port));
+                      key, address.host, reason, address.port));
+    });
     socket_ =
         FileDescriptor(::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-    const bool connected =
-        socket_ && ::connect(socket_.get(), found->ai_addr, found->ai_addrlen) == 0;
-    const int reason = errno;
-    ::freeaddrinfo(found);
-    if (!connected)
+    if (!socket_ || ::connect(socket_.get(), found->ai_addr, found->ai_addrlen) != 0)
       throw InputError(fmt::format("{}: {} cannot be reached ({}); check the network", key,
-                                   address.text(), std::strerror(reason)));
+                                   address.text(), std::strerror(errno)));
   }
 
   void greet(std::string lines) noexcept override {
@@ -333,6 +325,18 @@ std::string HostPort::text() const {
 
 HostPort HostPort::link() const {
   return host == "0.0.0.0" || host == "::" ? HostPort{machine_name(), port} : *this;
+}
+
+std::unique_ptr<addrinfo, void (*)(addrinfo*)> resolve(
+    const HostPort& address, int type,
+    const std::function<InputError(const char* reason)>& refuse) {
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = type;
+  hints.ai_flags = AI_PASSIVE;
+  const int error =
+      ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
+  if (error != 0) throw refuse(::gai_strerror(error));
+  return {found, ::freeaddrinfo};
 }
 
 HostPort parse_host_port(std::string_view text, std::string_view key) {

@@ -1,10 +1,13 @@
 #pragma once
+#include <netdb.h>
+
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 
+#include "app/runtime/errors.hpp"
 #include "app/runtime/file_descriptor.hpp"
 #include "core/types/time.hpp"
 
@@ -22,6 +25,11 @@ struct HostPort {
   /// Address for viewers: the machine's name if the host is every address (0.0.0.0, ::).
   [[nodiscard]] HostPort link() const;
 };
+
+/// First address of a host name or number for that type of socket. Throws the result of
+/// `refuse(reason)`.
+[[nodiscard]] std::unique_ptr<addrinfo, void (*)(addrinfo*)> resolve(
+    const HostPort& address, int type, const std::function<InputError(const char* reason)>& refuse);
 
 /// Destination of the lines.
 struct LineAddress {

@@ -91,11 +91,6 @@ struct LivePoint {
   bool both = false;
 };
 
-/// A report before its comparison with the INS.
-struct Posed {
-  FrameReport report{};
-};
-
 /// Live page of `publish.http` (docs/live_interface.md).
 ///
 /// Threads  on_…() run on the estimator's thread: they push into rings and, if a viewer waits for
@@ -124,16 +119,13 @@ class LivePage final : public SessionObserver {
         }) {}
 
   ~LivePage() override {
-    stop_.store(true, std::memory_order_release);
+    stop_ = true;
     thread_.join();
   }
 
-  LivePage(const LivePage&) = delete;
-  LivePage& operator=(const LivePage&) = delete;
-
   void on_start(const SessionStart& start) noexcept override {
     start_ = start;
-    started_.store(true, std::memory_order_release);
+    started_ = true;
   }
 
   void on_frame(const RigFrame& frame) noexcept override { (void)images_.copy(frame); }
@@ -154,7 +146,7 @@ class LivePage final : public SessionObserver {
     push(PublishedEnuAlignment{alignment, origin});
   }
 
-  void on_pose(const FrameReport& report) noexcept override { push(Posed{report}); }
+  void on_pose(const FrameReport& report) noexcept override { push(PosedFrame{report}); }
 
   void on_report(const FrameReport& report) noexcept override { push(report); }
 
@@ -163,31 +155,24 @@ class LivePage final : public SessionObserver {
   void on_calibration(const CalibrationRecord& calibration) noexcept override { push(calibration); }
 
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override {
-    ended_.store(true, std::memory_order_release);
-    return {{"page_updates", counts_.updates.load(std::memory_order_relaxed)},
-            {"page_dropped", counts_.dropped.load(std::memory_order_relaxed)}};
+    ended_ = true;
+    return {{"page_updates", updates_}, {"page_dropped", dropped_}};
   }
 
  private:
   using Clock = std::chrono::steady_clock;
 
   using Item =
-      std::variant<Posed, FrameReport, EventRecord, CalibrationRecord, PublishedEnuAlignment>;
+      std::variant<PosedFrame, FrameReport, EventRecord, CalibrationRecord, PublishedEnuAlignment>;
 
   void push(const Item& item) noexcept {
-    if (!items_.push(item)) counts_.dropped.fetch_add(1, std::memory_order_relaxed);
-  }
-  void add(const Posed& posed) { state_.add_pose(posed.report); }
-  void add(const FrameReport& report) { state_.add_report(report); }
-  template <class Record>
-  void add(const Record& record) {
-    state_.add(record);
+    if (!items_.push(item)) ++dropped_;
   }
   void work() {
     (void)pthread_setname_np(pthread_self(), "vergence-page");
     // On Linux each thread has its own niceness.
     (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
-    while (!stop_.load(std::memory_order_acquire)) {
+    while (!stop_) {
       server_.step(milliseconds(100));
       drain();
     }
@@ -197,23 +182,22 @@ class LivePage final : public SessionObserver {
   }
 
   void drain() {
-    if (!begun_ && started_.load(std::memory_order_acquire)) {
+    if (!begun_ && started_) {
       state_.begin(start_);
       begun_ = true;
     }
     // The flag is read before the rings, which then contain the rest of the session.
-    const bool ended = ended_.load(std::memory_order_acquire);
+    const bool ended = ended_;
     for (Item item; items_.pop(&item);)
-      std::visit([this](const auto& record) { add(record); }, item);
+      std::visit([this](const auto& record) { state_.add(record); }, item);
     if (ended) state_.end();
   }
 
   [[nodiscard]] std::string handle(HttpRoute route, const HttpRequest& request) {
-    constexpr auto kOrder = std::memory_order_relaxed;
     if (route == HttpRoute::state) return state_since(request);
-    if (route == HttpRoute::recalibrate) requests_->recalibrate.store(true, kOrder);
-    if (route == HttpRoute::mark) requests_->mark.store(true, kOrder);
-    if (route == HttpRoute::stop_recording) requests_->stop_recording.store(true, kOrder);
+    if (route == HttpRoute::recalibrate) requests_->recalibrate = true;
+    if (route == HttpRoute::mark) requests_->mark = true;
+    if (route == HttpRoute::stop_recording) requests_->stop_recording = true;
     return "";
   }
 
@@ -222,7 +206,7 @@ class LivePage final : public SessionObserver {
     drain();
     // Viewers wait for the session, because the simulated world starts slowly.
     if (!begun_) return "";
-    counts_.updates.fetch_add(1, std::memory_order_relaxed);
+    ++updates_;
     const bool known = request.epoch == epoch_;
     std::uint64_t version = 0;
     if (known)
@@ -269,9 +253,7 @@ class LivePage final : public SessionObserver {
 
   // Passed from the estimator's thread to the page's.
   Ring<Item, 256> items_;
-  struct Counts {
-    std::atomic<std::uint64_t> updates{0}, dropped{0};
-  } counts_;
+  std::atomic<std::uint64_t> updates_{0}, dropped_{0};
   FrameImages images_;
   // Points of the images in images_: the maximum that a page can show.
   FixedVector<LivePoint, 600> points_;

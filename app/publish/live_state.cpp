@@ -70,13 +70,14 @@ void LiveState::add_interval(HostStamp estimated) noexcept {
   interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
 }
 
-void LiveState::add_pose(const FrameReport& report) {
+void LiveState::add(const PosedFrame& posed) {
+  const FrameReport& report = posed.report;
   if (newest_) add_interval(report.estimated);
   newest_ = report;
   estimate_.add(static_cast<double>(report.pose.estimate_ms));
 }
 
-void LiveState::add_report(const FrameReport& report) {
+void LiveState::add(const FrameReport& report) {
   newest_report_ = report;
   const PoseStatus status = report.pose.status;
   if (status == PoseStatus::lost && !report.ins_valid) return;

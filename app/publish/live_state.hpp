@@ -49,6 +49,11 @@ class LiveTrail {
   float min_step_m_ = 0.5F;
 };
 
+/// Report of a frame before its comparison with the INS.
+struct PosedFrame {
+  FrameReport report{};
+};
+
 /// State of the live page, kept so that a late viewer sees the whole session. Every change has a
 /// version, so that a viewer gets only later changes. Not thread-safe. Memory is bounded: the trail
 /// is thinned, and the newest events and calibrations are kept.
@@ -58,9 +63,9 @@ class LiveState {
 
   void begin(const SessionStart& start) { start_ = start; }
   /// Adds a frame with its pose: status, counts and times.
-  void add_pose(const FrameReport& report);
+  void add(const PosedFrame& posed);
   /// Adds a frame to the trail after its comparison with the INS.
-  void add_report(const FrameReport& report);
+  void add(const FrameReport& report);
   void add(const EventRecord& event);
   void add(const CalibrationRecord& calibration);
   void add(const PublishedEnuAlignment& alignment);

@@ -20,23 +20,23 @@ class ByteWriter {
   explicit ByteWriter(std::span<std::uint8_t> room) noexcept : room_(room) {}
 
   template <class T>
-  void put(T value) noexcept {
+  ByteWriter& put(T value) noexcept {
     static_assert(std::is_arithmetic_v<T>);
-    bytes(&value, sizeof value);
+    return bytes(&value, sizeof value);
   }
-  void bytes(const void* data, std::size_t size) noexcept {
+  ByteWriter& bytes(const void* data, std::size_t size) noexcept {
     if (size > room_.size() - at_) {
       ok_ = false;
       room_ = room_.first(at_);
-      return;
+      return *this;
     }
     if (size > 0) std::memcpy(room_.data() + at_, data, size);
     at_ += size;
+    return *this;
   }
   /// Writes a length of four bytes and the text.
-  void text(std::string_view s) noexcept {
-    put(static_cast<std::uint32_t>(s.size()));
-    bytes(s.data(), s.size());
+  ByteWriter& text(std::string_view s) noexcept {
+    return put(static_cast<std::uint32_t>(s.size())).bytes(s.data(), s.size());
   }
   /// Overwrites a value at offset `at`.
   template <class T>

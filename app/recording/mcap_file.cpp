@@ -20,49 +20,6 @@ bool cannot_write_back(int error) noexcept {
   return error == ESPIPE || error == EINVAL || error == ENOSYS;
 }
 
-class SystemDisk final : public Disk {
- public:
-  [[nodiscard]] int create(const char* path) noexcept override {
-    const int fd = ::open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-    return fd < 0 ? -errno : fd;
-  }
-  [[nodiscard]] std::int64_t write(int fd, const iovec* pieces, int count,
-                                   std::uint64_t offset) noexcept override {
-    for (;;) {
-      const ssize_t n = ::pwritev(fd, pieces, count, static_cast<off_t>(offset));
-      if (n > 0) return n;
-      if (n == 0) return -ENOSPC;
-      if (errno != EINTR) return -errno;
-    }
-  }
-  [[nodiscard]] int truncate(int fd, std::uint64_t size) noexcept override {
-    return ::ftruncate(fd, static_cast<off_t>(size)) == 0 ? 0 : -errno;
-  }
-  // Where the file system does not support it, pages are written as those of any other file.
-  void start_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept override {
-    (void)::sync_file_range(fd, static_cast<off64_t>(offset), static_cast<off64_t>(size),
-                            SYNC_FILE_RANGE_WRITE);
-  }
-  [[nodiscard]] int finish_writeback(int fd, std::uint64_t offset,
-                                     std::uint64_t size) noexcept override {
-    const int done = ::sync_file_range(
-        fd, static_cast<off64_t>(offset), static_cast<off64_t>(size),
-        SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
-    const int error = done == 0 || cannot_write_back(errno) ? 0 : -errno;
-    (void)::posix_fadvise(fd, static_cast<off_t>(offset), static_cast<off_t>(size),
-                          POSIX_FADV_DONTNEED);
-    return error;
-  }
-  [[nodiscard]] int synchronise(int fd) noexcept override {
-    return ::fdatasync(fd) == 0 || errno == EINVAL ? 0 : -errno;
-  }
-  void close(int fd) noexcept override { (void)::close(fd); }
-  [[nodiscard]] int rename(const char* from, const char* to) noexcept override {
-    return std::rename(from, to) == 0 ? 0 : -errno;
-  }
-  void remove(const char* path) noexcept override { (void)::unlink(path); }
-};
-
 constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
 // Opcode u8, length u64.
 constexpr std::size_t kRecordHead = 9;
@@ -96,20 +53,40 @@ void put_record(ByteWriter* out, Opcode opcode, const Content& content) noexcept
 
 }  // namespace
 
-Disk& system_disk() noexcept {
-  static SystemDisk disk;
-  return disk;
+int Disk::create(const char* path) noexcept {
+  const int fd = ::open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  return fd < 0 ? -errno : fd;
+}
+
+std::int64_t Disk::write(int fd, const iovec* pieces, int count, std::uint64_t offset) noexcept {
+  for (;;) {
+    const ssize_t n = ::pwritev(fd, pieces, count, static_cast<off_t>(offset));
+    if (n > 0) return n;
+    if (n == 0) return -ENOSPC;
+    if (errno != EINTR) return -errno;
+  }
+}
+
+int Disk::finish_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept {
+  const int done = ::sync_file_range(
+      fd, static_cast<off64_t>(offset), static_cast<off64_t>(size),
+      SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
+  const int error = done == 0 || cannot_write_back(errno) ? 0 : -errno;
+  (void)::posix_fadvise(fd, static_cast<off_t>(offset), static_cast<off_t>(size),
+                        POSIX_FADV_DONTNEED);
+  return error;
+}
+
+int Disk::synchronise(int fd) noexcept {
+  return ::fdatasync(fd) == 0 || errno == EINVAL ? 0 : -errno;
 }
 
 void McapMessageHead::write(std::span<std::uint8_t, kSize> out) const noexcept {
   ByteWriter w(out);
   w.put(static_cast<std::uint8_t>(Opcode::message));
   w.put(static_cast<std::uint64_t>(kSize - kRecordHead) + content);
-  w.put(channel);
-  w.put(sequence);
-  w.put(log_time);
   // The publish time equals the time of measurement.
-  w.put(log_time);
+  w.put(channel).put(sequence).put(log_time).put(log_time);
 }
 
 McapMessageHead McapMessageHead::read(std::span<const std::uint8_t, kSize> in) noexcept {
@@ -183,17 +160,14 @@ int McapFile::create(const char* path) noexcept {
   counts_ = {};
   Appender out(this);
   out.bytes(kMagic.data(), kMagic.size());
-  out.record(Opcode::header, [this](ByteWriter* w) {
-    w->text("ros2");
-    w->text(library_);
-  });
+  out.record(Opcode::header, [this](ByteWriter* w) { w->text("ros2").text(library_); });
   write_schemas(&out);
   write_channels(&out);
   out.flush();
   if (out.error() != 0) {
     abandon();
     // A file without its head is no recording and would block the next attempt.
-    disk_.remove(path);
+    (void)::unlink(path);
   }
   return out.error();
 }
@@ -201,10 +175,8 @@ int McapFile::create(const char* path) noexcept {
 void McapFile::write_schemas(Appender* out) const noexcept {
   for (std::size_t i = 0; i < topics_.size(); ++i)
     out->record(Opcode::schema, [&](ByteWriter* w) {
-      w->put(static_cast<std::uint16_t>(i + 1));
-      w->text(topics_[i].type);
-      w->text("ros2msg");
-      w->text(topics_[i].definition);
+      const McapTopic& t = topics_[i];
+      w->put(static_cast<std::uint16_t>(i + 1)).text(t.type).text("ros2msg").text(t.definition);
     });
 }
 
@@ -212,13 +184,10 @@ void McapFile::write_channels(Appender* out) const noexcept {
   for (std::size_t i = 0; i < topics_.size(); ++i)
     out->record(Opcode::channel, [&](ByteWriter* w) {
       constexpr std::string_view kQos = "offered_qos_profiles";
-      w->put(static_cast<std::uint16_t>(i + 1));
-      w->put(static_cast<std::uint16_t>(i + 1));
-      w->text(topics_[i].topic);
-      w->text("cdr");
-      w->put(static_cast<std::uint32_t>(8 + kQos.size() + topics_[i].qos.size()));
-      w->text(kQos);
-      w->text(topics_[i].qos);
+      const auto id = static_cast<std::uint16_t>(i + 1);
+      const std::string& qos = topics_[i].qos;
+      w->put(id).put(id).text(topics_[i].topic).text("cdr");
+      w->put(static_cast<std::uint32_t>(8 + kQos.size() + qos.size())).text(kQos).text(qos);
     });
 }
 
@@ -232,7 +201,7 @@ int McapFile::append(iovec* pieces, int count) noexcept {
     const std::int64_t n = disk_.write(fd_, pieces, count, at);
     if (n < 0) {
       // An incomplete chunk is cut off.
-      (void)disk_.truncate(fd_, end_);
+      (void)!::ftruncate(fd_, static_cast<off_t>(end_));
       return static_cast<int>(n);
     }
     at += static_cast<std::uint64_t>(n);
@@ -276,12 +245,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   ByteWriter w(head);
   w.put(static_cast<std::uint8_t>(Opcode::chunk));
   w.put(static_cast<std::uint64_t>(kChunkHead - kRecordHead) + chunk.records);
-  w.put(chunk.start);
-  w.put(chunk.end);
-  w.put(chunk.records);
-  w.put(crc);
-  w.text("");
-  w.put(chunk.records);
+  w.put(chunk.start).put(chunk.end).put(chunk.records).put(crc).text("").put(chunk.records);
   chunk.offset = end_;
   chunk.length = kChunkHead + chunk.records;
 
@@ -296,7 +260,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
       const std::size_t size_at = out->size();
       out->put(std::uint32_t{0});
       for (const Entry& e : entries_)
-        if (mine(e)) out->put(e.log_time), out->put(e.offset);
+        if (mine(e)) out->put(e.log_time).put(e.offset);
       out->overwrite(size_at, static_cast<std::uint32_t>(out->size() - size_at - 4));
     });
   }
@@ -322,7 +286,9 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
 
 /// The disk writes this chunk while the next one is gathered; the previous one is written by now.
 void McapFile::write_back(const ChunkIndex& chunk) noexcept {
-  disk_.start_writeback(fd_, chunk.offset, end_ - chunk.offset);
+  // Where the file system does not support it, pages are written as those of any other file.
+  (void)::sync_file_range(fd_, static_cast<off64_t>(chunk.offset),
+                          static_cast<off64_t>(end_ - chunk.offset), SYNC_FILE_RANGE_WRITE);
   if (chunk.offset > writeback_) {
     record_unwritten(disk_.finish_writeback(fd_, writeback_, chunk.offset - writeback_));
     writeback_ = chunk.offset;
@@ -342,42 +308,28 @@ void McapFile::write_statistics(Appender* out) const noexcept {
   out->record(Opcode::statistics, [this](ByteWriter* w) {
     std::uint64_t messages = 0;
     for (const std::uint64_t n : counts_) messages += n;
-    w->put(messages);
-    // Number of schemas.
-    w->put(static_cast<std::uint16_t>(topics_.size()));
-    // Number of channels.
-    w->put(static_cast<std::uint32_t>(topics_.size()));
-    // Number of attachments.
-    w->put(std::uint32_t{0});
-    // Number of metadata records.
-    w->put(std::uint32_t{0});
-    w->put(static_cast<std::uint32_t>(chunks_.size()));
-    w->put(first_);
-    w->put(last_);
-    w->put(static_cast<std::uint32_t>(10 * topics_.size()));
+    const auto topics = static_cast<std::uint32_t>(topics_.size());
+    // Numbers of schemas, channels, attachments, metadata records and chunks.
+    w->put(messages).put(static_cast<std::uint16_t>(topics)).put(topics);
+    w->put(std::uint32_t{0}).put(std::uint32_t{0}).put(static_cast<std::uint32_t>(chunks_.size()));
+    w->put(first_).put(last_).put(10 * topics);
     for (std::size_t i = 0; i < topics_.size(); ++i)
-      w->put(static_cast<std::uint16_t>(i + 1)), w->put(counts_[i]);
+      w->put(static_cast<std::uint16_t>(i + 1)).put(counts_[i]);
   });
 }
 
 void McapFile::write_chunk_indexes(Appender* out) const noexcept {
   for (const ChunkIndex& chunk : chunks_)
     out->record(Opcode::chunk_index, [&](ByteWriter* w) {
-      w->put(chunk.start);
-      w->put(chunk.end);
-      w->put(chunk.offset);
-      w->put(chunk.length);
+      w->put(chunk.start).put(chunk.end).put(chunk.offset).put(chunk.length);
       const std::size_t size_at = w->size();
       w->put(std::uint32_t{0});
       for (std::size_t i = 0; i < topics_.size(); ++i)
         if (chunk.index[i] != kNone)
-          w->put(static_cast<std::uint16_t>(i + 1)),
-              w->put(chunk.offset + chunk.length + chunk.index[i]);
+          w->put(static_cast<std::uint16_t>(i + 1))
+              .put(chunk.offset + chunk.length + chunk.index[i]);
       w->overwrite(size_at, static_cast<std::uint32_t>(w->size() - size_at - 4));
-      w->put(std::uint64_t{chunk.index_length});
-      w->text("");
-      w->put(chunk.records);
-      w->put(chunk.records);
+      w->put(std::uint64_t{chunk.index_length}).text("").put(chunk.records).put(chunk.records);
     });
 }
 
@@ -387,34 +339,28 @@ int McapFile::finish() noexcept {
   out.record(Opcode::data_end, [](ByteWriter* w) { w->put(std::uint32_t{0}); });
   out.begin_crc();
   const std::uint64_t summary = out.offset();
-  struct Part {
-    Opcode opcode;
-    std::uint64_t start, end;
-  };
-  std::array<Part, 4> groups{};
+  // Starts of the groups, and the end of the last one.
+  std::array<std::uint64_t, 5> starts{summary};
   write_schemas(&out);
-  groups[0] = {Opcode::schema, summary, out.offset()};
+  starts[1] = out.offset();
   write_channels(&out);
-  groups[1] = {Opcode::channel, groups[0].end, out.offset()};
+  starts[2] = out.offset();
   write_statistics(&out);
-  groups[2] = {Opcode::statistics, groups[1].end, out.offset()};
+  starts[3] = out.offset();
   write_chunk_indexes(&out);
-  groups[3] = {Opcode::chunk_index, groups[2].end, out.offset()};
-  const std::uint64_t offsets = out.offset();
-  for (const Part& group : groups)
-    if (group.end > group.start)
+  const std::uint64_t offsets = starts[4] = out.offset();
+  constexpr std::array kGroups{Opcode::schema, Opcode::channel, Opcode::statistics,
+                               Opcode::chunk_index};
+  for (std::size_t i = 0; i < kGroups.size(); ++i)
+    if (starts[i + 1] > starts[i])
       out.record(Opcode::summary_offset, [&](ByteWriter* w) {
-        w->put(static_cast<std::uint8_t>(group.opcode));
-        w->put(group.start);
-        w->put(group.end - group.start);
+        w->put(static_cast<std::uint8_t>(kGroups[i])).put(starts[i]).put(starts[i + 1] - starts[i]);
       });
   // The checksum covers the footer up to itself.
   std::array<std::uint8_t, kRecordHead + 16> footer{};
   ByteWriter w(footer);
-  w.put(static_cast<std::uint8_t>(Opcode::footer));
-  w.put(std::uint64_t{20});
-  w.put(summary);
-  w.put(offsets);
+  w.put(static_cast<std::uint8_t>(Opcode::footer)).put(std::uint64_t{20});
+  w.put(summary).put(offsets);
   out.bytes(footer.data(), footer.size());
   const std::uint32_t crc = out.crc();
   out.bytes(&crc, sizeof crc);
@@ -430,7 +376,7 @@ int McapFile::finish() noexcept {
 
 void McapFile::abandon() noexcept {
   if (fd_ < 0) return;
-  disk_.close(fd_);
+  (void)::close(fd_);
   fd_ = -1;
 }
 

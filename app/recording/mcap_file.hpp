@@ -14,35 +14,26 @@
 
 namespace vergence::app {
 
-/// File-system interface of a recording; tests simulate a full, missing or slow disk. Not
-/// thread-safe. Does not allocate. Returns negative errno values on errors.
+/// Calls of the file system that fail or stall with a disk; tests simulate a full, missing or slow
+/// one. Not thread-safe. Does not allocate. Returns negative errno values on errors.
 class Disk {
  public:
   virtual ~Disk() = default;
   /// Creates an empty file for writing; an existing one is refused (EEXIST). Returns the
   /// descriptor.
-  [[nodiscard]] virtual int create(const char* path) noexcept = 0;
+  [[nodiscard]] virtual int create(const char* path) noexcept;
   /// Writes pieces at `offset`. Returns the number of bytes written, more than 0.
   [[nodiscard]] virtual std::int64_t write(int fd, const iovec* pieces, int count,
-                                           std::uint64_t offset) noexcept = 0;
-  [[nodiscard]] virtual int truncate(int fd, std::uint64_t size) noexcept = 0;
-  /// Starts writing the bytes to the disk.
-  virtual void start_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept = 0;
+                                           std::uint64_t offset) noexcept;
   /// Waits for writeback and then drops the pages from the page cache, so that recording neither
   /// evicts other data nor accumulates more dirty pages than the disk can absorb. The kernel
   /// reports a writeback error only once per descriptor, so synchronise() does not repeat it.
   /// Returns 0 or -errno.
   [[nodiscard]] virtual int finish_writeback(int fd, std::uint64_t offset,
-                                             std::uint64_t size) noexcept = 0;
+                                             std::uint64_t size) noexcept;
   /// Waits until contents and length are on the disk.
-  [[nodiscard]] virtual int synchronise(int fd) noexcept = 0;
-  virtual void close(int fd) noexcept = 0;
-  [[nodiscard]] virtual int rename(const char* from, const char* to) noexcept = 0;
-  virtual void remove(const char* path) noexcept = 0;
+  [[nodiscard]] virtual int synchronise(int fd) noexcept;
 };
-
-/// Disk of the system.
-[[nodiscard]] Disk& system_disk() noexcept;
 
 /// Topic of messages: a Schema and a Channel record, both with the index in the list plus 1 as id.
 struct McapTopic {

@@ -292,7 +292,7 @@ void write_pose_transform(CdrWriter* out, const PoseSample& sample) noexcept {
 }
 
 void write_rig_transforms(CdrWriter* out, Stamp stamp, const RigCalibration& rig,
-                          std::span<const std::string_view> names) noexcept {
+                          std::span<const std::string> names) noexcept {
   std::array<NamedTransform, kMaxCameras> transforms;
   const auto cameras = std::min(static_cast<std::size_t>(rig.cameras), names.size());
   for (std::size_t k = 1; k < cameras; ++k)

@@ -109,7 +109,7 @@ void write_transforms(CdrWriter* out, Stamp stamp,
 void write_pose_transform(CdrWriter* out, const PoseSample& sample) noexcept;
 /// Writes `left` → every other camera. `names` are the frames of the cameras.
 void write_rig_transforms(CdrWriter* out, Stamp stamp, const RigCalibration& rig,
-                          std::span<const std::string_view> names) noexcept;
+                          std::span<const std::string> names) noexcept;
 
 /// Writes a std_msgs/String.
 void write_text(CdrWriter* out, std::string_view text) noexcept;

@@ -8,9 +8,16 @@
 #include <algorithm>
 #include <cassert>
 #include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <system_error>
+#include <utility>
 
+#include <fmt/format.h>
+
+#include "app/runtime/errors.hpp"
 #include "app/runtime/file_descriptor.hpp"
+#include "app/runtime/version.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "drivers/clock.hpp"
 
@@ -35,6 +42,25 @@ constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;
 constexpr std::size_t kSpare = std::size_t{1} << 20;
 // Poses take precedence; recorded data wait in memory.
 constexpr int kNice = 5;
+
+/// Quality of service of a topic: reliable, and for latched topics transient local.
+std::string qos(bool latched) {
+  constexpr const char* kForever = "    sec: 2147483647\n    nsec: 4294967295\n";
+  return fmt::format(
+      "- history: 1\n  depth: {}\n  reliability: 1\n  durability: {}\n  deadline:\n{}  "
+      "lifespan:\n{}"
+      "  liveliness: 1\n  liveliness_lease_duration:\n{}  avoid_ros_namespace_conventions: false\n",
+      latched ? 1 : 10, latched ? 1 : 2, kForever, kForever, kForever);
+}
+
+std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
+  std::vector<McapTopic> out;
+  out.reserve(topics.size());
+  for (const RecordedTopic& t : topics)
+    out.push_back(
+        {t.name, std::string(ros_type_name(t.type)), ros_definition(t.type), qos(t.latched)});
+  return out;
+}
 
 /// Fill limit of a queue while nothing is written. A producer that does not wait finds room for an
 /// image; one that waits (`hurried`) finds room for anything that fits.
@@ -96,8 +122,24 @@ void RecordRing::release(std::size_t size) noexcept {
 }
 
 Recording::Recording(const std::filesystem::path& folder, const Options& options)
-    : options_(options), sequences_(options.files.topics.size()), files_(folder, options.files) {
+    : options_(options),
+      sequences_(options.topics.size()),
+      folder_(folder.string()),
+      topics_(described(options.topics)),
+      disk_(options.disk != nullptr ? *options.disk : disk_of_system_),
+      file_(disk_, topics_, "vergence " + std::string(version())) {
   assert(options_.queues.size() <= McapFile::kMaxParts);
+  if (folder_.size() + 32 > PATH_MAX)
+    throw InputError(folder_ + ": the path is too long for a recording; use a shorter one");
+  for (const RecordingPreamble& p : options.preamble) {
+    std::array<std::uint8_t, McapMessageHead::kSize> head{};
+    McapMessageHead{static_cast<std::uint16_t>(p.topic + 1), 0, 0, p.message.size()}.write(head);
+    preamble_.insert(preamble_.end(), head.begin(), head.end());
+    preamble_.insert(preamble_.end(), p.message.begin(), p.message.end());
+  }
+  if (const int error = open_file(); error != 0)
+    throw InputError(folder_ + ": the recording cannot be created (" + std::strerror(-error) +
+                     "); check the disk and the directory's permissions");
   for (const std::size_t bytes : options_.queues) queues_.push_back(std::make_unique<Queue>(bytes));
   thread_ = std::thread([this] { work(); });
 }
@@ -128,8 +170,8 @@ std::span<std::uint8_t> Recording::begin(std::size_t queue, std::size_t topic, S
     freed_.wait(seen);
   }
   if (q.open.empty()) {
-    counts_.dropped.fetch_add(1, std::memory_order_relaxed);
-    if (bulky) counts_.dropped_images.fetch_add(1, std::memory_order_relaxed);
+    ++counts_.dropped;
+    if (bulky) ++counts_.dropped_images;
     return {};
   }
   return q.open.subspan(McapMessageHead::kSize);
@@ -162,7 +204,10 @@ void Recording::work() noexcept {
     }
     drain(hurried || last, last);
   }
-  files_.finish(static_cast<std::uint64_t>(std::max<std::int64_t>(options_.start.ns(), 0)));
+  if (file_.open() && preamble_due_)
+    (void)write_preamble(
+        static_cast<std::uint64_t>(std::max<std::int64_t>(options_.start.ns(), 0)));
+  end_file();
 }
 
 void Recording::drain(bool at_once, bool last) noexcept {
@@ -173,14 +218,15 @@ void Recording::drain(bool at_once, bool last) noexcept {
       return;
     }
     if (!at_once && !due(batch)) return;
-    if (!last && files_.resting()) return make_room(at_once);
+    // Shortly after a failure the disk is not used.
+    if (!last && failing_ && monotonic_now().ns() < retry_ns_) return make_room(at_once);
     if (store(batch)) {
       release(batch);
-      files_.roll();
+      begin_next_file();
       continue;
     }
     if (!last) return make_room(at_once);
-    counts_.lost.fetch_add(batch.messages, std::memory_order_relaxed);
+    counts_.lost += batch.messages;
     release(batch);
   }
 }
@@ -220,7 +266,7 @@ void Recording::release(const Batch& batch) noexcept {
 
 void Recording::drop_oldest(RecordRing* ring) noexcept {
   ring->release(read_head(ring->waiting()).record_size());
-  counts_.lost.fetch_add(1, std::memory_order_relaxed);
+  ++counts_.lost;
 }
 
 /// While the disk accepts nothing, the oldest messages are dropped in favour of new ones.
@@ -231,14 +277,85 @@ void Recording::make_room(bool hurried) noexcept {
 }
 
 bool Recording::store(const Batch& batch) noexcept {
-  const std::uint64_t bytes =
-      files_.append(std::span(batch.parts).first(queues_.size()), batch.first,
-                    counts_.lost.load(std::memory_order_relaxed) + files_.unwritten());
-  if (bytes == 0) return false;
-  counts_.messages.fetch_add(batch.messages, std::memory_order_relaxed);
-  counts_.bytes.fetch_add(bytes, std::memory_order_relaxed);
-  counts_.chunks.fetch_add(1, std::memory_order_relaxed);
+  if (!file_.open() && open_file() != 0) return false;
+  const std::uint64_t before = file_.size();
+  int error = preamble_due_ ? write_preamble(batch.first) : 0;
+  if (error == 0) error = file_.write_chunk(std::span(batch.parts).first(queues_.size()));
+  record_unwritten();
+  if (error != 0) {
+    fail(-error);
+    return false;
+  }
+  if (std::exchange(failing_, false))
+    (void)notices_.push({Notice::Kind::good_again, 0, counts_.lost, number_});
+  counts_.messages += batch.messages;
+  counts_.bytes += file_.size() - before;
+  ++counts_.chunks;
   return true;
+}
+
+void Recording::end_file() noexcept {
+  const int error = file_.finish();
+  record_unwritten();
+  if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
+}
+
+/// The data are not written again, because the system no longer has them.
+void Recording::record_unwritten() noexcept {
+  const McapFile::Unwritten missing = file_.pop_unwritten();
+  if (missing.messages == 0) return;
+  counts_.lost += missing.messages;
+  (void)notices_.push({Notice::Kind::unwritten, -missing.error, missing.messages, number_});
+}
+
+int Recording::open_file() noexcept {
+  if (const int error = file_.create(path().data()); error != 0) {
+    fail(-error);
+    return error;
+  }
+  ++counts_.files;
+  preamble_due_ = !preamble_.empty();
+  return 0;
+}
+
+/// Writes the preamble before the first chunk of a file, with that chunk's time. Returns 0 or an
+/// error.
+int Recording::write_preamble(std::uint64_t time) noexcept {
+  for (std::span<std::uint8_t> rest(preamble_); !rest.empty();) {
+    McapMessageHead head = McapMessageHead::read(rest.first<McapMessageHead::kSize>());
+    head.log_time = time;
+    head.write(rest.first<McapMessageHead::kSize>());
+    rest = rest.subspan(head.record_size());
+  }
+  const std::array<std::span<const std::uint8_t>, 1> part{preamble_};
+  const int error = file_.write_chunk(part);
+  preamble_due_ = error != 0;
+  return error;
+}
+
+void Recording::fail(int error) noexcept {
+  if (!std::exchange(failing_, true))
+    (void)notices_.push({Notice::Kind::failed, error, 0, number_});
+  retry_ns_ = (monotonic_now() + kRetry).ns();
+}
+
+void Recording::begin_next_file() noexcept {
+  if (!file_.full() && (options_.roll_bytes == 0 || file_.size() < options_.roll_bytes)) return;
+  end_file();
+  if (!several_) {
+    const auto only = path();
+    several_ = true;
+    (void)std::rename(only.data(), path().data());
+  }
+  ++number_;
+}
+
+std::array<char, PATH_MAX> Recording::path() const noexcept {
+  std::array<char, PATH_MAX> path{};
+  (void)(several_
+             ? fmt::format_to_n(path.data(), path.size() - 1, "{}/drive_{}.mcap", folder_, number_)
+             : fmt::format_to_n(path.data(), path.size() - 1, "{}/drive.mcap", folder_));
+  return path;
 }
 
 // ---- the owner
@@ -253,15 +370,45 @@ void Recording::close() noexcept {
   thread_.join();
 }
 
+std::vector<std::string> Recording::pop_errors() {
+  std::vector<std::string> out;
+  for (Notice n; notices_.pop(&n);) out.push_back(message(n));
+  return out;
+}
+
+std::string Recording::message(const Notice& n) const {
+  const std::string what = std::strerror(n.error);
+  switch (n.kind) {
+    case Notice::Kind::good_again:
+      return fmt::format("{}: the recording is written again; {} messages were lost", folder_,
+                         n.lost);
+    case Notice::Kind::failed:
+      return fmt::format(
+          "{}: the recording cannot be written ({}); the session continues, writing is retried "
+          "every {:.0f} s, and messages that do not fit into memory are lost: check the disk",
+          folder_, what, kRetry.to_seconds());
+    case Notice::Kind::unfinished:
+      return fmt::format(
+          "{}: file {} of the recording has no summary ({}); it can be read without one, up to its "
+          "last chunk",
+          folder_, n.file, what);
+    case Notice::Kind::unwritten:
+      return fmt::format(
+          "{}: the disk lost data that it had accepted ({}): {} messages of file {} of the "
+          "recording are lost; check the disk",
+          folder_, what, n.lost, n.file);
+  }
+  return {};
+}
+
 RecordingCounters Recording::counters() const noexcept {
-  RecordingCounters c;
-  const auto get = [](const std::atomic<std::uint64_t>& v) {
-    return v.load(std::memory_order_relaxed);
-  };
-  c.messages = get(counts_.messages), c.bytes = get(counts_.bytes);
-  c.chunks = get(counts_.chunks), c.files = files_.files();
-  c.dropped = get(counts_.dropped), c.dropped_images = get(counts_.dropped_images);
-  c.lost = get(counts_.lost) + files_.unwritten();
+  RecordingCounters c{.messages = counts_.messages,
+                      .bytes = counts_.bytes,
+                      .chunks = counts_.chunks,
+                      .files = counts_.files,
+                      .dropped = counts_.dropped,
+                      .dropped_images = counts_.dropped_images,
+                      .lost = counts_.lost};
   for (const auto& q : queues_) {
     c.queue_bytes += q->ring.capacity();
     c.queue_high_water += q->ring.high_water();

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <atomic>
+#include <climits>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -13,9 +14,10 @@
 #include <vector>
 
 #include "app/recording/mcap_file.hpp"
-#include "app/recording/recording_files.hpp"
+#include "app/recording/messages.hpp"
 #include "app/runtime/queue_thread.hpp"
 #include "core/memory/arena.hpp"
+#include "core/memory/ring.hpp"
 #include "core/types/time.hpp"
 #include "drivers/common/wake_event.hpp"
 
@@ -36,8 +38,6 @@ class RecordRing {
   /// `bytes` is rounded up to whole pages.
   explicit RecordRing(std::size_t bytes);
   ~RecordRing();
-  RecordRing(const RecordRing&) = delete;
-  RecordRing& operator=(const RecordRing&) = delete;
 
   /// Memory for a record of `size` bytes; empty if there is no room. Invalid after the next begin()
   /// unless committed.
@@ -93,6 +93,21 @@ struct RecordingCounters {
   std::size_t queue_bytes = 0, queue_high_water = 0;
 };
 
+/// Topic of a recording. Its number is its index in the list.
+struct RecordedTopic {
+  std::string name;
+  RosType type = RosType::text;
+  /// If true, late subscribers receive the last message (tf_static).
+  bool latched = false;
+};
+
+/// Message at the beginning of every file.
+struct RecordingPreamble {
+  std::size_t topic = 0;
+  /// Encoded as CDR.
+  std::vector<std::uint8_t> message{};
+};
+
 /// Writes messages to MCAP files `drive.mcap` on its own thread, so that producers never wait for a
 /// disk.
 ///
@@ -107,30 +122,33 @@ struct RecordingCounters {
 /// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, followed
 ///            by drive_1.mcap. Every file begins with all schemas, channels and the preamble.
 /// Threads    One thread per queue calls begin() and commit(), the owner close() after the last
-///            commit(). pop_errors() and counters() are thread-safe; counters are exact after
-///            close().
+///            commit(), and pop_errors(). counters() is thread-safe, and exact after close().
 /// Memory     Allocated at construction; the writer's thread is sealed.
 /// Full       drop: begin() refuses and counts; large messages leave room for small ones. wait:
 ///            begin() waits for room (virtual time, replay).
 /// Errors     The constructor throws InputError (directory, disk) and std::system_error (memory).
 ///            After a failed write the data wait in their queue while there is room, and the file
-///            is retried every RecordingFiles::kRetry; pop_errors() has the messages.
+///            is retried every kRetry; pop_errors() has the messages.
 class Recording {
  public:
+  static constexpr Duration kRetry = Duration::seconds(3);
   struct Options {
-    RecordingFiles::Options files{};
+    std::vector<RecordedTopic> topics;
+    std::vector<RecordingPreamble> preamble{};
+    /// A file is ended at this size; 0 disables this.
+    std::uint64_t roll_bytes = 0;
     /// Capacity of each queue, bytes.
     std::vector<std::size_t> queues;
     /// Stamp of the preamble if no message follows.
     Stamp start{};
     WhenFull when_full = WhenFull::drop;
+    /// Null selects the disk of the system.
+    Disk* disk = nullptr;
   };
 
   /// `folder` must exist.
   Recording(const std::filesystem::path& folder, const Options& options);
   ~Recording();
-  Recording(const Recording&) = delete;
-  Recording& operator=(const Recording&) = delete;
 
   /// Memory for a message of at most `most` bytes; empty if it is dropped, which is counted.
   /// `bulky` marks an image, which leaves room for a thousand small messages.
@@ -140,7 +158,7 @@ class Recording {
   void commit(std::size_t queue, std::size_t size) noexcept;
 
   /// Messages about the disk since the last call.
-  [[nodiscard]] std::vector<std::string> pop_errors() { return files_.pop_errors(); }
+  [[nodiscard]] std::vector<std::string> pop_errors();
   [[nodiscard]] RecordingCounters counters() const noexcept;
   /// Writes the remaining messages and ends the file. Call once.
   void close() noexcept;
@@ -167,7 +185,16 @@ class Recording {
   /// Live values of RecordingCounters.
   struct Counts {
     std::atomic<std::uint64_t> messages{0}, bytes{0}, chunks{0};
-    std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0};
+    std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0}, files{0};
+  };
+  /// Message about the disk.
+  struct Notice {
+    enum class Kind : std::uint8_t { good_again, failed, unfinished, unwritten } kind{};
+    // Value of errno.
+    int error = 0;
+    // Number of lost messages so far.
+    std::uint64_t lost = 0;
+    int file = 0;
   };
 
   void work() noexcept;
@@ -179,14 +206,44 @@ class Recording {
   void make_room(bool hurried) noexcept;
   void drop_oldest(RecordRing* ring) noexcept;
   [[nodiscard]] bool store(const Batch& batch) noexcept;
+  /// Opens a file. Returns 0 or an error.
+  [[nodiscard]] int open_file() noexcept;
+  [[nodiscard]] int write_preamble(std::uint64_t time) noexcept;
+  void fail(int error) noexcept;
+  void end_file() noexcept;
+  void begin_next_file() noexcept;
+  void record_unwritten() noexcept;
+  [[nodiscard]] std::array<char, PATH_MAX> path() const noexcept;
+  [[nodiscard]] std::string message(const Notice& notice) const;
 
   const Options options_;
   // Sequence numbers by topic, used by its producer.
   std::vector<std::uint32_t> sequences_;
   std::vector<std::unique_ptr<Queue>> queues_;
-  RecordingFiles files_;
-  // Monotonic time, used by the writer's thread.
+  const std::string folder_;
+  const std::vector<McapTopic> topics_;
+  Disk disk_of_system_;
+  Disk& disk_;
+
+  // Used by the writer's thread only.
+
+  // Contains Message records.
+  std::vector<std::uint8_t> preamble_;
+  McapFile file_;
+  // Monotonic time.
   std::int64_t waiting_since_ns_ = 0;
+  // Number of the current file.
+  int number_ = 0;
+  // True if file names are numbered.
+  bool several_ = false;
+  // True if the current file lacks its preamble.
+  bool preamble_due_ = false;
+  // True if the last write failed.
+  bool failing_ = false;
+  // Monotonic time of the next attempt.
+  std::int64_t retry_ns_ = 0;
+  // Passed from the writer to pop_errors().
+  Ring<Notice, 64> notices_;
 
   Counts counts_;
   // Guards stop_ and hurry_ while the writer sleeps.

@@ -189,8 +189,6 @@ Bridge::Bridge(const BridgeOptions& options, TopicWriter* writer)
   writer_->advertise("/diagnostics", RosType::diagnostics, false);
 }
 
-Bridge::~Bridge() = default;
-
 /// The buffer grows until the message fits, because texts of diagnostics have any length.
 template <class Write>
 void Bridge::publish(const std::string& topic, const Write& write) {

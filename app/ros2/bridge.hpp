@@ -57,7 +57,6 @@ class Bridge {
   /// Announces all topics except those of cameras, whose names come with the calibration. `writer`
   /// must outlive it.
   Bridge(const BridgeOptions& options, TopicWriter* writer);
-  ~Bridge();
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 

@@ -29,8 +29,6 @@ class DdsNode final : public TopicWriter {
   /// ends the discovery of Humble's nodes.
   DdsNode(std::uint32_t domain, const std::string& ros_distribution);
   ~DdsNode() override;
-  DdsNode(const DdsNode&) = delete;
-  DdsNode& operator=(const DdsNode&) = delete;
 
   void advertise(const std::string& topic, RosType type, bool latched) override;
   void publish(const std::string& topic, std::span<const std::uint8_t> cdr) override;

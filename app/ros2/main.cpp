@@ -1,8 +1,11 @@
 // vergence-ros2: the pose stream of a running vergence as ROS 2 topics (docs/ros2.md).
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -19,8 +22,8 @@
 
 #include "app/ros2/bridge.hpp"
 #include "app/ros2/dds_node.hpp"
-#include "app/ros2/pose_stream_client.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/file_descriptor.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/runtime/version.hpp"
 #include "core/comparison/comparison.hpp"
@@ -97,6 +100,95 @@ void finish(Options* o) {
       mount_of({x[0], x[1], x[2]}, Vec3(r[0], r[1], r[2]) * (std::numbers::pi / 180));
 }
 
+/// Reader of the pose stream's Unix socket (docs/live_interface.md). No call blocks.
+///
+/// Holds one line of at most kMaxLine bytes and the following image of at most kMaxImage bytes;
+/// longer ones close the connection.
+class PoseStreamClient {
+ public:
+  // In bytes.
+  static constexpr std::size_t kMaxLine = std::size_t{64} << 10;
+  static constexpr std::size_t kMaxImage = std::size_t{128} << 20;
+
+  /// `address` is unix:///PATH; throws InputError for another form.
+  explicit PoseStreamClient(std::string_view address) {
+    constexpr std::string_view kUnix = "unix://";
+    if (address.starts_with(kUnix)) path_ = address.substr(kUnix.size());
+    if (!path_.starts_with('/') || path_.size() >= sizeof(sockaddr_un::sun_path))
+      throw InputError(fmt::format(
+          "--socket: \"{}\" is not unix:///PATH of at most {} bytes; give the address of "
+          "publish.pose_stream",
+          address.substr(0, 120), sizeof(sockaddr_un::sun_path) - 1));
+  }
+
+  /// Returns 0 if connected, else errno.
+  int connect() {
+    close();
+    FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path_.copy(address.sun_path, sizeof address.sun_path - 1);
+    if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      return errno;
+    socket_ = std::move(socket);
+    return 0;
+  }
+  [[nodiscard]] bool connected() const noexcept { return static_cast<bool>(socket_); }
+  /// Descriptor to poll; −1 without a connection.
+  [[nodiscard]] int descriptor() const noexcept { return socket_.get(); }
+  /// Passes on the complete lines and images received: `on_line` gets a line without its line feed
+  /// and returns the size of the image that follows it, in bytes. Returns false if the connection
+  /// has ended.
+  template <class OnLine, class OnImage>
+  bool read(const OnLine& on_line, const OnImage& on_image) {
+    std::array<char, 65536> bytes;
+    const ssize_t n = ::recv(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+    if (n < 0 && (errno == EAGAIN || errno == EINTR)) return true;
+    if (n <= 0) {
+      close();
+      return false;
+    }
+    rest_.append(bytes.data(), static_cast<std::size_t>(n));
+    std::string_view rest = rest_;
+    for (;;) {
+      const std::size_t end = image_size_ > 0 ? image_size_ : rest.find('\n');
+      // This includes npos.
+      if (end > rest.size()) break;
+      if (image_size_ > 0) {
+        image_size_ = 0;
+        on_image(rest.substr(0, end));
+        rest.remove_prefix(end);
+      } else {
+        image_size_ = on_line(rest.substr(0, end));
+        rest.remove_prefix(end + 1);
+      }
+    }
+    rest_.erase(0, rest_.size() - rest.size());
+    if (image_size_ > 0 ? image_size_ <= kMaxImage : rest_.size() <= kMaxLine) return true;
+    close();
+    return false;
+  }
+  /// Sends a line including its line feed. Returns false if it was not sent.
+  bool send(std::string_view line) noexcept {
+    return connected() && ::send(socket_.get(), line.data(), line.size(),
+                                 MSG_DONTWAIT | MSG_NOSIGNAL) == static_cast<ssize_t>(line.size());
+  }
+  void close() noexcept {
+    socket_.reset();
+    rest_.clear();
+    image_size_ = 0;
+  }
+  [[nodiscard]] const std::string& path() const noexcept { return path_; }
+
+ private:
+  std::string path_;
+  FileDescriptor socket_;
+  // Incomplete line or image.
+  std::string rest_;
+  // Size of the next image in bytes; 0 if a line is next.
+  std::size_t image_size_ = 0;
+};
+
 /// Main loop: reads the stream, publishes topics and forwards service calls.
 ///
 /// Threads  One. Fast DDS's threads write to an eventfd.
@@ -114,8 +206,6 @@ class Program {
   ~Program() {
     while (!calls_.empty()) answer({false, "vergence-ros2 is stopping"});
   }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
 
   ExitCode run() {
     const SignalGuard signals;
@@ -175,7 +265,7 @@ class Program {
                    "/diagnostics\n");
       return 0;
     };
-    return client_.read(on_line, {});
+    return client_.read(on_line, [](std::string_view) {});
   }
 
   /// Images use a separate connection, so that poses do not wait behind them.

@@ -25,8 +25,6 @@ class BackgroundThread final : public BackgroundRunner {
 
   explicit BackgroundThread(Role role = Role::solver);
   ~BackgroundThread() override;
-  BackgroundThread(const BackgroundThread&) = delete;
-  BackgroundThread& operator=(const BackgroundThread&) = delete;
 
   void start(TaskRef task) noexcept override;
   [[nodiscard]] bool busy() noexcept override;

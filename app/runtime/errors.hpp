@@ -21,7 +21,7 @@ enum class ExitCode : int {
 /// (with line) or key, the problem and the fix. Caught in main(), exit code 2.
 class InputError : public std::runtime_error {
  public:
-  explicit InputError(const std::string& message) : std::runtime_error(message) {}
+  using std::runtime_error::runtime_error;
 };
 
 /// A configured device is missing, does not respond or is in use by another program. The text is
@@ -29,7 +29,7 @@ class InputError : public std::runtime_error {
 /// the device is available.
 class DeviceError : public std::runtime_error {
  public:
-  explicit DeviceError(const std::string& message) : std::runtime_error(message) {}
+  using std::runtime_error::runtime_error;
 };
 
 }  // namespace vergence::app

@@ -28,8 +28,6 @@ class QueueThread {
  public:
   explicit QueueThread(WhenFull when_full) noexcept : when_full_(when_full) {}
   ~QueueThread() { stop(); }
-  QueueThread(const QueueThread&) = delete;
-  QueueThread& operator=(const QueueThread&) = delete;
 
   /// Calls `begin` first on the thread, then `handle` with every item in order, and with null
   /// whenever the queue is empty.

@@ -86,8 +86,7 @@ void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found)
     message += (message.empty() ? "" : "; ") + fault_;
   }
   if (message.empty()) return;
-  (void)outcomes_.push(
-      {{stamp, failed ? "calibration_save_failed" : "calibration_saved", message}, failed});
+  (void)events_.push({stamp, failed ? "calibration_save_failed" : "calibration_saved", message});
 }
 
 void CalibrationWriter::write_session_file(const RigCalibration& rig) {

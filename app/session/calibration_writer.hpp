@@ -37,7 +37,7 @@ inline constexpr const char* kCalibrationsHeader =
 ///          the files, because YAML allocates and a disk may block.
 /// Memory   Fixed for the producer.
 /// Full     A producer of a replay waits. In a live run the calibration is dropped and counted.
-/// Errors   The constructor throws InputError. Later failures are an Outcome, or a fault of
+/// Errors   The constructor throws InputError. Later failures are an event, or a fault of
 ///          close().
 class CalibrationWriter final : public SessionObserver {
  public:
@@ -50,19 +50,15 @@ class CalibrationWriter final : public SessionObserver {
     std::optional<std::filesystem::path> state{};
     WhenFull when_full = WhenFull::drop;
   };
-  /// Outcome of writing the state file: the event `calibration_saved` or `calibration_save_failed`.
-  struct Outcome {
-    EventRecord event{};
-    bool failed = false;
-  };
 
   explicit CalibrationWriter(Options options);
   ~CalibrationWriter() override { thread_.stop(); }
 
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
-  /// Pops the oldest outcome. Returns false if there is none.
-  [[nodiscard]] bool next(Outcome* outcome) noexcept { return outcomes_.pop(outcome); }
+  /// Pops the oldest event about writing the state file: `calibration_saved`, or
+  /// `calibration_save_failed`. Returns false if there is none.
+  [[nodiscard]] bool next(EventRecord* event) noexcept { return events_.pop(event); }
   /// Writes the pending data, and calibration.yaml with the calibration in use at the end (null if
   /// there is none). Messages about incomplete files go to *faults. Call once, after the last
   /// on_…().
@@ -89,7 +85,7 @@ class CalibrationWriter final : public SessionObserver {
 
   const Options options_;
   LineFile lines_;
-  Ring<Outcome, 2 * kMaxWaiting> outcomes_;
+  Ring<EventRecord, 2 * kMaxWaiting> events_;
   // Counted by the producer.
   std::uint64_t dropped_ = 0;
 

@@ -120,11 +120,11 @@ std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
 
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
-  o.files.topics = topics(facts.begin.file);
+  o.topics = topics(facts.begin.file);
   o.queues = {queue_bytes(c, facts), kPulseQueue};
-  o.files.preamble = {{session_topic, description(c, facts)}};
+  o.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
-  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
+  o.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
   o.when_full = facts.when_full;
   return o;
 }
@@ -140,9 +140,7 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
       folder_(folder.string()),
       recording_(folder, recording_options(configuration, facts)),
       rig_(facts.begin.file.rig),
-      calibrated_(facts.begin.trust != CalibrationTrust::none) {
-  for (std::size_t k = 0; k < frames_.size(); ++k) frame_names_[k] = frames_[k];
-}
+      calibrated_(facts.begin.trust != CalibrationTrust::none) {}
 
 void DriveRecorder::close(std::vector<std::string>* faults) {
   recording_.close();
@@ -184,7 +182,7 @@ void DriveRecorder::on_frame(const RigFrame& frame) noexcept {
 
 void DriveRecorder::post_image(const RigFrame& frame, std::size_t camera) noexcept {
   const ImageView& image = frame.images[camera];
-  const std::string_view name = frame_names_[camera];
+  const std::string& name = frames_[camera];
   const auto write = [&](CdrWriter* out) {
     write_image(out, frame.stamp, name, image);
     const auto pixels =
@@ -201,11 +199,10 @@ void DriveRecorder::post_image(const RigFrame& frame, std::size_t camera) noexce
 }
 
 void DriveRecorder::post_rig(Stamp stamp) noexcept {
-  const auto cameras = static_cast<std::size_t>(rig_.cameras);
   // Read before the message is posted, which then is in this file or a later one.
   const std::uint64_t files = recording_.counters().files;
   post(tf_static_topic, stamp, [&](CdrWriter* out) {
-    write_rig_transforms(out, stamp, rig_, std::span(frame_names_).first(cameras));
+    write_rig_transforms(out, stamp, rig_, frames_);
     rig_in_file_ = files;
   });
 }

@@ -62,7 +62,6 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   const ReplayableSolverRunner& watch_;
   // Frames of reference of the cameras.
   std::vector<std::string> frames_;
-  std::array<std::string_view, kMaxCameras> frame_names_{};
   const std::string folder_;
   Recording recording_;
 

@@ -104,18 +104,19 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  [[nodiscard]] virtual const SourceFacts& facts() const noexcept = 0;
+  /// Valid after construction.
+  [[nodiscard]] const SourceFacts& facts() const noexcept { return facts_; }
 
   /// Call before start(): `observer` receives the trigger board's pulses and must outlive the
   /// source.
   virtual void observe_pulses(PulseObserver* /*observer*/) {}
   /// Starts the stream; the session's files are open. Problems of files go to *faults. Throws
   /// InputError if a device does not start.
-  virtual void start(std::vector<std::string>* faults) = 0;
+  virtual void start(std::vector<std::string>* /*faults*/) {}
   /// Waits for the next item. Returns false once the run is over or stopped.
   [[nodiscard]] virtual bool next(SourceItem* item) noexcept = 0;
   /// Takes back the slots of the last frame, whose pose is known.
-  virtual void done(const PoseSample& sample) noexcept = 0;
+  virtual void done(const PoseSample& /*sample*/) noexcept {}
   virtual void stop() noexcept = 0;
   /// Number of iterations of the thread behind next(), with or without data; it stops growing if
   /// the thread hangs. Thread-safe. Always 0 if not counted.
@@ -137,6 +138,9 @@ class FrameSource {
   [[nodiscard]] virtual std::optional<ExitCode> verdict(Progress* /*progress*/) const {
     return std::nullopt;
   }
+
+ protected:
+  SourceFacts facts_{};
 };
 
 }  // namespace vergence::app

@@ -13,30 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json enu_alignment_json(const EnuAlignmentRecord& record) {
-  const EnuAlignment& p = record.alignment;
-  return {{"stamp_ns", record.stamp.ns()},
-          {"T_enu_world", matrix_json(p.T_enu_world)},
-          {"fitted_over_m", p.distance},
-          {"residual_m", p.residual},
-          {"heading_sigma_deg", p.rotation_sigma.z() * kDegreesPerRadian}};
-}
-
-Json errors_json(const EnuErrors& e) {
-  if (e.poses == 0) return nullptr;
-  return {{"poses", e.poses},
-          {"horizontal_rms_m", e.horizontal_rms_m},
-          {"horizontal_max_m", e.horizontal_max_m},
-          {"horizontal_end_m", e.horizontal_end_m},
-          {"horizontal_end_percent",
-           e.ins_path_m > 0 ? Json(100 * e.horizontal_end_m / e.ins_path_m) : Json()},
-          {"up_rms_m", e.up_rms_m},
-          {"up_end_m", e.up_end_m},
-          {"heading_rms_deg", e.heading_rms_deg},
-          {"heading_max_deg", e.heading_max_deg},
-          {"heading_end_deg", e.heading_end_deg}};
-}
-
 }  // namespace
 
 Json matrix_json(const Transform& T) {
@@ -54,21 +30,6 @@ Json ins_mount_json(const Transform& T_ins_left, const std::string& source) {
   return {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
           {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
           {"source", source}};
-}
-
-Json enu_json(const EnuMetrics& metrics) {
-  if (!metrics.origin) return nullptr;
-  Json alignments = Json::array();
-  for (const EnuAlignmentRecord& record : metrics.alignments)
-    alignments.push_back(enu_alignment_json(record));
-  return {{"origin",
-           {{"latitude_deg", metrics.origin->latitude_deg},
-            {"longitude_deg", metrics.origin->longitude_deg},
-            {"height_m", metrics.origin->height_m}}},
-          {"mount", ins_mount_json(metrics.T_ins_left, metrics.mount_source)},
-          {"alignments", alignments},
-          {"ins_path_m", metrics.errors.ins_path_m},
-          {"errors", errors_json(metrics.errors)}};
 }
 
 InsComparison::InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
@@ -128,45 +89,66 @@ void InsComparison::measure_way(const ComparedPose& pose) noexcept {
   if (!std::exchange(on_way_, true)) last_place_ = place;
   beyond_ = (place - last_place_).norm();
   if (beyond_ < std::clamp(kSigmas * pose.ins_position_sigma, kMin, kMax)) return;
-  errors_.ins_path_m += std::exchange(beyond_, 0);
+  ins_path_m_ += std::exchange(beyond_, 0);
   last_place_ = place;
 }
 
 void InsComparison::measure_errors(const ComparedPose& pose) noexcept {
   if (!pose.compared) return;
-  EnuErrors& e = errors_;
+  auto& e = errors_;
   const double across = pose.error_enu.head<2>().norm(), up = pose.error_enu.z();
   // A compass heading increases clockwise.
   const double turn = -pose.error_yaw * kDegreesPerRadian;
   ++e.poses;
-  e.horizontal_rms_m += across * across;
+  e.horizontal_m2 += across * across;
   e.horizontal_max_m = std::max(e.horizontal_max_m, across);
   e.horizontal_end_m = across;
   if (pose.height_known) {
-    ++heights_;
-    e.up_rms_m += up * up;
+    ++e.heights;
+    e.up_m2 += up * up;
     e.up_end_m = up;
   }
-  e.heading_rms_deg += turn * turn;
+  e.heading_deg2 += turn * turn;
   e.heading_max_deg = std::max(e.heading_max_deg, std::abs(turn));
   e.heading_end_deg = turn;
 }
 
-EnuMetrics InsComparison::earth(const std::string& mount_source) const {
-  EnuMetrics metrics;
-  if (comparison_.has_origin()) metrics.origin = comparison_.plane().origin();
-  metrics.alignments.assign(alignments_.begin(), alignments_.end());
-  metrics.errors = errors_;
+Json InsComparison::enu_json(const std::string& mount_source) const {
+  if (!comparison_.has_origin()) return nullptr;
+  const Geodetic& origin = comparison_.plane().origin();
+  Json alignments = Json::array();
+  for (const auto& [stamp, p] : alignments_)
+    alignments.push_back({{"stamp_ns", stamp.ns()},
+                          {"T_enu_world", matrix_json(p.T_enu_world)},
+                          {"fitted_over_m", p.distance},
+                          {"residual_m", p.residual},
+                          {"heading_sigma_deg", p.rotation_sigma.z() * kDegreesPerRadian}});
   // The last step is still under way; alone it may be nothing but a standstill's noise.
-  if (errors_.ins_path_m > 0) metrics.errors.ins_path_m += beyond_;
-  const double n = std::max(1.0, static_cast<double>(errors_.poses));
-  for (double* squares : {&metrics.errors.horizontal_rms_m, &metrics.errors.heading_rms_deg})
-    *squares = std::sqrt(*squares / n);
-  metrics.errors.up_rms_m =
-      std::sqrt(metrics.errors.up_rms_m / std::max(1.0, static_cast<double>(heights_)));
-  metrics.T_ins_left = T_ins_left_;
-  metrics.mount_source = mount_source;
-  return metrics;
+  const double path = ins_path_m_ > 0 ? ins_path_m_ + beyond_ : 0;
+  const auto& e = errors_;
+  const auto rms = [](double squares, std::uint64_t n) {
+    return std::sqrt(squares / std::max(1.0, static_cast<double>(n)));
+  };
+  Json errors;
+  if (e.poses > 0)
+    errors = {{"poses", e.poses},
+              {"horizontal_rms_m", rms(e.horizontal_m2, e.poses)},
+              {"horizontal_max_m", e.horizontal_max_m},
+              {"horizontal_end_m", e.horizontal_end_m},
+              {"horizontal_end_percent", path > 0 ? Json(100 * e.horizontal_end_m / path) : Json()},
+              {"up_rms_m", rms(e.up_m2, e.heights)},
+              {"up_end_m", e.up_end_m},
+              {"heading_rms_deg", rms(e.heading_deg2, e.poses)},
+              {"heading_max_deg", e.heading_max_deg},
+              {"heading_end_deg", e.heading_end_deg}};
+  return {{"origin",
+           {{"latitude_deg", origin.latitude_deg},
+            {"longitude_deg", origin.longitude_deg},
+            {"height_m", origin.height_m}}},
+          {"mount", ins_mount_json(T_ins_left_, mount_source)},
+          {"alignments", alignments},
+          {"ins_path_m", path},
+          {"errors", errors}};
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> InsComparison::counters() const {

@@ -18,43 +18,11 @@
 
 namespace vergence::app {
 
-/// Alignment and the stamp from which it applies.
-struct EnuAlignmentRecord {
-  Stamp stamp{};
-  EnuAlignment alignment{};
-};
-
-/// Errors against the INS after the alignment, over the compared poses.
-struct EnuErrors {
-  std::uint64_t poses = 0;
-  /// Horizontal path length of the INS from its first fix on, straight across gaps.
-  double ins_path_m = 0;
-  double horizontal_rms_m = 0, horizontal_max_m = 0, horizontal_end_m = 0;
-  /// Estimate minus INS.
-  double up_rms_m = 0, up_end_m = 0;
-  /// The value at the end is clockwise.
-  double heading_rms_deg = 0, heading_max_deg = 0, heading_end_deg = 0;
-};
-
-/// Position of a run on the earth, and its errors against the INS.
-struct EnuMetrics {
-  /// Origin of enu; empty if the INS never had a fix.
-  std::optional<Geodetic> origin{};
-  std::vector<EnuAlignmentRecord> alignments{};
-  EnuErrors errors{};
-  /// INS extrinsics used by the comparison.
-  Transform T_ins_left{};
-  /// Origin of the INS extrinsics.
-  std::string mount_source{};
-};
-
 /// Rows of [R t], as summary.json has a transform.
 [[nodiscard]] nlohmann::ordered_json matrix_json(const Transform& T);
 /// INS-to-camera extrinsics and where they were read.
 [[nodiscard]] nlohmann::ordered_json ins_mount_json(const Transform& T_ins_left,
                                                     const std::string& source);
-/// Null without an origin.
-[[nodiscard]] nlohmann::ordered_json enu_json(const EnuMetrics& metrics);
 
 enum class InsSource : std::uint8_t { device, recording };
 
@@ -87,8 +55,9 @@ class InsComparison {
   /// Number of poses with an INS position.
   [[nodiscard]] std::uint64_t matches() const noexcept { return matches_; }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
-  /// `mount_source` is the origin of the INS extrinsics in the options.
-  [[nodiscard]] EnuMetrics earth(const std::string& mount_source) const;
+  /// The block `enu` of summary.json: position on the earth, and errors against the INS. Null if
+  /// the INS never had a fix. `mount_source` is the origin of the INS extrinsics in the options.
+  [[nodiscard]] nlohmann::ordered_json enu_json(const std::string& mount_source) const;
 
  private:
   void measure_way(const ComparedPose& pose) noexcept;
@@ -115,12 +84,18 @@ class InsComparison {
   std::uint64_t added_ = 0, drained_ = 0;
   std::uint64_t matches_ = 0, scale_disagreements_ = 0;
   std::uint32_t alignment_revision_ = 0;
-  // Allocated at construction.
-  std::vector<EnuAlignmentRecord> alignments_;
-  // Means and RMS are sums of squares until earth() is called.
-  EnuErrors errors_{};
-  // Number of poses whose vertical error is in errors_.
-  std::uint64_t heights_ = 0;
+  // Alignments and the stamps from which they apply. Allocated at construction.
+  std::vector<std::pair<Stamp, EnuAlignment>> alignments_;
+  // Errors against the INS after the alignment, over the compared poses: sums of squares, maxima
+  // and the newest values. Headings are clockwise.
+  struct {
+    std::uint64_t poses = 0, heights = 0;
+    double horizontal_m2 = 0, horizontal_max_m = 0, horizontal_end_m = 0;
+    double up_m2 = 0, up_end_m = 0;
+    double heading_deg2 = 0, heading_max_deg = 0, heading_end_deg = 0;
+  } errors_;
+  // Horizontal path length of the INS from its first fix on, straight across gaps.
+  double ins_path_m_ = 0;
   // True if last_place_ is valid.
   bool on_way_ = false;
   // End of the newest complete step of the path.

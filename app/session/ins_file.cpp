@@ -36,94 +36,73 @@ void append_sigma(std::string* line, double sigma, double unit) {
     fmt::format_to(std::back_inserter(*line), "{:.6g}", sigma * unit);
 }
 
-/// The fields of a line, taken in their order; one that is no value of its column is refused with
-/// file:line.
-class Fields {
- public:
-  Fields(const fs::path& file, std::size_t number, std::string_view line)
-      : file_(file), line_(number) {
-    const std::size_t count = split(line, ',', fields_);
-    if (count != kColumns)
-      refuse(fmt::format("has {} columns instead of {}; the line is damaged", count, kColumns));
-  }
-
-  /// 0 for an empty field if it is `optional`.
-  [[nodiscard]] std::int64_t integer(std::int64_t least, std::int64_t most, bool optional = false) {
-    const std::string_view field = fields_[next_++];
-    if (optional && field.empty()) return 0;
-    const auto value = parse_integer(field);
-    if (!value || *value < least || *value > most) refuse_field();
-    return *value;
-  }
-  /// False: all of them are empty.
-  template <std::size_t N>
-  [[nodiscard]] bool numbers(std::array<double, N>* values) {
-    const auto mine = std::span(fields_).subspan(next_, N);
-    const bool none = std::ranges::all_of(mine, [](std::string_view f) { return f.empty(); });
-    for (double& value : *values)
-      if (!parse_number(fields_[next_++], &value) && !none) refuse_field();
-    return !none;
-  }
-  [[nodiscard]] double sigma() {
-    std::array<double, 1> value{};
-    if (numbers(&value) && value[0] < 0) refuse_field();
-    return value[0];
-  }
-  [[nodiscard]] FixStatus fix() {
-    const auto found = std::ranges::find(kFixes, fields_[next_++]);
-    if (found == kFixes.end()) refuse_field();
-    return static_cast<FixStatus>(found - kFixes.begin());
-  }
-  [[noreturn]] void refuse(const std::string& message) const { app::refuse(file_, line_, message); }
-
- private:
-  /// The field that was taken last.
-  [[noreturn]] void refuse_field() const {
-    std::array<std::string_view, kColumns> names;
-    (void)split(kInsHeader, ',', names);
-    refuse(fmt::format("`{}` is not a value of the column {}; the line is damaged",
-                       fields_[next_ - 1].substr(0, 40), names[next_ - 1]));
-  }
-
-  const fs::path& file_;
-  std::size_t line_;
-  std::array<std::string_view, kColumns> fields_{};
-  std::size_t next_ = 0;
-};
-
-InsRecord parse(Fields fields) {
+/// Reads a line; a field that is no value of its column is refused with file:line.
+InsRecord parse(const fs::path& file, std::size_t number, std::string_view line) {
+  std::array<std::string_view, kColumns> fields{}, names{};
+  if (const std::size_t count = split(line, ',', fields); count != kColumns)
+    refuse(file, number,
+           fmt::format("has {} columns instead of {}; the line is damaged", count, kColumns));
+  (void)split(kInsHeader, ',', names);
+  // Index of the next field.
+  std::size_t next = 0;
+  const auto require = [&](bool read) {
+    if (!read)
+      refuse(file, number,
+             fmt::format("`{}` is not a value of the column {}; the line is damaged",
+                         fields[next].substr(0, 40), names[next]));
+    ++next;
+  };
   constexpr std::int64_t kMax = std::numeric_limits<std::int64_t>::max();
+  // 0 for an empty field if it is `optional`.
+  const auto integer = [&](std::int64_t most, bool optional = false) {
+    const auto value = parse_integer(fields[next]);
+    require(value ? *value >= 0 && *value <= most : optional && fields[next].empty());
+    return value.value_or(0);
+  };
+  // False: all of them are empty.
+  const auto numbers = [&](std::span<double> values) {
+    const auto mine = std::span(fields).subspan(next, values.size());
+    const bool none = std::ranges::all_of(mine, [](std::string_view f) { return f.empty(); });
+    for (double& value : values) require(parse_number(fields[next], &value) || none);
+    return !none;
+  };
+  const auto sigma = [&] {
+    double value = 0;
+    require(fields[next].empty() || (parse_number(fields[next], &value) && value >= 0));
+    return value;
+  };
   InsRecord r;
   InsSample& s = r.sample;
-  s.stamp = Stamp(fields.integer(0, kMax));
-  s.stamp_error = Duration::nanoseconds(fields.integer(0, kMax));
-  s.number = static_cast<std::uint64_t>(fields.integer(0, kMax));
-  s.fix = fields.fix();
+  s.stamp = Stamp(integer(kMax));
+  s.stamp_error = Duration::nanoseconds(integer(kMax));
+  s.number = static_cast<std::uint64_t>(integer(kMax));
+  const auto fix = std::ranges::find(kFixes, fields[next]);
+  require(fix != kFixes.end());
+  s.fix = static_cast<FixStatus>(fix - kFixes.begin());
   std::array<double, 3> place{};
-  if (fields.numbers(&place)) {
+  if (numbers(place))
     s.position = {place[0], place[1], place[2]};
-    if (!s.position.plausible())
-      fields.refuse("the position is not a valid latitude and longitude; the line is damaged");
-  } else {
+  else
     s.fix = FixStatus::none;
-  }
-  s.velocity_valid = fields.numbers(&s.velocity_enu);
-  s.attitude_valid = fields.numbers(&s.q_enu_ins);
+  if (!s.position.plausible())
+    refuse(file, number, "the position is not a valid latitude and longitude; the line is damaged");
+  s.velocity_valid = numbers(s.velocity_enu);
+  s.attitude_valid = numbers(s.q_enu_ins);
   const auto& q = s.q_enu_ins;
   const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
   if (!(std::abs(length - 1) <= kQuaternionLength))
-    fields.refuse(fmt::format(
-        "the quaternion has the length {:.3g} instead of 1; the line is damaged", length));
-  s.position_sigma = fields.sigma();
-  s.height_sigma = fields.sigma();
-  s.velocity_sigma = fields.sigma();
-  s.tilt_sigma = fields.sigma() / kDegreesPerRadian;
-  s.heading_sigma = fields.sigma() / kDegreesPerRadian;
-  r.quality.status =
-      static_cast<std::uint32_t>(fields.integer(0, std::numeric_limits<std::uint32_t>::max()));
-  r.quality.satellites = static_cast<std::uint8_t>(fields.integer(0, 255, true));
-  r.quality.filter_valid = fields.integer(0, 1) != 0;
-  r.quality.utc_ns = fields.integer(0, kMax, true);
+    refuse(file, number,
+           fmt::format("the quaternion has the length {:.3g} instead of 1; the line is damaged",
+                       length));
+  s.position_sigma = sigma();
+  s.height_sigma = sigma();
+  s.velocity_sigma = sigma();
+  s.tilt_sigma = sigma() / kDegreesPerRadian;
+  s.heading_sigma = sigma() / kDegreesPerRadian;
+  r.quality.status = static_cast<std::uint32_t>(integer(std::numeric_limits<std::uint32_t>::max()));
+  r.quality.satellites = static_cast<std::uint8_t>(integer(255, true));
+  r.quality.filter_valid = integer(1) != 0;
+  r.quality.utc_ns = integer(kMax, true);
   r.quality.utc_valid = r.quality.utc_ns != 0;
   return r;
 }
@@ -180,7 +159,7 @@ std::vector<InsRecord> read_ins_file(const fs::path& file) {
     refuse(file, 1, "is not the first line of an ins.csv; pass a file that `vergence run` wrote");
   std::vector<InsRecord> records;
   while (lines.next(&line)) {
-    const InsRecord record = parse(Fields(file, lines.number(), line));
+    const InsRecord record = parse(file, lines.number(), line);
     if (records.empty() || records.back().sample.stamp < record.sample.stamp)
       records.push_back(record);
   }

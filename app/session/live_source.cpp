@@ -1,20 +1,23 @@
 #include "app/session/live_source.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "app/devices/camera_masks.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/exposure_control.hpp"
 #include "app/devices/rig_settings.hpp"
+#include "app/runtime/durable_file.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/records.hpp"
-#include "app/session/timing_monitor.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/clock.hpp"
 
@@ -23,6 +26,58 @@ namespace {
 
 // 2020-01-01 00:00 UTC, so that every run in virtual time has the same stamps.
 constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kMicroseconds = 1e6;
+
+double us(Duration d) { return d.to_seconds() * kMicroseconds; }
+
+const char* fix_name(FixStatus fix) noexcept {
+  constexpr std::array kNames{"no position", "dead reckoning", "a fix without height", "a fix"};
+  return kNames[static_cast<std::size_t>(fix)];
+}
+
+/// Representation of a device event in events.jsonl.
+struct DeviceReport {
+  const char* kind;
+  bool to_user;
+  // Format of the message: {0} is the camera, {1} the seconds.
+  const char* text;
+};
+/// In the order of DeviceEvent::Kind.
+constexpr std::array kDeviceReports{
+    DeviceReport{"camera_disconnected", true,
+                 "camera {0} is disconnected; the run continues without it"},
+    DeviceReport{"camera_reconnected", true, "camera {0} is reconnected"},
+    DeviceReport{"trigger_board_disconnected", true,
+                 "the trigger board is disconnected: check its cable; reconnecting every second"},
+    DeviceReport{"trigger_board_reconnected", true, "the trigger board is reconnected"},
+    DeviceReport{"trigger_board_restarted", true,
+                 "the trigger board restarted: its pulses count from 0; the pairing is being "
+                 "verified again"},
+    DeviceReport{"pairing_pending", false,
+                 "images of camera {0} are not used until their pulses are identified"},
+    DeviceReport{"pairing_verified", false,
+                 "the pairing of camera {0} is verified after {1:.2f} s"}};
+
+/// Three digits after the point: nanoseconds of microseconds, and a thousandth of a ppm.
+double rounded(double value) { return std::round(value * 1e3) / 1e3; }
+
+Json clock_json(const std::string& device, const ClockRecord& clock) {
+  return {{"device", device},
+          {"stamps", clock.stamps()},
+          {"drift_ppm", rounded(clock.drift_ppm())},
+          {"error_us", rounded(us(clock.error()))},
+          {"worst_error_us", rounded(us(clock.worst_error()))}};
+}
+
+SourceEvent event_of_device(const DeviceEvent& event) noexcept {
+  const DeviceReport& report = kDeviceReports[static_cast<std::size_t>(event.kind)];
+  return {
+      EventRecord(event.stamp, report.kind, fmt::runtime(report.text), event.camera, event.seconds),
+      report.to_user};
+}
 
 std::vector<std::string> list_serials(const std::vector<CameraDevice*>& cameras) {
   std::vector<std::string> serials;
@@ -43,7 +98,6 @@ class LiveSource final : public FrameSource {
       : request_(request),
         configuration_(request.configuration),
         devices_(request.configuration, request.faults, request.fast, request.duration_s),
-        time_(devices_.sync().mode, request.fast),
         fault_logged_(devices_.faults().size(), false) {
     facts_.begin =
         starting_calibration(configuration_, request.calibration, list_serials(devices_.cameras()));
@@ -51,7 +105,6 @@ class LiveSource final : public FrameSource {
     make_facts();
   }
 
-  [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
   void observe_pulses(PulseObserver* observer) override { pulse_observer_ = observer; }
   void start(std::vector<std::string>* faults) override {
     const HostStamp assumed = devices_.start();
@@ -64,16 +117,15 @@ class LiveSource final : public FrameSource {
     if (!truth_.empty()) write_truth(faults);
   }
   [[nodiscard]] bool next(SourceItem* item) noexcept override {
-    while (true) {
+    for (;;) {
       if (waiting_) {
-        if (next_event(item)) return true;
-        waiting_ = false;
-        const auto* frame = std::get_if<AcquiredFrame>(&in_hand_);
-        *item = SourceFrame{frame->rig, 0};
+        const auto& frame = std::get<AcquiredFrame>(in_hand_);
+        waiting_ = next_event(frame, item);
+        if (!waiting_) *item = SourceFrame{frame.rig, 0};
         return true;
       }
       if (const auto* reading = std::get_if<InsRecord>(&in_hand_)) {
-        const auto event = time_.of_reading(*reading);
+        const auto event = event_of_reading(*reading);
         in_hand_ = DeviceEvent{};
         if (event) {
           *item = *event;
@@ -81,24 +133,21 @@ class LiveSource final : public FrameSource {
         }
       }
       if (!acquisition_->next(&in_hand_)) return false;
-      if (const auto* frame = std::get_if<AcquiredFrame>(&in_hand_)) {
-        waiting_ = true;
-        const auto event = time_.of_set(*frame);
-        if (!event) continue;
-        *item = *event;
-        return true;
-      }
-      if (const auto* reading = std::get_if<InsRecord>(&in_hand_)) {
+      waiting_ = std::holds_alternative<AcquiredFrame>(in_hand_);
+      if (waiting_) continue;
+      if (const auto* reading = std::get_if<InsRecord>(&in_hand_))
         *item = *reading;
-        return true;
-      }
-      *item = TimingMonitor::of_device(*std::get_if<DeviceEvent>(&in_hand_));
+      else
+        *item = event_of_device(std::get<DeviceEvent>(in_hand_));
       return true;
     }
   }
   void done(const PoseSample& sample) noexcept override {
     const auto* frame = std::get_if<AcquiredFrame>(&in_hand_);
-    time_.record_pose(*frame, sample.estimate_ms, request_.fast ? HostStamp{} : monotonic_now());
+    const SyncedSet& set = frame->set;
+    latency_.add(request_.fast
+                     ? (set.arrival - set.stamp).to_seconds() * 1e3 + double{sample.estimate_ms}
+                     : (monotonic_now() - set.stamp).to_seconds() * 1e3);
     acquisition_->release(*frame);
   }
   void stop() noexcept override { acquisition_->stop(); }
@@ -126,7 +175,7 @@ class LiveSource final : public FrameSource {
         c.sync.acquiring.begin(), c.sync.acquiring.begin() + facts_.begin.file.rig.cameras);
     input->skipped = c.dropped_sets + c.sync.missed + *acquiring;
     input->devices = counters();
-    input->time = time_.json(c, devices_.cameras().size(), devices_.ins() != nullptr);
+    input->time = time_json(c);
     if (devices_.mock() != nullptr) input->truth = truth_metrics(totals, estimator);
   }
   void print_metrics(const SummaryInput& input, Progress* progress) const override {
@@ -203,11 +252,14 @@ class LiveSource final : public FrameSource {
     facts_.first = request_.fast ? start_ : o.tie_stamp;
   }
   /// An event that goes before the frame in hand. False: none is left.
-  [[nodiscard]] bool next_event(SourceItem* item) noexcept {
-    const Stamp stamp = std::get_if<AcquiredFrame>(&in_hand_)->rig.stamp;
+  [[nodiscard]] bool next_event(const AcquiredFrame& frame, SourceItem* item) noexcept {
+    if (const auto event = event_of_set(frame)) {
+      *item = *event;
+      return true;
+    }
     const auto faults = devices_.faults();
     for (std::size_t i = 0; i < faults.size(); ++i) {
-      if (fault_logged_[i] || stamp < start_ + faults[i].at) continue;
+      if (fault_logged_[i] || frame.rig.stamp < start_ + faults[i].at) continue;
       fault_logged_[i] = true;
       *item = SourceEvent{.record = {start_ + faults[i].at, "fault", "{}, as scheduled",
                                      mock::to_string(faults[i].kind)},
@@ -216,20 +268,88 @@ class LiveSource final : public FrameSource {
     }
     return false;
   }
+  /// Event of a set that was handed out, if a run of ambiguous ones begins with it.
+  std::optional<SourceEvent> event_of_set(const AcquiredFrame& frame) noexcept {
+    const bool was = std::exchange(ambiguous_, frame.set.proof == SyncProof::ambiguous);
+    if (was || !ambiguous_) return std::nullopt;
+    return SourceEvent{
+        EventRecord(frame.rig.stamp, "pairing_ambiguous",
+                    "ambiguous pair: pulses, counters and stamps contradict each "
+                    "other{}",
+                    verifies_pairing(devices_.sync().mode) ? "; one image is used alone" : ""),
+        true};
+  }
+  /// Event of an INS sample, if the state of the receiver or the filter has changed, or the offset
+  /// of the session's stamps from UTC.
+  std::optional<SourceEvent> event_of_reading(const InsRecord& reading) noexcept {
+    // Minimum change of the satellite count that is reported.
+    constexpr int kMany = 3;
+    const InsQuality& q = reading.quality;
+    const int count = q.satellites;
+    const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
+                         reading.sample.fix != fix_ ||
+                         std::abs(count - int{quality_.satellites}) >= kMany;
+    if (!changed) return event_of_utc(reading);
+    any_quality_ = true;
+    quality_ = q;
+    fix_ = reading.sample.fix;
+    // A device that reports no filter state has no status either.
+    const bool given = q.status != 0 || q.filter_valid;
+    return SourceEvent{EventRecord(reading.sample.stamp, "ins_status",
+                                   "the INS has {}, {} satellites{}", fix_name(fix_), count,
+                                   !given           ? ""
+                                   : q.filter_valid ? ", filter valid"
+                                                    : ", filter not valid")};
+  }
+  std::optional<SourceEvent> event_of_utc(const InsRecord& reading) noexcept {
+    // Minimum clock step in s that is reported.
+    constexpr double kStep = 0.1;
+    if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return std::nullopt;
+    const double ahead =
+        static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
+    if (reported_ahead_s_ && std::abs(ahead - *reported_ahead_s_) < kStep) return std::nullopt;
+    reported_ahead_s_ = ahead;
+    return SourceEvent{EventRecord(reading.sample.stamp, "utc_offset",
+                                   "the session's stamps are {:.4f} s {} the INS's UTC; they "
+                                   "follow the host clock at the start",
+                                   std::abs(ahead), ahead < 0 ? "behind" : "ahead of")};
+  }
+  /// The block `time` of summary.json.
+  [[nodiscard]] Json time_json(const AcquisitionCounters& c) const {
+    Json clocks = Json::array();
+    const SyncMode mode = devices_.sync().mode;
+    const bool verifiable = verifies_pairing(mode);
+    bool verified = verifiable;
+    for (std::size_t k = 0; k < devices_.cameras().size(); ++k) {
+      clocks.push_back(clock_json(fmt::format("camera {}", k), c.cameras[k]));
+      verified = verified && c.verified[k];
+    }
+    if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
+    if (devices_.ins() != nullptr) clocks.push_back(clock_json("INS", c.ins));
+    Json latency;
+    if (latency_.count() > 0) {
+      latency = {{"mean", rounded(latency_.mean())}};
+      latency.update(distribution_json(latency_));
+      latency["virtual"] = request_.fast;
+    }
+    return {{"clocks", clocks},
+            {"worst_stamp_error_us", rounded(static_cast<double>(c.worst_stamp_error_ns) * 1e-3)},
+            {"pairing",
+             {{"mode", to_string(mode)},
+              {"message", proof_message(mode)},
+              {"verifiable", verifiable},
+              {"verified", verified},
+              {"worst_acquisition_s", rounded(c.sync.worst_acquisition.to_seconds())}}},
+            {"latency_ms", latency}};
+  }
   void write_truth(std::vector<std::string>* faults) const {
+    std::string text, line;
+    for (const StampedPose& pose : truth_) {
+      format_tum(pose.stamp, pose.T_world_body, &line);
+      text += line;
+    }
     try {
-      LineFile file(request_.session.out / "truth.tum");
-      // Number of lines per flush, a tenth of the file's buffer.
-      constexpr std::size_t kTogether = 1000;
-      std::size_t lines = 0;
-      std::string line;
-      for (const StampedPose& pose : truth_) {
-        format_tum(pose.stamp, pose.T_world_body, &line);
-        (void)file.append(line);
-        if (++lines % kTogether == 0) (void)file.flush();
-      }
-      if (!file.close() || file.lost_lines() > 0)
-        faults->push_back(file.path().string() + ": incomplete; free space on that disk");
+      replace_durably(request_.session.out / "truth.tum", text);
     } catch (const InputError& e) {
       faults->emplace_back(e.what());
     }
@@ -255,21 +375,18 @@ class LiveSource final : public FrameSource {
         {"clock_resets", c.clock_resets},       {"pulses", c.pulses},
         {"pulses_missed", c.sync.missed},       {"pauses", c.pauses},
         {"pauses_refused", c.pauses_refused}};
-    const auto add = [&out](const std::string& name, std::uint64_t count) {
-      out.emplace_back(name, count);
-    };
     if (exposure_) {
       const ExposureCounters e = exposure_->counters();
-      add("exposure_changes", e.changes);
-      add("exposure_refused", e.refused);
-      add("exposure_unequal", e.unequal);
-      add("exposure_again", e.again);
-      add("exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000));
-      add("gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db));
+      out.insert(out.end(),
+                 {{"exposure_changes", e.changes},
+                  {"exposure_refused", e.refused},
+                  {"exposure_unequal", e.unequal},
+                  {"exposure_again", e.again},
+                  {"exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000)},
+                  {"gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db)}});
     }
     for (std::size_t k = 0; k < devices_.cameras().size(); ++k) {
       const CameraStatistics s = devices_.cameras()[k]->statistics();
-      const std::string name = fmt::format("camera{}_", k);
       for (const auto& [what, count] : {std::pair{"delivered", s.delivered},
                                         {"lost", s.lost},
                                         {"underruns", s.underruns},
@@ -282,23 +399,23 @@ class LiveSource final : public FrameSource {
                                         {"pending", c.sync.acquiring[k]},
                                         {"acquisitions", c.sync.acquisitions[k]},
                                         {"contradictions", c.sync.contradictions[k]}})
-        add(name + what, count);
+        out.emplace_back(fmt::format("camera{}_{}", k, what), count);
     }
     if (devices_.ins() != nullptr) {
       const InsStatistics s = devices_.ins()->statistics();
-      add("ins_lost", s.lost);
-      add("ins_malformed", s.malformed);
-      add("ins_restarts", s.restarts);
-      add("ins_overruns", s.overruns);
+      out.insert(out.end(), {{"ins_lost", s.lost},
+                             {"ins_malformed", s.malformed},
+                             {"ins_restarts", s.restarts},
+                             {"ins_overruns", s.overruns}});
     }
     if (devices_.trigger() != nullptr) {
       const TriggerStatistics s = devices_.trigger()->statistics();
-      add("board_pulses", s.pulses);
-      add("board_lost", s.lost);
-      add("board_malformed", s.malformed);
-      add("board_overruns", s.overruns);
-      add("board_reboots", c.reboots);
-      add("board_starts", s.starts);
+      out.insert(out.end(), {{"board_pulses", s.pulses},
+                             {"board_lost", s.lost},
+                             {"board_malformed", s.malformed},
+                             {"board_overruns", s.overruns},
+                             {"board_reboots", c.reboots},
+                             {"board_starts", s.starts}});
     }
     return out;
   }
@@ -306,7 +423,6 @@ class LiveSource final : public FrameSource {
   const RunRequest& request_;
   const Configuration& configuration_;
   DriveDevices devices_;
-  SourceFacts facts_;
   // Null if exposures are fixed.
   std::unique_ptr<ExposureControl> exposure_;
   // Null if pulses are not recorded.
@@ -318,7 +434,15 @@ class LiveSource final : public FrameSource {
   std::vector<StampedPose> truth_;
 
   // Used by the estimator's thread; read by others after it has joined.
-  TimingMonitor time_;
+  TimeHistogram latency_;
+  // True if the last set was ambiguous.
+  bool ambiguous_ = false;
+  // Quality reported last.
+  InsQuality quality_{};
+  FixStatus fix_ = FixStatus::none;
+  bool any_quality_ = false;
+  // Last reported lead of the session's stamps over the INS's UTC, in s.
+  std::optional<double> reported_ahead_s_{};
   std::vector<bool> fault_logged_;
   // Last item returned, or the one that waits until its events have been returned.
   Acquired in_hand_{};
@@ -332,10 +456,10 @@ ExitCode run_drive(const RunRequest& request) {
   // Signals are handled before the simulated world is rendered, which takes seconds.
   const SignalGuard signals;
   try {
-    const auto source = with_plain_errors([&] { return std::make_unique<LiveSource>(request); });
+    LiveSource source(request);
     // A signal may arrive while devices are opened, which takes seconds.
     if (const auto stopped = signals.stop_code()) return *stopped;
-    return run_session(*source, request.configuration, request.session, signals);
+    return run_session(source, request.configuration, request.session, signals);
   } catch (const DeviceError&) {
     // After a stop by the user a missing device is no error.
     if (const auto stopped = signals.stop_code()) return *stopped;

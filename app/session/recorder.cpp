@@ -95,7 +95,7 @@ void Recorder::write(const InsRecord& reading) {
 }
 
 void Recorder::write(const EventRecord& e) {
-  totals_.add(e);
+  totals_->add(e);
   format_event(e, &line_);
   files_->events.append(line_);
 }
@@ -105,7 +105,7 @@ void Recorder::write(const FrameReport& r) {
   if (options_.disk_full) pretend(stamp);
   format_pose_row(r, &line_);
   files_->poses.append(line_);
-  totals_.add(r);
+  totals_->add(r);
   if (r.pose.status == PoseStatus::lost) return;
   format_tum(stamp, r.pose.T_world_left, &line_);
   files_->trajectory.append(line_);
@@ -181,7 +181,7 @@ std::vector<std::string> Recorder::pop_errors() {
 /// The trajectories, from the session's own files: nothing that grows with the drive waits in
 /// memory.
 void Recorder::read_back() {
-  SessionTotals& totals = totals_.totals();
+  SessionTotals& totals = *totals_;
   const auto read = [this](const LineFile& file, std::vector<StampedPose>* out) {
     try {
       *out = read_tum(file.path());
@@ -199,7 +199,7 @@ void Recorder::read_back() {
 
 std::unique_ptr<SessionTotals> Recorder::close() {
   thread_.stop();
-  SessionTotals& totals = totals_.totals();
+  SessionTotals& totals = *totals_;
   for (LineFile* file : files_->all) {
     file->close(&totals.faults);
     totals.lost_lines += file->lost_lines();
@@ -211,7 +211,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   totals.dropped_records = dropped_records_;
   totals.dropped_readings = dropped_readings_;
   totals.ring_high_water = thread_.high_water();
-  return std::make_unique<SessionTotals>(std::move(totals));
+  return std::move(totals_);
 }
 
 }  // namespace vergence::app

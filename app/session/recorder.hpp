@@ -19,8 +19,6 @@
 
 namespace vergence::app {
 
-class LineFile;
-
 /// Writes trajectory.tum, reference.tum (removed at the end without a reference), poses.csv,
 /// events.jsonl and, with an INS, ins.csv of a session during the run, on its own thread, so that
 /// the estimator never waits for a disk.
@@ -97,7 +95,7 @@ class Recorder final : public SessionObserver {
   struct Files;
   Options options_;
   std::unique_ptr<Files> files_;
-  TotalsBuilder totals_;
+  std::unique_ptr<SessionTotals> totals_ = std::make_unique<SessionTotals>();
   // Buffer of the line that is being formatted.
   std::string line_;
   std::size_t memory_ = 0;

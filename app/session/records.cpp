@@ -203,6 +203,18 @@ void append_value(std::string* line, const char* value) { append_text(line, valu
 
 }  // namespace
 
+void FrameCounts::add(const PoseSample& sample) noexcept {
+  ++read;
+  ++(sample.status == PoseStatus::ok         ? ok
+     : sample.status == PoseStatus::degraded ? degraded
+                                             : lost);
+  if (sample.status == PoseStatus::lost) return;
+  const Vec3& position = sample.T_world_left.t;
+  const Vec3 step = position - newest_position_.value_or(position);
+  path_m += std::hypot(step.x(), step.y(), step.z());
+  newest_position_ = position;
+}
+
 void FrameReport::set_comparison(const ComparedPose& with_ins) noexcept {
   ComparedPose::operator=(with_ins);
   if (ins_valid) T_reference_left = reference.T_enu_left;

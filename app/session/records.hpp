@@ -81,6 +81,12 @@ struct FrameCounts {
   std::uint64_t missing = 0;
   /// Sum of the steps between successive poses.
   double path_m = 0;
+
+  /// Adds a frame that was read.
+  void add(const PoseSample& sample) noexcept;
+
+ private:
+  std::optional<Vec3> newest_position_{};
 };
 
 /// Report of one frame: input without images, pose, also in ENU next to the INS, and times.

@@ -1,39 +1,53 @@
 #include "app/session/session_runner.hpp"
 
 #include <malloc.h>
+#include <pthread.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdio>
 #include <functional>
+#include <future>
 #include <memory>
-#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "app/datasets/reference_track.hpp"
+#include "app/devices/camera_masks.hpp"
 #include "app/report/report.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/realtime.hpp"
 #include "app/runtime/service_manager.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/session/calibration_writer.hpp"
 #include "app/session/drive_recorder.hpp"
-#include "app/session/drive_threads.hpp"
-#include "app/session/estimation_loop.hpp"
+#include "app/session/event_log.hpp"
 #include "app/session/session_quota.hpp"
 #include "core/memory/allocation_guard.hpp"
+#include "core/memory/thread_allocations.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
 
+/// Time budget of a frame: live, the next one does not wait.
+Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
+  if (facts.frame_interval <= Duration{}) return {};
+  return realtime.frame_budget_ms > 0 ? Duration::seconds(1e-3 * realtime.frame_budget_ms)
+                                      : facts.frame_interval;
+}
+
 /// Everything that is set up before the first frame and torn down after the last, in the order of
-/// its members.
+/// its members, and the loop of the estimator's thread: it takes input from the source, estimates
+/// its pose, compares it with the INS, and hands everything on to the session's observers.
 class SessionRunner {
  public:
   SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -43,50 +57,64 @@ class SessionRunner {
         configuration_(configuration),
         request_(options),
         signals_(signals),
-        loop_(source, configuration, options),
-        threads_(configuration.realtime) {}
+        reference_(facts_.truth),
+        masks_(configuration, facts_.begin.file.rig),
+        options_(estimator_options(configuration, facts_.begin.trust, facts_.adoption,
+                                   masks_.views(), frame_budget(facts_, configuration.realtime))),
+        runner_(make_runner(configuration.threads)),
+        estimator_(options_, facts_.begin.file.rig, facts_.begin.nominal, estimator_arena_,
+                   *runner_, watched_solver_),
+        progress_(Progress::on_stderr(options.quiet)),
+        realtime_(configuration.realtime, realtime_system_) {
+    if (facts_.ins)
+      comparison_ = std::make_unique<InsComparison>(facts_.ins->options, facts_.ins->kind,
+                                                    comparison_arena_, log_);
+    // A run has fewer threads than this, so polling does not allocate.
+    constexpr std::size_t kThreads = 64;
+    threads_.reserve(kThreads);
+  }
   [[nodiscard]] ExitCode run() {
-    std::vector<std::string> faults;
     open();
     if (request_.print_memory) print_memory_table();
-    Progress progress = Progress::on_stderr(request_.quiet);
     const auto allocations_before = AllocationGuard::runtime_allocations();
-    print_remarks(&progress);
+    print_remarks();
     // Returns the memory that was used during set-up to the system.
     (void)::malloc_trim(0);
-    threads_.lock_memory(&progress);
-    start_source(&faults);
-    std::thread estimating = start_estimating();
+    warn(realtime_.lock_memory());
+    start_source();
+    std::future<void> estimating = start_estimating();
     service_.ready();
-    watch(&progress);
-    estimating.join();
-    progress.finish();
-    source_.finish(&progress);
+    watch(estimating);
+    estimating.get();
+    progress_.finish();
+    source_.finish(&progress_);
 
-    if (recording_) recording_->close(&faults);
-    print_recording_errors(&progress);
-    const Estimator& estimator = loop_.estimator();
-    calibrations_->close(estimator.calibrated() ? &estimator.calibration() : nullptr, &faults);
-    loop_.log_kept_calibrations();
-    loop_.event_log().show(&progress, facts_.frames);
+    if (recording_) recording_->close(&faults_);
+    print_recording_errors();
+    calibrations_->close(estimator_.calibrated() ? &estimator_.calibration() : nullptr, &faults_);
+    log_kept_calibrations();
+    log_.show(&progress_, facts_.frames);
     const auto totals = recorder_->close();
     static_cast<CalibrationTotals&>(*totals) = calibrations_->totals();
     totals->dropped_records += calibrations_->dropped();
     const SummaryInput input =
         summary_input(*totals, AllocationGuard::runtime_allocations() - allocations_before);
-    write_files(*totals, input, &faults, &progress);
-    if (!request_.quiet) print_metrics(*totals, input, &progress);
+    write_files(*totals, input);
+    if (!request_.quiet) print_metrics(*totals, input);
     // The report reads the files: of a day's drive two are not held at once.
     // Assigning {} would keep the memory.
     totals->trajectory = std::vector<StampedPose>();
     totals->reference = std::vector<StampedPose>();
-    const ExitCode code = verdict(*totals, faults, &progress);
-    const bool usable = report(&progress);
+    const ExitCode code = verdict(*totals);
+    const bool usable = report();
     return signals_.stop_code().value_or(code == ExitCode::done && !usable ? ExitCode::not_usable
                                                                            : code);
   }
 
  private:
+  void warn(const std::vector<std::string>& messages) {
+    for (const std::string& message : messages) progress_.print("vergence: " + message);
+  }
   void open() {
     // On a full disk there is room for the folder only when the quota has made some.
     if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
@@ -104,7 +132,7 @@ class SessionRunner {
     to_record.first = facts_.first;
     to_record.when_full = facts_.when_full;
     to_record.keep_trajectory = trajectory_is_asked_for();
-    to_record.ins = loop_.comparison() != nullptr;
+    to_record.ins = comparison_ != nullptr;
     to_record.disk_full = facts_.disk_full;
     recorder_ = std::make_unique<Recorder>(request_.out, to_record);
     calibrations_ = std::make_unique<CalibrationWriter>(CalibrationWriter::Options{
@@ -112,23 +140,25 @@ class SessionRunner {
     observers_ = {recorder_.get(), calibrations_.get()};
     observers_.insert(observers_.end(), request_.observers.begin(), request_.observers.end());
     if (configuration_.record.any()) {
-      recording_ = std::make_unique<DriveRecorder>(request_.out, configuration_, facts_,
-                                                   loop_.solver_watch());
+      recording_ =
+          std::make_unique<DriveRecorder>(request_.out, configuration_, facts_, watched_solver_);
       observers_.push_back(recording_.get());
       if (configuration_.record.pulses != 0) source_.observe_pulses(recording_.get());
     }
     const SessionStart start = session_start();
     for (SessionObserver* observer : observers_) observer->on_start(start);
-    loop_.open(SessionOutput(observers_), recording_.get(), calibrations_.get());
+    output_ = SessionOutput(observers_);
+    log_.open(&output_, facts_.first);
+    if (comparison_) comparison_->open(&output_);
     const StartingCalibration& begin = facts_.begin;
     if (begin.trust != CalibrationTrust::none)
-      loop_.output().post(
+      output_.post(
           &SessionObserver::on_calibration,
           CalibrationRecord::begin(begin.file.rig, facts_.first, begin.cause, begin.source));
   }
   /// Returns true if the end of the session needs all poses in memory.
   [[nodiscard]] bool trajectory_is_asked_for() const {
-    return loop_.comparison() != nullptr || !facts_.truth.empty() || facts_.knows_truth;
+    return comparison_ != nullptr || !facts_.truth.empty() || facts_.knows_truth;
   }
   [[nodiscard]] SessionStart session_start() const {
     SessionStart start;
@@ -147,46 +177,43 @@ class SessionRunner {
     start.recording = recording_ != nullptr;
     return start;
   }
-  void print_remarks(Progress* progress) {
-    for (const std::string& message : removed_) {
-      progress->print("vergence: " + message);
-      loop_.event_log().log(facts_.first, "session_removed", message, false);
-    }
+  void print_remarks() {
+    warn(removed_);
+    for (const std::string& message : removed_)
+      log_.log(facts_.first, "session_removed", message, false);
     for (const SourceRemark& remark : facts_.remarks) {
-      if (remark.print) progress->print("vergence: " + remark.message);
-      if (remark.kind != nullptr)
-        loop_.event_log().log(facts_.first, remark.kind, remark.message, false);
+      if (remark.print) progress_.print("vergence: " + remark.message);
+      if (remark.kind != nullptr) log_.log(facts_.first, remark.kind, remark.message, false);
     }
   }
-  void estimate() noexcept {
-    loop_.run();
-    const std::lock_guard lock(mutex_);
-    done_ = true;
-    changed_.notify_one();
+  /// Threads are examined at every poll in the first second, then once per second.
+  void poll_threads() {
+    constexpr int kAtFirst = 20, kLater = 20;
+    const int count = polls_++;
+    if (count >= kAtFirst && count % kLater != 0) return;
+    process_threads(&threads_);
+    for (const ProcessThread& thread : threads_)
+      if (thread.own()) own_threads_.insert(thread.name);
+    warn(realtime_.apply(threads_));
   }
-  void watch(Progress* progress) {
+  void watch(const std::future<void>& estimating) {
     constexpr std::chrono::milliseconds kPollInterval{50};
-    std::unique_lock lock(mutex_);
-    while (!changed_.wait_for(lock, kPollInterval, [this] { return done_; })) {
+    while (estimating.wait_for(kPollInterval) == std::future_status::timeout) {
       if (signals_.stop_requested()) source_.stop();
       source_.poll();
-      service_.alive(loop_.items(), loop_.waiting(), source_.rounds(),
-                     std::chrono::steady_clock::now());
-      if (facts_.on_request && signals_.poll_calibration_request()) loop_.ask_calibration();
-      lock.unlock();
-      if (loop_.drained()) halt_source();
-      threads_.poll(progress);
-      loop_.event_log().show(progress, facts_.frames);
-      print_recording_errors(progress);
-      lock.lock();
+      service_.alive(items_, waiting_, source_.rounds(), std::chrono::steady_clock::now());
+      if (facts_.on_request && signals_.poll_calibration_request()) calibration_asked_ = true;
+      if (drained_) halt_source();
+      poll_threads();
+      log_.show(&progress_, facts_.frames);
+      print_recording_errors();
     }
-    lock.unlock();
     halt_source();
-    loop_.event_log().show(progress, facts_.frames);
+    log_.show(&progress_, facts_.frames);
   }
-  void start_source(std::vector<std::string>* faults) {
+  void start_source() {
     try {
-      source_.start(faults);
+      source_.start(&faults_);
     } catch (const std::exception&) {
       // Devices that did start may already deliver data to the recording.
       halt_source();
@@ -195,9 +222,9 @@ class SessionRunner {
     }
   }
   /// Without it the devices' data are not consumed yet.
-  [[nodiscard]] std::thread start_estimating() {
+  [[nodiscard]] std::future<void> start_estimating() {
     try {
-      return std::thread([this] { estimate(); });
+      return std::async(std::launch::async, [this] { estimate(); });
     } catch (const std::system_error& e) {
       source_.stop();
       halt_source();
@@ -224,45 +251,40 @@ class SessionRunner {
     if (!halted_) source_.halt();
     halted_ = true;
   }
-  void print_recording_errors(Progress* progress) {
-    for (const std::string& message : recorder_->pop_errors())
-      progress->print("vergence: " + message);
-    if (!recording_) return;
-    for (const std::string& message : recording_->pop_errors())
-      progress->print("vergence: " + message);
+  void print_recording_errors() {
+    warn(recorder_->pop_errors());
+    if (recording_) warn(recording_->pop_errors());
   }
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
-                                           std::uint64_t allocations) const {
+                                           std::uint64_t runtime_allocations) const {
     SummaryInput input;
-    input.dropped_by_estimator = loop_.event_log().dropped();
-    const Trajectory& reference = loop_.comparison() != nullptr ? totals.reference : facts_.truth;
+    input.dropped_by_estimator = log_.dropped();
+    const Trajectory& reference = comparison_ != nullptr ? totals.reference : facts_.truth;
     if (!reference.empty() && !totals.trajectory.empty())
       input.evaluation = evaluate(totals.trajectory, reference, summary_evaluation_options());
-    if (const InsComparison* comparison = loop_.comparison()) {
-      input.comparison = comparison->counters();
-      input.earth = comparison->earth(facts_.ins->mount_source);
+    if (comparison_) {
+      input.comparison = comparison_->counters();
+      input.enu = comparison_->enu_json(facts_.ins->mount_source);
     }
-    const Estimator& estimator = loop_.estimator();
-    input.calibrated = estimator.calibrated();
-    input.online = loop_.options().online;
-    input.verified = input.online && estimator.verified();
-    input.calibration = estimator.calibration();
+    input.calibrated = estimator_.calibrated();
+    input.online = options_.online;
+    input.verified = input.online && estimator_.verified();
+    input.calibration = estimator_.calibration();
     input.calibration_source = totals.accepted > 0 ? "online" : facts_.begin.source;
     if (facts_.begin.trust != CalibrationTrust::none) input.before = facts_.begin.file.rig;
-    input.options = loop_.options().calibration;
-    input.runtime_allocations = allocations;
-    input.frame_budget = loop_.options().frame_budget;
-    input.allocations = threads_.allocations();
+    input.options = options_.calibration;
+    input.runtime_allocations = runtime_allocations;
+    input.frame_budget = options_.frame_budget;
+    input.allocations = allocations();
     input.memory = memory();
     input.configuration_hash = configuration_hash(configuration_);
     input.assumptions = facts_.assumptions;
-    source_.describe(totals, estimator, &input);
+    source_.describe(totals, estimator_, &input);
     for (SessionObserver* observer : observers_)
       for (auto& counter : observer->counters()) input.devices.push_back(std::move(counter));
     return input;
   }
-  void write_files(const SessionTotals& totals, const SummaryInput& input,
-                   std::vector<std::string>* faults, Progress* progress) {
+  void write_files(const SessionTotals& totals, const SummaryInput& input) {
     try {
       // Names of files need not be UTF-8.
       replace_durably(request_.out / "summary.json",
@@ -270,79 +292,95 @@ class SessionRunner {
                               .dump(2, ' ', false, nlohmann::json::error_handler_t::replace) +
                           "\n");
     } catch (const InputError& e) {
-      faults->emplace_back(e.what());
+      faults_.emplace_back(e.what());
     }
-    faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-    print_recording_errors(progress);
-    for (const std::string& message : *faults) progress->print("vergence: " + message);
+    faults_.insert(faults_.end(), totals.faults.begin(), totals.faults.end());
+    print_recording_errors();
+    warn(faults_);
   }
-  void print_metrics(const SessionTotals& totals, const SummaryInput& input,
-                     Progress* progress) const {
-    progress->print(
+  void print_metrics(const SessionTotals& totals, const SummaryInput& input) {
+    progress_.print(
         fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; "
                     "estimator {:.1f} ms per frame, p99 {:.1f} ms",
                     request_.out.string(), totals.read, totals.ok + totals.degraded,
                     totals.degraded, totals.lost, input.skipped, facts_.skipped_label,
                     totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
     if (input.calibrated && !input.online)
-      progress->print("the calibration is not verified: calibration.online is off");
+      progress_.print("the calibration is not verified: calibration.online is off");
     else if (input.calibrated && !input.verified)
-      progress->print(
+      progress_.print(
           "the calibration was never verified; drive turns past near objects, with tracks in the "
           "image corners");
-    if (const std::string message = allocations_message(input.allocations);
-        request_.print_memory && !message.empty())
-      progress->print(message);
-    source_.print_metrics(input, progress);
+    if (request_.print_memory) print_allocations(input.allocations);
+    source_.print_metrics(input, &progress_);
   }
-  [[nodiscard]] ExitCode verdict(const SessionTotals& totals,
-                                 const std::vector<std::string>& faults, Progress* progress) const {
+  void print_allocations(const ThreadAllocationCounts& allocations) {
+    std::vector<std::string> list;
+    for (const auto* threads : {&allocations.own, &allocations.libraries})
+      for (const auto& [name, count] : *threads)
+        if (count > 0) list.push_back(fmt::format("{} {}", name, count));
+    if (!list.empty())
+      progress_.print(fmt::format("runtime heap allocations: {}", fmt::join(list, ", ")));
+  }
+  [[nodiscard]] ExitCode verdict(const SessionTotals& totals) {
     // Also without a pose the user is informed which device was disconnected.
-    const std::optional<ExitCode> of_source = source_.verdict(progress);
+    const std::optional<ExitCode> of_source = source_.verdict(&progress_);
     if (totals.ok + totals.degraded == 0) {
-      progress->print("vergence: no frame has a pose; events.jsonl and poses.csv in " +
+      progress_.print("vergence: no frame has a pose; events.jsonl and poses.csv in " +
                       request_.out.string() + " have the reasons");
       return ExitCode::not_usable;
     }
     if (of_source) return *of_source;
-    if (loop_.comparison() != nullptr && loop_.comparison()->matches() == 0) {
-      progress->print(
+    if (comparison_ != nullptr && comparison_->matches() == 0) {
+      progress_.print(
           "vergence: the INS never had a position, so no pose is compared; the poses are written; "
           "check its antenna");
       return ExitCode::not_usable;
     }
-    return faults.empty() ? ExitCode::done : ExitCode::not_written;
+    return faults_.empty() ? ExitCode::done : ExitCode::not_written;
   }
   /// Writes report.html and prints the closing lines; with `quiet` only those that must not be
   /// missed. Returns false if no pose can be relied on.
-  [[nodiscard]] bool report(Progress* progress) const {
+  [[nodiscard]] bool report() {
     ReportOutcome outcome;
     try {
       outcome = write_report(request_.out);
     } catch (const InputError& e) {
-      progress->print(std::string("vergence: ") + e.what());
+      progress_.print(std::string("vergence: ") + e.what());
       return true;
     }
     if (request_.quiet) {
       if (!outcome.assessment.usable)
-        progress->print("vergence: do not use these poses: " + outcome.assessment.main_reason);
+        progress_.print("vergence: do not use these poses: " + outcome.assessment.main_reason);
       return outcome.assessment.usable;
     }
     // Number of columns.
     constexpr std::size_t kWidth = 110;
     for (const std::string& message : closing_lines(outcome))
-      progress->print(fmt::format("{}", fmt::join(wrapped(message, kWidth), "\n  ")));
+      progress_.print(fmt::format("{}", fmt::join(wrapped(message, kWidth), "\n  ")));
     return outcome.assessment.usable;
   }
   /// Bytes by component.
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const {
-    return {{"estimator_bytes", loop_.estimator_arena().used()},
+    return {{"estimator_bytes", estimator_arena_.used()},
             {"comparison_bytes",
-             loop_.comparison_arena().used() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
+             comparison_arena_.used() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
             {"images_bytes", facts_.image_bytes},
             {"recording_bytes", recording_ ? recording_->memory() : 0},
             {"recorder_bytes", recorder_->memory() + calibrations_->memory()},
             {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
+  }
+  /// ThreadAllocations' counts, and the names of threads that made no allocation.
+  [[nodiscard]] ThreadAllocationCounts allocations() const {
+    const ThreadAllocations::Counts counts = ThreadAllocations::counts();
+    ThreadAllocationCounts out;
+    for (const std::string& name : own_threads_) out.own[name] = 0;
+    for (std::size_t i = 0; i < counts.size; ++i) {
+      const std::string name = counts.rows[i].name.data();
+      (ProcessThread{0, name}.own() ? out.own : out.libraries)[name] += counts.rows[i].count;
+    }
+    if (counts.others > 0) out.libraries["others"] = counts.others;
+    return out;
   }
   /// Prints the components on stdout, and the parts of the estimator's arena, the largest first.
   void print_memory_table() const {
@@ -355,11 +393,108 @@ class SessionRunner {
       sum += bytes;
     }
     print("total_bytes", sum);
-    const auto rows = loop_.estimator_arena().rows();
+    const auto rows = estimator_arena_.rows();
     std::vector<ArenaRow> parts(rows.begin(), rows.end());
     std::ranges::stable_sort(parts, std::greater<>(), &ArenaRow::bytes);
     for (const ArenaRow& part : parts) print(fmt::format("  {}", part.name), part.bytes);
     (void)std::fflush(stdout);
+  }
+  void log_kept_calibrations() noexcept {
+    for (EventRecord event; calibrations_->next(&event);)
+      log_.log(event, event.kind == std::string_view("calibration_save_failed"));
+  }
+
+  [[nodiscard]] bool next(SourceItem* item) noexcept {
+    waiting_ = true;
+    const bool got = source_.next(item);
+    waiting_ = false;
+    items_ += got ? 1 : 0;
+    return got;
+  }
+
+  void estimate() noexcept {
+    (void)pthread_setname_np(pthread_self(), "vergence-estim");
+    AllocationGuard::seal_thread();
+    for (SourceItem item; next(&item);) {
+      std::visit([this](const auto& value) { handle(value); }, item);
+      if (comparison_) comparison_->drain();
+    }
+    ThreadAllocations::end();
+    drained_ = true;
+    estimator_.finish();
+    log_.collect(estimator_);
+    if (comparison_) comparison_->finish();
+    AllocationGuard::unseal_thread();
+  }
+
+  void handle(const InsRecord& reading) noexcept { comparison_->add(reading); }
+  void handle(const SourceEvent& event) noexcept {
+    if (event.recalibrate) estimator_.request_recalibration();
+    if (event.skipped) ++counts_.skipped;
+    if (event.listed) log_.log(event.record, event.to_user);
+  }
+
+  void request_recalibration(Stamp stamp, const char* message) noexcept {
+    estimator_.request_recalibration();
+    log_.log(stamp, "recalibration_requested", message, true);
+  }
+
+  /// Handles requests of viewers.
+  void poll_requests(Stamp stamp) noexcept {
+    if (request_.requests == nullptr) return;
+    SessionRequests& requests = *request_.requests;
+    if (requests.recalibrate.exchange(false) && facts_.on_request)
+      request_recalibration(stamp, "a recalibration was requested on the live page");
+    if (requests.mark.exchange(false)) log_.log(stamp, "mark", "marked on the live page", true);
+    if (requests.stop_recording.exchange(false) && recording_) {
+      log_.log(stamp, "recording_stopped", "recording stopped on the live page; the run continues",
+               true);
+      recording_->stop();
+    }
+  }
+
+  void handle(const SourceFrame& frame) noexcept {
+    if (calibration_asked_.exchange(false))
+      request_recalibration(frame.rig.stamp, "a recalibration was requested by SIGUSR1");
+    poll_requests(frame.rig.stamp);
+    log_kept_calibrations();
+    if (!delivering_) ThreadAllocations::begin();
+    delivering_ = true;
+    watched_solver_.begin_frame(frame.solver_idle);
+    output_.post(&SessionObserver::on_frame, frame.rig);
+    const PoseSample sample = estimator_.process(frame.rig);
+    source_.done(sample);
+    const FrameReport posed = frame_report(frame, sample);
+    output_.post(&SessionObserver::on_pose, posed);
+    output_.post(&SessionObserver::on_tracks, estimator_.tracks());
+    log_.collect(estimator_);
+    log_.record_effort(sample);
+    if (comparison_) return comparison_->add(posed);
+    output_.post(&SessionObserver::on_report, posed);
+    log_.collect(posed);
+  }
+
+  [[nodiscard]] FrameReport frame_report(const SourceFrame& frame,
+                                         const PoseSample& sample) noexcept {
+    const RigFrame& rig = frame.rig;
+    if (newest_number_ && rig.number > *newest_number_ + 1)
+      counts_.missing += rig.number - *newest_number_ - 1;
+    newest_number_ = rig.number;
+    counts_.add(sample);
+    FrameReport r;
+    r.pose = sample;
+    r.counts = counts_;
+    r.stamp_error = rig.stamp_error;
+    r.spread = rig.spread;
+    r.pairing = rig.pairing;
+    r.cameras = rig.cameras;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+      if (!rig.images[k].empty())
+        r.images_present = static_cast<std::uint8_t>(r.images_present | 1U << k);
+    r.estimated = monotonic_now();
+    r.decode_ms = frame.decode_ms;
+    if (!comparison_) r.T_reference_left = reference_.at(sample.stamp);
+    return r;
   }
 
   FrameSource& source_;
@@ -367,36 +502,61 @@ class SessionRunner {
   const Configuration& configuration_;
   const SessionOptions& request_;
   const SignalGuard& signals_;
-  EstimationLoop loop_;
+
+  const ReferenceTrack reference_;
+  const CameraMasks masks_;
+  const EstimatorOptions options_;
+  Arena estimator_arena_, comparison_arena_;
+  const std::unique_ptr<PairRunner> runner_;
+  BackgroundThread solver_;
+  ReplayableSolverRunner watched_solver_{solver_};
+  Estimator estimator_;
+  SessionOutput output_;
+  EventLog log_;
+  // Null without an INS.
+  std::unique_ptr<InsComparison> comparison_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<CalibrationWriter> calibrations_;
   // Null if nothing is recorded.
   std::unique_ptr<DriveRecorder> recording_;
   std::vector<SessionObserver*> observers_;
 
+  // Used by the estimator's thread only.
+  FrameCounts counts_{};
+  std::optional<std::uint64_t> newest_number_{};
+  // True after the first frame.
+  bool delivering_ = false;
+
+  // Items handled so far, and whether the loop waits for the next one, for the hang detection.
+  std::atomic<std::uint64_t> items_{0};
+  std::atomic<bool> waiting_{false};
+  // True once the source has given its last item; the estimator may still decide a calibration.
+  std::atomic<bool> drained_{false};
+  // Requests a new calibration before the next frame.
+  std::atomic<bool> calibration_asked_{false};
+
   // Used by the caller's thread only.
+  Progress progress_;
+  // A message for each incomplete file.
+  std::vector<std::string> faults_;
   ServiceManager service_;
-  // Guards `done_` for the caller's thread, which waits on `changed_`.
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool done_ = false;
   // True if this session created its directory.
   bool folder_made_ = false;
   // One message per session that was deleted to respect the quota.
   std::vector<std::string> removed_;
-  // Used by the caller's thread only.
   bool halted_ = false;
-  // Used by the caller's thread only.
-  DriveThreads threads_;
+  RealtimeSystem realtime_system_;
+  RealtimeThreads realtime_;
+  int polls_ = 0;
+  std::vector<ProcessThread> threads_;
+  std::set<std::string> own_threads_{};
 };
 
 }  // namespace
 
 ExitCode run_session(FrameSource& source, const Configuration& configuration,
                      const SessionOptions& options, const SignalGuard& signals) {
-  const auto runner = with_plain_errors(
-      [&] { return std::make_unique<SessionRunner>(source, configuration, options, signals); });
-  return runner->run();
+  return std::make_unique<SessionRunner>(source, configuration, options, signals)->run();
 }
 
 }  // namespace vergence::app

@@ -1,6 +1,5 @@
 #pragma once
 #include <filesystem>
-#include <stdexcept>
 #include <vector>
 
 #include "app/config/configuration.hpp"
@@ -25,7 +24,7 @@ struct SessionOptions {
 /// Processes a source by estimator and comparison into a session directory: set-up, monitoring,
 /// events, comparison, summary, report and result, equal for devices and recordings.
 ///
-///     const auto source = make_recorded_source(request, …);
+///     const auto source = std::make_unique<LiveSource>(request);
 ///     SessionOptions options;
 ///     options.out = "sessions/monday";
 ///     const ExitCode code = run_session(*source, request.configuration, options, signals);
@@ -40,18 +39,5 @@ struct SessionOptions {
 ///          result), not_written (a missing or incomplete file), interrupted, terminated
 [[nodiscard]] ExitCode run_session(FrameSource& source, const Configuration& configuration,
                                    const SessionOptions& options, const SignalGuard& signals);
-
-/// Returns the result of `make`. Turns std::invalid_argument and std::length_error, by which core
-/// rejects inconsistent options and rigs, into InputError with the same message.
-template <class Make>
-auto with_plain_errors(const Make& make) {
-  try {
-    return make();
-  } catch (const std::invalid_argument& e) {
-    throw InputError(e.what());
-  } catch (const std::length_error& e) {
-    throw InputError(e.what());
-  }
-}
 
 }  // namespace vergence::app

@@ -12,45 +12,34 @@ void BudgetStatistics::add(const FrameWorkload& effort) noexcept {
   windows += window ? 0 : 1;
 }
 
-void TotalsBuilder::add(const FrameReport& report) {
+void SessionTotals::add(const FrameReport& report) {
   const PoseSample& p = report.pose;
   newest_ = p.stamp;
   newest_frame_ = p.frame;
-  ++totals_.read;
+  FrameCounts::add(p);
   match_verified();
-  ++(p.status == PoseStatus::ok         ? totals_.ok
-     : p.status == PoseStatus::degraded ? totals_.degraded
-                                        : totals_.lost);
-  totals_.estimate.add(static_cast<double>(p.estimate_ms));
+  estimate.add(static_cast<double>(p.estimate_ms));
   if (p.state != State::stereo_odometry && p.state != State::lost)
-    totals_.calibrating.add(static_cast<double>(p.estimate_ms));
-  totals_.decode.add(static_cast<double>(report.decode_ms));
-  totals_.work_dropped.add(p.effort);
+    calibrating.add(static_cast<double>(p.estimate_ms));
+  decode.add(static_cast<double>(report.decode_ms));
+  work_dropped.add(p.effort);
   for (std::size_t i = 0; i < p.stage_ms.size(); ++i)
-    totals_.stages[i].add(static_cast<double>(p.stage_ms[i]));
-  if (p.status == PoseStatus::lost) return;
-  const Vec3& t = p.T_world_left.t;
-  if (last_position_) {
-    const Vec3 step = t - *last_position_;
-    totals_.path_m += std::hypot(step.x(), step.y(), step.z());
-  }
-  last_position_ = t;
+    stages[i].add(static_cast<double>(p.stage_ms[i]));
 }
 
 /// An event comes before the pose of its frame, or after the last one.
-void TotalsBuilder::match_verified() {
-  if (totals_.verified == newest_ && !totals_.verified_frame && totals_.read > 0)
-    totals_.verified_frame = newest_frame_;
+void SessionTotals::match_verified() {
+  if (verified == newest_ && !verified_frame && read > 0) verified_frame = newest_frame_;
 }
 
-void TotalsBuilder::add(const EventRecord& e) {
+void SessionTotals::add(const EventRecord& e) {
   const std::string_view kind = e.kind;
-  if (kind == "calibration_verified" && !totals_.verified) {
-    totals_.verified = e.stamp;
+  if (kind == "calibration_verified" && !verified) {
+    verified = e.stamp;
     match_verified();
-  } else if (kind == "calibration_contradicted" && !totals_.contradicted) {
+  } else if (kind == "calibration_contradicted" && !contradicted) {
     const double* percent = std::get_if<double>(&e.fields[0].value);
-    totals_.contradicted = {e.stamp, percent != nullptr ? *percent : 0.0};
+    contradicted = {e.stamp, percent != nullptr ? *percent : 0.0};
   }
 }
 

@@ -108,9 +108,7 @@ struct CalibrationTotals {
 };
 
 /// Totals of a session, for summary.json.
-struct SessionTotals : CalibrationTotals {
-  /// Numbers of frames.
-  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
+struct SessionTotals : FrameCounts, CalibrationTotals {
   /// In ms.
   TimeHistogram estimate, decode;
   /// Frames in states other than stereo_odometry and lost, in ms.
@@ -122,8 +120,6 @@ struct SessionTotals : CalibrationTotals {
   std::optional<std::uint64_t> verified_frame{};
   /// First contradiction of the calibration in use.
   std::optional<Contradiction> contradicted{};
-  /// Sum of the steps between successive poses.
-  double path_m = 0;
   /// Poses read back from trajectory.tum, if requested.
   std::vector<StampedPose> trajectory;
   /// Poses read back from reference.tum in its own frame, if requested.
@@ -138,20 +134,14 @@ struct SessionTotals : CalibrationTotals {
   std::size_t ring_high_water = 0;
   /// A message for each incomplete file.
   std::vector<std::string> faults;
-};
 
-/// Accumulates the totals from the frames and events of a session. Not thread-safe.
-class TotalsBuilder {
- public:
+  using CalibrationTotals::add;
   void add(const FrameReport& report);
   void add(const EventRecord& event);
-  [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
 
  private:
   void match_verified();
 
-  SessionTotals totals_{};
-  std::optional<Vec3> last_position_{};
   Stamp newest_{};
   std::uint64_t newest_frame_ = 0;
 };

@@ -172,7 +172,8 @@ Json recalibrations_json(const SessionTotals& totals) {
 }
 
 /// Null where nothing was counted.
-Json counters_json(const std::vector<std::pair<std::string, std::uint64_t>>& counters) {
+template <class Counters>
+Json counters_json(const Counters& counters) {
   Json json;
   for (const auto& [name, count] : counters) json[name] = count;
   return json;
@@ -292,7 +293,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
       {"lines", totals.lost_lines},        {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
-  json["enu"] = input.earth ? enu_json(*input.earth) : Json();
+  json["enu"] = input.enu;
   json["time"] = input.time;
   json["truth"] = truth_json(input.truth, input);
   json["schema_version"] = kSchemaVersion;

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -30,9 +31,9 @@ struct TruthMetrics {
 /// delivered until the last (docs/deployment.md).
 struct ThreadAllocationCounts {
   /// Counts of the program's threads, also those with 0.
-  std::vector<std::pair<std::string, std::uint64_t>> own{};
+  std::map<std::string, std::uint64_t> own{};
   /// Counts of the libraries' threads.
-  std::vector<std::pair<std::string, std::uint64_t>> libraries{};
+  std::map<std::string, std::uint64_t> libraries{};
 };
 
 /// Percentiles and maximum of times, in ms to the microsecond.
@@ -71,8 +72,8 @@ struct SummaryInput {
   std::vector<std::pair<std::string, std::uint64_t>> devices{};
   /// Counters of the comparison with an INS.
   std::vector<std::pair<std::string, std::uint64_t>> comparison{};
-  /// Present with an INS.
-  std::optional<EnuMetrics> earth{};
+  /// Null without an INS.
+  nlohmann::ordered_json enu{};
   std::optional<TruthMetrics> truth{};
   /// Assumptions about the recording.
   std::vector<std::string> assumptions{};

@@ -1,10 +1,11 @@
-#include "app/devices/capture_result.hpp"
+#include "app/devices/image_check.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstdint>
 
 #include "app/devices/drive_sync.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "core/math/random.hpp"
 #include "tests/support/refusal.hpp"
 

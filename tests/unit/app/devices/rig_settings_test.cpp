@@ -77,10 +77,10 @@ TEST(RigSettings, renderedRigAndTruthRigHaveNoErrors) {
   const Configuration c =
       configured({"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1",
                   "mock.texture_detail=0", "mock.drive=still"});
-  const MockDrive drive = make_mock_drive(c, {"knock@5 camera=1 pitch_deg=0.2"}, false, 1.0);
-  expect_equal(drive.rig->truth().mounted(), mounted_rig(c));
-  expect_equal(drive.rig->truth().calibration(Duration::seconds(4)), mounted_rig(c));
-  const Transform moved = drive.rig->truth().calibration(Duration::seconds(6)).T_camera_left[1] *
+  const auto drive = make_mock_drive(c, {"knock@5 camera=1 pitch_deg=0.2"}, false, 1.0);
+  expect_equal(drive->truth().mounted(), mounted_rig(c));
+  expect_equal(drive->truth().calibration(Duration::seconds(4)), mounted_rig(c));
+  const Transform moved = drive->truth().calibration(Duration::seconds(6)).T_camera_left[1] *
                           mounted_rig(c).T_camera_left[1].inverse();
   EXPECT_NEAR(log_so3(moved.R).x(), 0.2 * std::numbers::pi / 180, 1e-12);
 }

@@ -40,8 +40,8 @@ CalibrationRecord calibration(bool is_refinement, double x) {
 }
 
 void add_frame(LiveState* state, const FrameReport& report) {
-  state->add_pose(report);
-  state->add_report(report);
+  state->add(PosedFrame{report});
+  state->add(report);
 }
 
 TEST(LiveState, sendsChangesSinceAVersion) {

@@ -50,7 +50,7 @@ Killed record_and_kill(const std::filesystem::path& folder, std::chrono::microse
   const pid_t child = ::fork();
   if (child == 0) {
     Recording::Options o;
-    o.files.topics = {{"/text", RosType::text, false}, {"/image", RosType::image, false}};
+    o.topics = {{"/text", RosType::text, false}, {"/image", RosType::image, false}};
     o.queues = {8U << 20U};
     Recording recording(folder, o);
     for (std::uint32_t n = 0; n < PostTimes::kMax; ++n) {

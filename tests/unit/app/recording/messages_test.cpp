@@ -105,7 +105,7 @@ TEST(Messages, cameraInfosHoldRig) {
 
 TEST(Messages, everyMessageFitsItsBuffer) {
   std::array<std::uint8_t, kMessageRoom> bytes{};
-  const std::array<std::string_view, 4> names{"left", "right", "camera2", "camera3"};
+  const std::array<std::string, 4> names{"left", "right", "camera2", "camera3"};
   RigCalibration four = rig();
   four.cameras = 4;
   const auto fits = [&](const auto& write) {

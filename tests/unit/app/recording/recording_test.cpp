@@ -30,7 +30,7 @@ class FaultyDisk final : public Disk {
   std::atomic<int> writeback_error{0};
 
   [[nodiscard]] int create(const char* path) noexcept override {
-    return error != 0 ? -error : system_.create(path);
+    return error != 0 ? -error : Disk::create(path);
   }
   [[nodiscard]] std::int64_t write(int fd, const iovec* pieces, int count,
                                    std::uint64_t offset) noexcept override {
@@ -39,30 +39,16 @@ class FaultyDisk final : public Disk {
     if (error != 0) return -error;
     if (offset >= room) return -ENOSPC;
     iovec first = pieces[0];
-    if (room == ~std::uint64_t{0}) return system_.write(fd, pieces, count, offset);
+    if (room == ~std::uint64_t{0}) return Disk::write(fd, pieces, count, offset);
     first.iov_len = std::min<std::size_t>(first.iov_len, room - offset);
-    return system_.write(fd, &first, 1, offset);
+    return Disk::write(fd, &first, 1, offset);
   }
-  [[nodiscard]] int truncate(int fd, std::uint64_t size) noexcept override {
-    return error != 0 ? -error : system_.truncate(fd, size);
-  }
-  void start_writeback(int, std::uint64_t, std::uint64_t) noexcept override {}
   [[nodiscard]] int finish_writeback(int, std::uint64_t, std::uint64_t) noexcept override {
     return -writeback_error.exchange(0);
   }
   [[nodiscard]] int synchronise(int fd) noexcept override {
-    return error != 0 ? -error : system_.synchronise(fd);
+    return error != 0 ? -error : Disk::synchronise(fd);
   }
-  void close(int fd) noexcept override { system_.close(fd); }
-  [[nodiscard]] int rename(const char* from, const char* to) noexcept override {
-    return error != 0 ? -error : system_.rename(from, to);
-  }
-  void remove(const char* path) noexcept override {
-    if (error == 0) system_.remove(path);
-  }
-
- private:
-  Disk& system_ = system_disk();
 };
 
 using namespace std::chrono_literals;
@@ -73,7 +59,7 @@ constexpr std::size_t kText = 0, kImage = 1;
 
 Recording::Options options() {
   Recording::Options o;
-  o.files.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}};
+  o.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}};
   o.queues = {4U << 20U};
   o.when_full = WhenFull::wait;
   return o;
@@ -109,8 +95,8 @@ TEST(Recording, splitsBySizeWithRosbagNames) {
   const TemporaryFolder folder;
   Recording::Options o = options();
   o.queues = {64U << 10U};
-  o.files.preamble = {{kText, {0, 1, 0, 0, 2, 0, 0, 0, 'p', 0}}};
-  o.files.roll_bytes = 300'000;
+  o.preamble = {{kText, {0, 1, 0, 0, 2, 0, 0, 0, 'p', 0}}};
+  o.roll_bytes = 300'000;
   Recording recording(folder.path(), o);
   for (int i = 0; i < 3000; ++i) ASSERT_TRUE(post(&recording, i, 500));
   recording.close();
@@ -132,7 +118,7 @@ TEST(Recording, splitsBySizeWithRosbagNames) {
 /// For a recording on a disk with faults.
 class FaultyRecording : public ::testing::Test {
  protected:
-  FaultyRecording() { o.files.disk = &disk; }
+  FaultyRecording() { o.disk = &disk; }
 
   const TemporaryFolder folder;
   FaultyDisk disk;
@@ -174,7 +160,7 @@ TEST_F(FaultyRecording, retriesFailedWritesInSameFile) {
   std::this_thread::sleep_for(200ms);
   disk.error = 0;
   const auto chunks = recording.counters().chunks;
-  // The recording retries within RecordingFiles::kRetry.
+  // The recording retries within Recording::kRetry.
   await_chunks(recording, chunks + 1);
   recording.close();
   const auto errors = recording.pop_errors();
@@ -225,7 +211,7 @@ TEST(Recording, refusesUnwritableDiskAtStart) {
     FaultyDisk disk;
     disk.error = error;
     Recording::Options o = options();
-    o.files.disk = &disk;
+    o.disk = &disk;
     EXPECT_THROW(Recording(folder.path(), o), InputError) << error;
   }
 }
@@ -234,7 +220,7 @@ TEST_F(FaultyRecording, postingAndWritingDoNotAllocate) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   o.queues = {64U << 10U};
-  o.files.roll_bytes = 100'000;
+  o.roll_bytes = 100'000;
   Recording recording(folder.path(), o);
   const auto before = AllocationGuard::runtime_allocations();
   {

@@ -96,12 +96,12 @@ TEST(CalibrationWriter, savesFoundOrVerifiedForNextDrive) {
     const CalibrationFile in_session = read_calibration(folder / "calibration.yaml");
     EXPECT_EQ(in_session.rig.frames, finds ? 60 : 7);
     EXPECT_EQ(in_session.source, finds ? "online" : "");
-    CalibrationWriter::Outcome outcome;
-    EXPECT_EQ(writer.next(&outcome), frames > 0);
+    EventRecord event;
+    EXPECT_EQ(writer.next(&event), frames > 0);
     if (frames > 0) {
-      EXPECT_STREQ(outcome.event.kind, "calibration_saved");
+      EXPECT_STREQ(event.kind, "calibration_saved");
     }
-    EXPECT_FALSE(writer.next(&outcome)) << "what was replaced or kept is not kept again";
+    EXPECT_FALSE(writer.next(&event)) << "what was replaced or kept is not kept again";
   }
 }
 
@@ -137,12 +137,11 @@ TEST(CalibrationWriter, reportsWhetherNextDriveHasIt) {
          .state = has_state ? std::optional(folder / "state.yaml") : std::nullopt});
     writer.on_calibration(found(true));
     EXPECT_EQ(close(&writer).size(), session_fails ? 1U : 0U);
-    CalibrationWriter::Outcome outcome;
-    ASSERT_TRUE(writer.next(&outcome));
-    EXPECT_EQ(outcome.failed, failed);
-    EXPECT_EQ(
-        std::string(outcome.event.message.data()).find("calibration.yaml") != std::string::npos,
-        session_fails);
+    EventRecord event;
+    ASSERT_TRUE(writer.next(&event));
+    EXPECT_STREQ(event.kind, failed ? "calibration_save_failed" : "calibration_saved");
+    EXPECT_EQ(std::string(event.message.data()).find("calibration.yaml") != std::string::npos,
+              session_fails);
   }
 }
 

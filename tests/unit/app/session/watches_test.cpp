@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/background_thread.hpp"
-#include "app/session/timing_monitor.hpp"
 
 namespace vergence::app {
 namespace {

@@ -1,20 +1,12 @@
-#include "app/devices/capture_result.hpp"
+#include "app/devices/image_check.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <cctype>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <optional>
-#include <thread>
 
 #include <fmt/format.h>
-
-#include "app/runtime/nearest.hpp"
-#include "drivers/clock.hpp"
-#include "drivers/sync/sync_types.hpp"
 
 namespace vergence::app {
 
@@ -42,12 +34,6 @@ std::optional<std::string> why_unusable(const ImageStatistics& f, const std::str
            " is one uniform grey; check for a lens cap, fog on the glass, or a missing sensor "
            "signal";
   return std::nullopt;
-}
-
-void on_event(const DeviceEvent& event, CaptureResult* capture) {
-  const auto k = static_cast<std::size_t>(event.camera);
-  if (event.kind == DeviceEvent::Kind::camera_disconnected) capture->disconnected[k] = true;
-  if (event.kind == DeviceEvent::Kind::camera_reconnected) capture->disconnected[k] = false;
 }
 
 }  // namespace
@@ -117,78 +103,6 @@ bool are_identical(const ImageView& a, const ImageView& b) noexcept {
   for (int y = 0; y < a.height; ++y)
     if (std::memcmp(a.row(y), b.row(y), static_cast<std::size_t>(a.width)) != 0) return false;
   return image_statistics(a).contrast >= kFlat;
-}
-
-Configuration capture_configuration(const Configuration& configuration) {
-  Configuration c = configuration;
-  if (c.sync.mode != SyncMode::ins_syncout) c.ins.driver = "none";
-  return c;
-}
-
-std::vector<std::string> camera_names(const Configuration& c, int cameras) {
-  std::vector<std::string> names;
-  for (int k = 0; k < cameras; ++k) {
-    std::string name = c.cameras[static_cast<std::size_t>(k)].name;
-    std::ranges::replace_if(
-        name, [](unsigned char ch) { return std::isalnum(ch) == 0 && ch != '_' && ch != '-'; },
-        '_');
-    names.push_back(name.empty() ? "camera" + std::to_string(k) : name);
-  }
-  return distinct_names(names);
-}
-
-CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
-                           const SignalGuard& signals,
-                           const std::function<void(const CapturedSet&)>& use) {
-  const std::size_t n = devices.cameras().size();
-  CaptureResult capture;
-  capture.delivered.assign(n, 0);
-  capture.disconnected.assign(n, false);
-  Acquisition::Options o = devices.acquisition_options();
-  const HostMoment now = moment_now();
-  o.tie_stamp = now.day;
-  o.tie_host = devices.mock() != nullptr ? devices.start() : now.host;
-  Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), o);
-  start_acquisition(&source);
-  {
-    using Clock = std::chrono::steady_clock;
-    const auto limit = std::chrono::nanoseconds(options.limit.ns());
-    std::atomic<Clock::time_point> until{Clock::now() + limit};
-    // Ends the stream when nothing has come for too long, or a signal has.
-    const std::jthread watchdog([&](const std::stop_token& done) {
-      constexpr auto kPollInterval = std::chrono::milliseconds(50);
-      while (!done.stop_requested() && !signals.stop_requested() && Clock::now() < until.load())
-        std::this_thread::sleep_for(kPollInterval);
-      source.stop();
-    });
-    int passed = 0;
-    for (Acquired item; capture.sets < options.count && source.next(&item);) {
-      if (const auto* event = std::get_if<DeviceEvent>(&item)) on_event(*event, &capture);
-      const auto* frame = std::get_if<AcquiredFrame>(&item);
-      if (frame == nullptr) continue;
-      for (std::size_t i = 0; i < n; ++i) capture.delivered[i] += frame->set.present[i] ? 1 : 0;
-      if (frame->set.complete && passed++ >= options.skip) {
-        const RigFrame& rig = frame->rig;
-        use({capture.sets,
-             rig.stamp,
-             rig.stamp_error,
-             rig.spread,
-             frame->set.proof,
-             {rig.images.begin(), rig.images.begin() + static_cast<std::ptrdiff_t>(n)}});
-        ++capture.sets;
-        until = Clock::now() + limit;
-      }
-      source.release(*frame);
-    }
-  }
-  source.stop();
-  for (Acquired item; source.next(&item);)
-    if (const auto* frame = std::get_if<AcquiredFrame>(&item)) source.release(*frame);
-  source.join();
-  capture.end = capture.sets == options.count ? CaptureResult::End::done
-                : signals.stop_requested()    ? CaptureResult::End::interrupted
-                                              : CaptureResult::End::timeout;
-  return capture;
 }
 
 }  // namespace vergence::app
