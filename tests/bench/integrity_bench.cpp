@@ -32,8 +32,8 @@ struct Driven {
 
 /// Prints the estimator's result after a frame, for diagnosis.
 void print_events(const Estimator& e, const PoseSample& sample) {
-  fmt::print("    frame {:3d} {} {} sig {:.4f} {:.4f} {:.4f} inl {} {} rp {:.3f} ls {:.4f} kf {} unc {:.3f} z {:.3f}\n", sample.frame, to_string(sample.status),
-             to_string(sample.reason), std::sqrt(sample.motion_covariance[0]), std::sqrt(sample.motion_covariance[6]),std::sqrt(sample.motion_covariance[11]), sample.inliers, sample.stereo_inliers, sample.reprojection_px, sample.length_sigma, sample.keyframe, e.margins().uncertainty, sample.T_world_left.t.z());
+  fmt::print("    frame {:3d} {} {}\n", sample.frame, to_string(sample.status),
+             to_string(sample.reason));
   for (const EstimatorEvent& event : e.events())
     fmt::print("    frame {:3d} event {} value {:.3f} {}\n", sample.frame,
                static_cast<int>(event.kind), event.value, event.why);
