@@ -149,10 +149,9 @@ Number parse_number(const Entry& entry, const Key& key, const char* kind) {
   // Written so that a NaN is refused.
   if (parsed && static_cast<double>(value) >= key.least && static_cast<double>(value) <= key.most)
     return value;
-  const std::string range = range_text(key);
-  throw InputError(fmt::format("{}: {} is \"{}\"{}; it must be {}{}{}", entry.origin, key.name,
-                               entry.value.substr(0, 60),
-                               parsed ? "" : fmt::format(", not {}", kind),
+  const std::string range = range_text(key), text(entry.value.substr(0, 60));
+  throw InputError(fmt::format("{}: {} is {}; it must be {}{}{}", entry.origin, key.name,
+                               parsed ? text : fmt::format("\"{}\", not {}", text, kind),
                                range.starts_with("from ") ? range + " on" : "in " + range,
                                key.unit.empty() ? "" : " ", key.unit));
 }

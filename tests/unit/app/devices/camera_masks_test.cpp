@@ -63,7 +63,8 @@ TEST(CameraMasks, unusableMasksAreRefused) {
         std::pair{"truncated.pgm", "is truncated or damaged"},
         std::pair{"black.pgm", "is 0 everywhere"},
         std::pair{"text.pgm", "is not a mask; use a PNG"}, std::pair{"huge.pgm", "is not a mask"},
-        std::pair{"headless.pgm", "is not a mask"}, std::pair{"photo.jpg", "is not a mask"}})
+        std::pair{"headless.pgm", "is truncated or damaged"},
+        std::pair{"photo.jpg", "is not a mask"}})
     EXPECT_TRUE(refusal(folder.path(), name).starts_with(at + name + " " + why))
         << refusal(folder.path(), name);
   EXPECT_EQ(refusal(folder.path(), "nowhere.png"), "cameras.1.mask: nowhere.png is missing");
