@@ -35,12 +35,13 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
-  // Try the prediction, then with a larger range, then the last pose as the image has turned since.
+  // Try the prediction, then with a larger range, then the best pose so far, or if there is none
+  // the last one as the image has turned since.
   PoseFit best;
   for (const int attempt : {0, 1, 2}) {
     const int coarsest = attempt == 0 ? 2 : 3;
-    Transform start = predicted;
-    if (attempt == 2)
+    Transform start = best.inliers > 0 ? best.T_left_world : predicted;
+    if (attempt == 2 && best.inliers == 0)
       start = Transform{front_end_.turn_since_kept(), Vec3::Zero()} * motion_.T_left_world();
     // A quarter of the points is enough for MLESAC, for a third of the work.
     front_end_.follow_sample(map_, start, options_.features / 4, coarsest);
