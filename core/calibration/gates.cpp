@@ -25,6 +25,9 @@ constexpr double kSuppliedYaw = 1e-3, kOtherYaw = 15e-3;
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
 // Minimum path length of a solve, in baselines.
 constexpr double kMinBaselinesTravelled = 3.0;
+// Systematic error of the measured focal length, relative: at most 3.2 % on recorded sequences
+// after 25 frames (docs/calibration.md).
+constexpr double kSystematicFocal = 0.04;
 
 /// Median distance in px of one frame's matches between the left camera and camera k to the
 /// epipolar lines; negative if there are too few.
@@ -49,6 +52,8 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
   return median(std::span(distance).first(n));
 }
 
+constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
+
 /// Calls `each` for at most the newest kHeldOutFrames frames whose number is above `after` and at
 /// most `last`.
 template <class Each>
@@ -59,11 +64,6 @@ void for_newest(const TrackLog& log, std::uint64_t after, std::uint64_t last, Ea
     each(log.frame(i));
     ++n;
   }
-}
-
-template <class Each>
-void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept {
-  for_newest(log, after, std::numeric_limits<std::uint64_t>::max(), each);
 }
 
 /// Fit of camera k on the newest frames after frame number `after` and up to `last`.
@@ -80,28 +80,28 @@ HeldOut fit_on(const TrackLog& log, std::uint64_t after, std::uint64_t last,
   return h;
 }
 
-/// Fit of camera k on the newest frames after frame number `after`.
-HeldOut fit_on_held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig,
-                        int k) noexcept {
-  return fit_on(log, after, std::numeric_limits<std::uint64_t>::max(), rig, k);
-}
-
-/// Returns true if held-out frames contradict camera k of `rig`, compared with the fit of `solved`
-/// on its own frames.
-bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
-                  std::uint64_t newest, int k, double pixel_sigma) noexcept {
-  const HeldOut fit = fit_on_held_out(log, newest, rig, k);
-  if (fit.frames < kMinForMean) return false;
-  const HeldOut used = fit_on(log, 0, newest, solved, k);
-  return fit.median_px > kUnusualRatio * std::min(std::max(used.median_px, pixel_sigma), kMaxFitPx);
-}
-
-/// Returns true if contradicted() holds for any camera.
+/// Returns true if held-out frames contradict any camera of `rig`, compared with the fit of
+/// `solved` on its own frames.
 bool misfits(const TrackLog& log, std::uint64_t newest, const RigCalibration& solved,
              const RigCalibration& rig, double pixel_sigma) noexcept {
-  for (int k = 1; k < solved.cameras; ++k)
-    if (contradicted(log, rig, solved, newest, k, pixel_sigma)) return true;
+  for (int k = 1; k < solved.cameras; ++k) {
+    const HeldOut fit = fit_on(log, newest, kNoLimit, rig, k);
+    if (fit.frames < kMinForMean) continue;
+    const double used = fit_on(log, 0, newest, solved, k).median_px;
+    if (fit.median_px > kUnusualRatio * std::min(std::max(used, pixel_sigma), kMaxFitPx))
+      return true;
+  }
   return false;
+}
+
+/// Sigma of the relative depth of a calibration that is the rig's, in percent.
+double current_percent(const RigCalibration& current, int k, double depth,
+                       const CalibrationOptions& o) noexcept {
+  const double own = depth_error_percent(current, k, depth);
+  const double by_turn = 100 * depth / current.T_camera_left[static_cast<std::size_t>(k)].t.norm();
+  // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
+  return own > 0 ? std::hypot(own, 1e-3 * o.extrinsic_random_walk_mrad_per_sqrt_h * by_turn)
+                 : kSuppliedYaw * by_turn;
 }
 
 double angle_between(const Vec3& a, const Vec3& b) noexcept {
@@ -111,17 +111,17 @@ double angle_between(const Vec3& a, const Vec3& b) noexcept {
 }  // namespace
 
 HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
-  HeldOut worst = fit_on_held_out(log, after, rig, 1);
-  for (int k = 2; k < rig.cameras; ++k) {
-    const HeldOut fit = fit_on_held_out(log, after, rig, k);
-    if (fit.median_px > worst.median_px) worst = fit;
+  HeldOut worst;
+  for (int k = 1; k < rig.cameras; ++k) {
+    const HeldOut fit = fit_on(log, after, kNoLimit, rig, k);
+    if (k == 1 || fit.median_px > worst.median_px) worst = fit;
   }
   return worst;
 }
 
 bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
   int n = 0;
-  for_held_out(log, after, [&n](const LoggedFrame&) noexcept { ++n; });
+  for_newest(log, after, kNoLimit, [&n](const LoggedFrame&) noexcept { ++n; });
   return n >= kMinForMean;
 }
 
@@ -129,7 +129,7 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
                  const RigCalibration& worse, double chance) noexcept {
   double sum = 0, squares = 0;
   int n = 0;
-  for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
+  for_newest(log, after, kNoLimit, [&](const LoggedFrame& f) noexcept {
     double gain = 0;
     bool compared = false;
     for (int k = 1; k < better.cameras; ++k) {
@@ -148,20 +148,6 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
   const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
   return mean > chance * std::sqrt(variance / (n - 1));
 }
-
-namespace {
-
-/// Sigma of the relative depth of a calibration that is the rig's, in percent.
-double current_percent(const RigCalibration& current, int k, double depth,
-                       const CalibrationOptions& o) noexcept {
-  const double own = depth_error_percent(current, k, depth);
-  const double by_turn = 100 * depth / current.T_camera_left[static_cast<std::size_t>(k)].t.norm();
-  // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
-  return own > 0 ? std::hypot(own, 1e-3 * o.extrinsic_random_walk_mrad_per_sqrt_h * by_turn)
-                 : kSuppliedYaw * by_turn;
-}
-
-}  // namespace
 
 Assessment assess(const RigCalibration& measured, const RigCalibration& current,
                   CalibrationOrigin source, const TrackLog& log, std::uint64_t after,
@@ -278,9 +264,32 @@ Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noe
   if (const Gate gate = check_solution(q, o); gate != Gate::open) return gate;
   if (q.log == nullptr) return Gate::open;
   if (misfits(*q.log, s.newest, s.rig, s.rig, q.pixel_sigma)) return Gate::does_not_fit;
-  if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))
-    return Gate::no_better;
-  return Gate::open;
+  if (q.in_use == nullptr || !q.must_be_better || fits_better(*q.log, s.newest, s.rig, *q.in_use))
+    return Gate::open;
+  // A yaw changes depths, but hardly the distances to epipolar lines that are compared above.
+  const Assessment a = assess(s.rig, *q.in_use, q.source, *q.log, s.newest, o, q.pixel_sigma);
+  return (a.nearer || a.log_odds < 0) && !a.worse ? Gate::open : Gate::no_better;
+}
+
+FocalMeasurement check_focal_length(const RigSolution& found,
+                                    const RigCalibration& given) noexcept {
+  FocalMeasurement m;
+  m.configured_px = given.intrinsics[0].fx;
+  const Intrinsics& lens = found.rig.intrinsics[0];
+  if (!(m.configured_px > 0)) return m;
+  const double off = std::abs(lens.fx / m.configured_px - 1);
+  if (found.status == RigSolveStatus::not_converged && off > kFocalPriorSigma) {
+    // The solve has not converged but is already far off, and the true value is farther.
+    m.measured_px = lens.fx;
+    m.contradicted = m.doubted = true;
+  } else if (found.status == RigSolveStatus::ok && lens.sigma[0] > 0) {
+    m.measured_px = lens.fx;
+    m.sigma_px = std::hypot(lens.sigma[0], kSystematicFocal * lens.fx);
+    const double noise = lens.sigma[0] / lens.fx;
+    m.contradicted = off > kSystematicFocal + kCertainSigmas * noise;
+    m.doubted = m.contradicted || log_odds(off, noise, kSystematicFocal, kFocalPriorSigma) < 0;
+  }
+  return m;
 }
 
 }  // namespace vergence::calibration

@@ -3,24 +3,75 @@
 #include <cmath>
 
 #include "core/calibration/detail/change_detector.hpp"
-#include "core/calibration/detail/exposure_offset.hpp"
 #include "core/calibration/detail/monitor_residuals.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::calibration {
 namespace {
 
 using Kind = MonitorResult::Kind;
+
+Pinhole pinhole(const Intrinsics& lens) noexcept { return {lens.fx, lens.fy, lens.cx, lens.cy}; }
+
+bool good(const Pinhole& k) noexcept {
+  return k.fx > 0 && k.fy > 0 && std::isfinite(k.fx + k.fy + k.cx + k.cy);
+}
+
 }  // namespace
 
+StereoPair stereo_pair(const RigCalibration& rig, std::size_t k) noexcept {
+  return {rig.T_camera_left[k], pinhole(rig.intrinsics[0]), pinhole(rig.intrinsics[k])};
+}
+
 struct Monitor::Parts {
+  /// Fits the frames' offsets θ_f from the reference by a constant and by exposures of the camera
+  /// that are late by a fraction δ of the interval between frames.
+  ///
+  /// With T the transform of the camera, ω and v the rotation and translation of the left camera
+  /// since the previous frame, a late camera sees T exp(−δ (ω, v)). To first order this changes θ
+  /// by δ p, p = −(R ω, Bᵀ R v / |t|), B the tangent basis of moved_on_sphere(). A value.
+  class ExposureOffset {
+   public:
+    /// `frame`: evidence about θ at `T_camera_left`.
+    void add(const detail::Evidence& frame, const Transform& T_camera_left,
+             const Transform& T_now_before) noexcept {
+      const double length = T_camera_left.t.norm();
+      Vec5 p;
+      p << -(T_camera_left.R * log_so3(T_now_before.R)),
+          -(tangent_basis(T_camera_left.t / length).transpose() *
+            (T_camera_left.R * T_now_before.t)) /
+              length;
+      A_ += frame.A;
+      g_ += frame.g;
+      Ap_ += frame.A * p;
+      pAp_ += p.dot(frame.A * p);
+      pg_ += p.dot(frame.g);
+      gain_ += detail::gain(frame.A, frame.g);
+    }
+
+    /// Returns δ if it explains most of what the constant does not, else 0.
+    [[nodiscard]] double frames() const noexcept {
+      const Cholesky<5> factor = detail::with_prior(A_);
+      const double slope = pg_ - Ap_.dot(factor.solve(g_)),
+                   square = pAp_ - Ap_.dot(factor.solve(Ap_)),
+                   all = gain_ - g_.dot(factor.solve(g_));
+      return slope * slope > kMajority * square * all ? slope / square : 0;
+    }
+
+   private:
+    // Sums over frames; with θ_f = A⁻¹ g, `gain_` is the sum of θᵀ A θ.
+    Mat5 A_ = Mat5::Zero();
+    Vec5 g_ = Vec5::Zero(), Ap_ = Vec5::Zero();
+    double pAp_ = 0, pg_ = 0, gain_ = 0;
+  };
+
   MonitorOptions options{};
   bool valid = false;
-  Transform T_camera_left{};
-  detail::Reference reference{};
+  StereoPair pair{};
   Mat5 covariance = Mat5::Zero();
   detail::MonitorResiduals residuals{};
   detail::ChangeDetector windows{};
-  detail::ExposureOffset offset{};
+  ExposureOffset offset{};
   MonitorResult latest{};
   int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
@@ -43,19 +94,15 @@ Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
   parts_->clear();
 }
 
-bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
-                            const Pinhole& right, const Mat6& covariance) noexcept {
+bool Monitor::set_reference(const StereoPair& pair, const Mat6& covariance) noexcept {
   Parts& p = *parts_;
-  const double length = T_camera_left.t.norm();
-  const auto good = [](const Pinhole& k) {
-    return k.fx > 0 && k.fy > 0 && std::isfinite(k.fx + k.fy + k.cx + k.cy);
-  };
+  const Transform& T = pair.T_camera_left;
+  const double length = T.t.norm();
   p.valid =
-      T_camera_left.finite() && length > 0 && good(left) && good(right) && covariance.allFinite();
+      T.finite() && length > 0 && good(pair.left) && good(pair.camera) && covariance.allFinite();
   if (p.valid) {
-    const Mat32 B = tangent_basis(T_camera_left.t / length);
-    p.T_camera_left = T_camera_left;
-    p.reference = {EpipolarGeometry(T_camera_left), left, right};
+    const Mat32 B = tangent_basis(T.t / length);
+    p.pair = pair;
     Eigen::Matrix<double, 5, 6> back = Eigen::Matrix<double, 5, 6>::Zero();
     back.topLeftCorner<3, 3>().setIdentity();
     back.bottomRightCorner<2, 3>() = B.transpose() / length;
@@ -82,9 +129,9 @@ void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
 
 void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   // If most of the expected matches are missing, the few that are found are chance matches.
-  const detail::StereoResiduals stereo =
-      collapsed > 0 ? detail::StereoResiduals{}
-                    : residuals.stereo(reference, frame, options.min_matches, frame.moving);
+  const detail::StereoResiduals stereo = collapsed > 0
+                                             ? detail::StereoResiduals{}
+                                             : residuals.stereo(pair, frame, options.min_matches);
   if (!stereo.usable) return;
   if (!frame.moving) {
     watch_standing(frame, stereo);
@@ -92,7 +139,7 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   }
   standing_over = 0;
   windows.push(stereo);
-  offset.add(stereo.evidence, T_camera_left, frame.T_now_before);
+  offset.add(stereo.evidence, pair.T_camera_left, frame.T_now_before);
   latest = windows.decide();
 }
 
@@ -119,13 +166,12 @@ MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
     p.watch_matches(frame);
   }
   MonitorResult v = p.latest;
-  v.threshold = p.options.threshold;
   v.offset_frames = p.offset.frames();
   if (v.kind == Kind::quiet) {
     v.evidence = {};
     v.onset_frame = frame.frame;
   }
-  v.evidence.rotation_mrad = 1e3 * v.evidence.shift_px / p.reference.right.fx;
+  v.evidence.rotation_mrad = 1e3 * v.evidence.shift_px / p.pair.camera.fx;
   if (p.collapsed >= p.options.collapse_frames) {
     v.evidence = {};
     v.kind = Kind::collapse;

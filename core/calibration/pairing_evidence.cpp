@@ -21,10 +21,6 @@ constexpr double kReference = 0.25;
 // Threshold for one wrong decision in a million (Wald 1945); takes at least three frames.
 constexpr double kDecided = 13.8;
 
-Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
-  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
-}
-
 }  // namespace
 
 PairingEvidence::PairingEvidence(std::size_t capacity, Arena& arena)
@@ -34,8 +30,7 @@ PairingEvidence::PairingEvidence(std::size_t capacity, Arena& arena)
       early_px_(arena.make<float>(capacity, "pairing: distances, left late")) {}
 
 void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> points,
-                           const Transform& T_camera_left, const Pinhole& left,
-                           const Pinhole& camera) noexcept {
+                           const StereoPair& pair) noexcept {
   if (frame != frame_ + 1) count_ = 0;
   frame_ = frame;
   points = points.first(std::min(points.size(), before_.size()));
@@ -43,11 +38,11 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
             [](const StereoObservation& a, const StereoObservation& b) noexcept {
               return a.track < b.track;
             });
-  const EpipolarGeometry lines(T_camera_left);
+  const EpipolarGeometry lines(pair.T_camera_left);
   const auto distance = [&](const Vec2& in_left, const Vec2& in_camera) noexcept {
     double d = 0;
-    (void)lines.sampson(ray(left, in_left), ray(camera, in_camera), &d, nullptr);
-    return static_cast<float>(std::abs(d) * camera.fx);
+    (void)lines.sampson(ray(pair.left, in_left), ray(pair.camera, in_camera), &d, nullptr);
+    return static_cast<float>(std::abs(d) * pair.camera.fx);
   };
   std::size_t n = 0, both = 0;
   for (const StereoObservation& now : points) {

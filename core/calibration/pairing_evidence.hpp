@@ -26,10 +26,10 @@ class PairingEvidence {
  public:
   PairingEvidence(std::size_t capacity, Arena& arena);
 
-  /// Processes the next frame with the points that both cameras show, and sorts these by track. X_k
-  /// = T_camera_left X_left. Only frames with consecutive numbers are compared.
+  /// Processes the next frame with the points that both cameras show, and sorts these by track.
+  /// Only frames with consecutive numbers are compared.
   void next(std::uint64_t frame, std::span<StereoObservation> points,
-            const Transform& T_camera_left, const Pinhole& left, const Pinhole& camera) noexcept;
+            const StereoPair& pair) noexcept;
   /// Median distance of the newest frame's points from their epipolar lines, in px; 0 without
   /// points.
   [[nodiscard]] double distance_px() const noexcept { return distance_px_; }

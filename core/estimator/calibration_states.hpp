@@ -40,26 +40,21 @@ struct CalibrationTransition {
 
 /// All edges of the state machine; a trigger without an edge from the current state changes
 /// nothing.
-inline constexpr std::array kCalibrationTransitions = {
-    CalibrationTransition{CalibrationState::none, CalibrationTrigger::adopted,
-                          CalibrationState::unverified},
-    CalibrationTransition{CalibrationState::none, CalibrationTrigger::adopted_verified,
-                          CalibrationState::verified},
-    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::verified,
-                          CalibrationState::verified},
-    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::suspected,
-                          CalibrationState::suspect},
-    CalibrationTransition{CalibrationState::verified, CalibrationTrigger::contradicted,
-                          CalibrationState::unverified},
-    CalibrationTransition{CalibrationState::verified, CalibrationTrigger::suspected,
-                          CalibrationState::suspect},
-    CalibrationTransition{CalibrationState::suspect, CalibrationTrigger::adopted,
-                          CalibrationState::unverified},
-    CalibrationTransition{CalibrationState::suspect, CalibrationTrigger::adopted_verified,
-                          CalibrationState::verified},
-    CalibrationTransition{CalibrationState::suspect, CalibrationTrigger::kept,
-                          CalibrationState::unverified},
-};
+inline constexpr auto kCalibrationTransitions = [] {
+  using S = CalibrationState;
+  using T = CalibrationTrigger;
+  return std::to_array<CalibrationTransition>({
+      {S::none, T::adopted, S::unverified},
+      {S::none, T::adopted_verified, S::verified},
+      {S::unverified, T::verified, S::verified},
+      {S::unverified, T::suspected, S::suspect},
+      {S::verified, T::contradicted, S::unverified},
+      {S::verified, T::suspected, S::suspect},
+      {S::suspect, T::adopted, S::unverified},
+      {S::suspect, T::adopted_verified, S::verified},
+      {S::suspect, T::kept, S::unverified},
+  });
+}();
 
 [[nodiscard]] constexpr CalibrationState next_state(CalibrationState state,
                                                     CalibrationTrigger trigger) noexcept {

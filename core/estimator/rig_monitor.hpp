@@ -85,8 +85,12 @@ class RigMonitor {
  private:
   /// Monitors of one additional camera.
   struct CameraMonitors {
-    CameraMonitors(const calibration::MonitorOptions& options, std::size_t capacity, Arena& arena)
-        : monitor(options, arena), jumps(capacity, arena), pairing(capacity, arena) {}
+    CameraMonitors(std::size_t number, const calibration::MonitorOptions& options,
+                   std::size_t capacity, Arena& arena)
+        : k(number), monitor(options, arena), jumps(capacity, arena), pairing(capacity, arena) {}
+    std::size_t k;
+    // The reference; jumps may be measured against another calibration.
+    calibration::StereoPair pair{};
     calibration::Monitor monitor;
     calibration::DisparityJumpDetector jumps;
     calibration::PairingEvidence pairing;
@@ -98,45 +102,25 @@ class RigMonitor {
     Transform T_camera_left_before;
   };
 
-  [[nodiscard]] CameraMonitors& camera(int k) noexcept {
-    return *monitors_[static_cast<std::size_t>(k)];
-  }
-  [[nodiscard]] const CameraMonitors& camera(int k) const noexcept {
-    return *monitors_[static_cast<std::size_t>(k)];
-  }
-  void set_monitor_reference(int k, const Transform& T_camera_left,
-                             const Mat6& covariance) noexcept;
-  /// Result of camera k's monitor; the caller handles jumps.
-  [[nodiscard]] calibration::MonitorResult update_monitor(int k, const odometry::Odometry& odometry,
+  /// Result of the camera's monitor; the caller handles jumps.
+  [[nodiscard]] calibration::MonitorResult update_monitor(const odometry::Odometry& odometry,
                                                           const odometry::FrameOutcome& outcome,
                                                           std::uint64_t number, int found,
-                                                          bool moving) noexcept;
+                                                          bool moving, CameraMonitors* w) noexcept;
   /// Motion of the left camera since the previous monitored frame.
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Fills `stereo_` with camera k's matches. Returns the number of active points among them.
-  int collect_stereo(const odometry::Map& map, int k, int min_found) noexcept;
-  /// Adds the matches in `stereo_` to camera k's pairing evidence, and fills in whether the cameras
-  /// are in sync.
-  void update_pairing(int k, std::uint64_t number, RigAssessment* rig) noexcept;
-  /// Compares the disparities in `stereo_` with those of the previous frame.
-  [[nodiscard]] calibration::DisparityJump update_jumps(int k,
-                                                        const odometry::FrameOutcome& outcome,
-                                                        std::uint64_t number,
-                                                        const Transform& step) noexcept;
-  /// Combines camera k's results into the assessment of the rig, which is that of the worst camera.
-  void add_to_assessment(int k, calibration::MonitorResult v,
+  int collect_stereo(const odometry::Map& map, std::size_t k, int min_found) noexcept;
+  /// Combines the camera's results into the assessment of the rig, which is that of the worst one.
+  void add_to_assessment(const CameraMonitors& w, calibration::MonitorResult v,
                          const calibration::DisparityJump& jump, bool verified,
                          RigAssessment* rig) const noexcept;
-  /// Number of points that camera k should show at this pose.
-  [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
-                                    const Transform& T_left_world) const noexcept;
 
   const calibration::MonitorOptions& options_;
-  const int cameras_;
-  // Element k belongs to camera k ≥ 1; element 0 is empty.
+  // Element k belongs to camera k; those of the left camera and of cameras that the rig lacks are
+  // empty.
   std::array<std::optional<CameraMonitors>, kMaxCameras> monitors_;
   BoundedVector<calibration::StereoObservation> stereo_;
-  RigCalibration rig_{};
   bool solved_and_verified_ = false;
   std::optional<Transform> T_left_world_before_;
   bool map_rebuild_pending_ = false;

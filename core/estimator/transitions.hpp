@@ -41,36 +41,33 @@ struct Transition {
 };
 
 /// All edges of the state machine.
-inline constexpr std::array kTransitions = {
-    Transition{State::initialising, Trigger::calibration_given, State::stereo_odometry,
-               "a calibration is supplied"},
-    Transition{State::initialising, Trigger::pair_found, State::parallel_monocular,
-               "the first pair gave the initial extrinsics"},
-    Transition{State::parallel_monocular, Trigger::frames_enough, State::calibrating,
-               "enough frames to calibrate from"},
-    Transition{State::parallel_monocular, Trigger::pose_lost, State::lost,
-               "no pose for three frames"},
-    Transition{State::calibrating, Trigger::calibration_accepted, State::stereo_odometry,
-               "the calibration is accepted"},
-    Transition{State::calibrating, Trigger::calibration_rejected, State::parallel_monocular,
-               "the calibration is rejected"},
-    Transition{State::calibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
-    Transition{State::stereo_odometry, Trigger::rig_changed, State::recalibrating,
-               "the rig no longer fits its calibration"},
-    Transition{State::stereo_odometry, Trigger::requested, State::recalibrating,
-               "a recalibration was requested"},
-    Transition{State::stereo_odometry, Trigger::pose_lost, State::lost, "no pose for three frames"},
-    Transition{State::recalibrating, Trigger::calibration_accepted, State::stereo_odometry,
-               "the new calibration is accepted"},
-    Transition{State::recalibrating, Trigger::calibration_kept, State::stereo_odometry,
-               "the calibration in use fits as well as a new one"},
-    Transition{State::recalibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
-    Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "relocalised"},
-    Transition{State::lost, Trigger::pose_found_suspect, State::recalibrating,
-               "relocalised; the rig is still suspect"},
-    Transition{State::lost, Trigger::pose_found_uncalibrated, State::initialising,
-               "relocalised, without a calibration"},
-};
+inline constexpr auto kTransitions = [] {
+  using S = State;
+  using T = Trigger;
+  return std::to_array<Transition>({
+      {S::initialising, T::calibration_given, S::stereo_odometry, "a calibration is supplied"},
+      {S::initialising, T::pair_found, S::parallel_monocular,
+       "the first pair gave the initial extrinsics"},
+      {S::parallel_monocular, T::frames_enough, S::calibrating, "enough frames to calibrate from"},
+      {S::parallel_monocular, T::pose_lost, S::lost, "no pose for three frames"},
+      {S::calibrating, T::calibration_accepted, S::stereo_odometry, "the calibration is accepted"},
+      {S::calibrating, T::calibration_rejected, S::parallel_monocular,
+       "the calibration is rejected"},
+      {S::calibrating, T::pose_lost, S::lost, "no pose for three frames"},
+      {S::stereo_odometry, T::rig_changed, S::recalibrating,
+       "the rig no longer fits its calibration"},
+      {S::stereo_odometry, T::requested, S::recalibrating, "a recalibration was requested"},
+      {S::stereo_odometry, T::pose_lost, S::lost, "no pose for three frames"},
+      {S::recalibrating, T::calibration_accepted, S::stereo_odometry,
+       "the new calibration is accepted"},
+      {S::recalibrating, T::calibration_kept, S::stereo_odometry,
+       "the calibration in use fits as well as a new one"},
+      {S::recalibrating, T::pose_lost, S::lost, "no pose for three frames"},
+      {S::lost, T::pose_found, S::stereo_odometry, "relocalised"},
+      {S::lost, T::pose_found_suspect, S::recalibrating, "relocalised; the rig is still suspect"},
+      {S::lost, T::pose_found_uncalibrated, S::initialising, "relocalised, without a calibration"},
+  });
+}();
 
 /// Returns the edge of this trigger in this state, or nullptr if the trigger has no effect.
 [[nodiscard]] constexpr const Transition* find_transition(State state, Trigger trigger) noexcept {

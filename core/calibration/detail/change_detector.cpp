@@ -20,7 +20,60 @@ constexpr double kRelease = 0.5;
 // Ratio of gains by which a drift must exceed a knock. The best step explains 8/9 of a ramp; this
 // is the middle between that and a ramp that explains nothing more, on a logarithmic scale.
 constexpr double kRampGain = 1.06;
+// Ratio to the expected scatter above which a block's offset is a change of the rig.
+constexpr double kMaxOfExpected = 20;
+// Length of the running mean, in blocks: half a minute at 30 Hz.
+constexpr std::uint64_t kMaxBlocks = 60;
+
 }  // namespace
+
+bool EvidenceHistory::push(const Entry& entry) noexcept {
+  recent_[count_ % kRecent] = entry;
+  if (count_ % kBlock == 0) open_ = Entry{entry.frame, {}};
+  open_.evidence.add(entry.evidence);
+  ++count_;
+  return count_ % kBlock == 0;
+}
+
+void EvidenceHistory::close_block() noexcept {
+  if (closed_ >= kBlocks) total_.add(blocks_[closed_ % kBlocks].evidence, -1.0);
+  total_.add(open_.evidence);
+  blocks_[closed_ % kBlocks] = open_;
+  ++closed_;
+  open_ = Entry{};
+}
+
+void EvidenceHistory::sum_newest(std::size_t frames, Evidence* sum) const noexcept {
+  *sum = open_.evidence;
+  const std::size_t open = open_frames();
+  const std::size_t count =
+      std::min((frames - std::min(frames, open) + kBlock - 1) / kBlock, blocks());
+  for (std::size_t i = 0; i < count; ++i) sum->add(block(i).evidence);
+}
+
+Evidence EvidenceHistory::total() const noexcept {
+  Evidence sum = total_;
+  sum.add(open_.evidence);
+  return sum;
+}
+
+void BlockScatter::add(const Evidence& block, const Evidence& past, double lambda) noexcept {
+  if (!(block.n > 0) || !(past.n > 0)) return;
+  const Cholesky<5> of_block(block.A), of_past(past.A);
+  if (!of_block.ok() || !of_past.ok()) return;
+  const Vec5 d = of_block.solve(block.g) - of_past.solve(past.g);
+  const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
+  const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
+  const double limit = kMaxOfExpected * std::max(variance(), lambda / block.n);
+  // The comparison also rejects NaN.
+  if (!(scatter < limit)) return;
+  if (blocks_ == kMaxBlocks) {
+    sum_ -= sum_ / static_cast<double>(blocks_);
+    --blocks_;
+  }
+  sum_ += scatter;
+  ++blocks_;
+}
 
 void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
   options_ = options;
@@ -148,7 +201,6 @@ double ChangeDetector::single(const Evidence& frame, double spread) const noexce
 
 MonitorResult ChangeDetector::decide() noexcept {
   MonitorResult d;
-  d.threshold = options_.threshold;
   const std::size_t count = history_.frames();
   if (count == 0) return d;
   d.onset_frame = history_.recent(0).frame;

@@ -13,10 +13,6 @@ namespace {
 // for Gaussian errors at kTukey.
 constexpr double kTukeySpread = 1.46;
 
-Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
-  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
-}
-
 double tukey(double squared, double limit) noexcept {
   const double u = 1.0 - squared / (limit * limit);
   return u > 0 ? u * u : 0.0;
@@ -28,16 +24,17 @@ void MonitorResiduals::reset() noexcept {
   for (Memory& m : memories_) m.used = false;
 }
 
-StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame& frame,
-                                         int min_matches, bool follow) noexcept {
-  const double f = 0.5 * (c.right.fx + c.right.fy);
+StereoResiduals MonitorResiduals::stereo(const StereoPair& pair, const MonitorFrame& frame,
+                                         int min_matches) noexcept {
+  const EpipolarGeometry epipolar(pair.T_camera_left);
+  const double f = 0.5 * (pair.camera.fx + pair.camera.fy);
   rows_ = 0;
   for (const StereoObservation& s : frame.stereo) {
     if (rows_ == kMaxObservations) break;
     if (!(s.sigma_px > 0) || !s.left.allFinite() || !s.right.allFinite()) continue;
     StereoRow& row = stereo_[rows_];
-    const Vec2 left = ray(c.left, s.left), right = ray(c.right, s.right);
-    if (!c.epipolar.to_line(left, right, &row.r, &row.J)) continue;
+    if (!epipolar.to_line(ray(pair.left, s.left), ray(pair.camera, s.right), &row.r, &row.J))
+      continue;
     row.r *= f;
     row.J *= f;
     // The errors of both images add up across the line.
@@ -72,7 +69,7 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
   result.usable =
       std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
                     [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
-  measure_spread(result.evidence, fit, follow && result.usable, &result);
+  measure_spread(result.evidence, fit, frame.moving && result.usable, &result);
   return result;
 }
 

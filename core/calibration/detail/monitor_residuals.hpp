@@ -4,17 +4,11 @@
 
 #include "core/calibration/detail/monitor_evidence.hpp"
 #include "core/calibration/monitor.hpp"
-#include "core/geometry/epipolar.hpp"
 
 namespace vergence::calibration::detail {
 
 /// Maximum number of observations of a frame; further ones are left out.
 inline constexpr std::size_t kMaxObservations = 1024;
-
-struct Reference {
-  EpipolarGeometry epipolar{Transform{}};
-  Pinhole left{}, right{};
-};
 
 /// Evidence from one frame's stereo matches.
 struct StereoResiduals {
@@ -37,10 +31,10 @@ struct StereoResiduals {
 class MonitorResiduals {
  public:
   void reset() noexcept;
-  /// `follow`: accumulate each track's gradient for spread_life. False at standstill, where tracks
-  /// do not end.
-  [[nodiscard]] StereoResiduals stereo(const Reference& reference, const MonitorFrame& frame,
-                                       int min_matches, bool follow) noexcept;
+  /// Each track's gradient is accumulated for spread_life, but not at standstill, where tracks do
+  /// not end.
+  [[nodiscard]] StereoResiduals stereo(const StereoPair& pair, const MonitorFrame& frame,
+                                       int min_matches) noexcept;
 
  private:
   struct StereoRow {
