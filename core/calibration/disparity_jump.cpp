@@ -39,10 +39,7 @@ void sort_into(std::span<const StereoObservation> stereo,
   into->clear();
   for (const StereoObservation& s : stereo)
     if (!into->push(s)) break;
-  std::sort(into->begin(), into->end(),
-            [](const StereoObservation& a, const StereoObservation& b) noexcept {
-              return a.track < b.track;
-            });
+  std::ranges::sort(*into, {}, &StereoObservation::track);
 }
 
 }  // namespace
@@ -66,14 +63,14 @@ void DisparityJumpDetector::skip(const Transform& T_now_previous) noexcept {
   if (++skipped_ > kMaxSkipped) before_.clear();
 }
 
-bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObservation& now,
-                                const Transform& T_now_previous, Row* out) const noexcept {
+void DisparityJumpDetector::add_row(const StereoObservation& before, const StereoObservation& now,
+                                    const Transform& T_now_previous) noexcept {
   const Transform& T = pair_.T_camera_left;
   const Vec3 a = ray(pair_.left, before.left).homogeneous();
   const double depth = triangulated_depth(a, ray(pair_.camera, before.right).homogeneous(), T);
-  if (!(depth > 0)) return false;
+  if (!(depth > 0)) return;
   const Vec3 moved = T_now_previous * Vec3(depth * a);
-  if (!(moved.z() > 0)) return false;
+  if (!(moved.z() > 0)) return;
   const Vec3 other = T * moved;
   const Mat23 G = derivative(pair_.camera, other);
   const Vec2 predicted = project(pair_.camera, other) - project(pair_.left, moved);
@@ -81,20 +78,19 @@ bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObs
   // Direction of the epipolar line, along which the point moves in the other image with its depth.
   const Vec2 farther = G * (T.R * moved);
   const double length = farther.norm();
-  if (!(length > 0)) return false;
+  if (!(length > 0)) return;
   const Vec2 direction = farther / length;
-  out->e = direction.dot(now.right - now.left - predicted);
-  out->along = direction.dot(by_depth);
-  return std::isfinite(out->e) && std::isfinite(out->along);
+  const Row row{direction.dot(now.right - now.left - predicted), direction.dot(by_depth)};
+  if (std::isfinite(row.e) && std::isfinite(row.along)) (void)rows_.push(row);
 }
 
-DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
+DisparityJump DisparityJumpDetector::fit() noexcept {
   DisparityJump jump;
-  if (rows.size() < kMinTracksOfFrame) return jump;
+  if (rows_.size() < kMinTracksOfFrame) return jump;
   double s = 0, along = 0, scale = 0, variance = 0;
   const auto median_by = [&](auto value) noexcept {
-    for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
-    return median(scratch_.first(rows.size()));
+    for (std::size_t i = 0; i < rows_.size(); ++i) scratch_[i] = value(rows_[i]);
+    return median(scratch_.first(rows_.size()));
   };
   s = median_by([](const Row& r) noexcept { return r.e; });
   for (int k = 0; k < kReweightings; ++k) {
@@ -102,7 +98,7 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
                                   return std::abs(r.e - s - along * r.along);
                                 }) / kMedianOfNormal);
     double w = 0, wa = 0, waa = 0, we = 0, wae = 0;
-    for (const Row& r : rows) {
+    for (const Row& r : rows_) {
       const double u = (r.e - s - along * r.along) / (kTukey * scale);
       if (std::abs(u) >= 1) continue;
       const double weight = (1 - u * u) * (1 - u * u);
@@ -161,17 +157,17 @@ DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
   const Transform T_now_before = T_now_previous * T_now_before_;
   T_now_before_ = {};
   skipped_ = 0;
-  std::size_t rows = 0;
+  rows_.clear();
   for (std::size_t i = 0, j = 0; i < before_.size() && j < now_.size();) {
     if (before_[i].track < now_[j].track) {
       ++i;
     } else if (now_[j].track < before_[i].track) {
       ++j;
-    } else if (row(before_[i++], now_[j++], T_now_before, &rows_[rows])) {
-      ++rows;
+    } else {
+      add_row(before_[i++], now_[j++], T_now_before);
     }
   }
-  DisparityJump jump = fit(rows_.first(rows));
+  DisparityJump jump = fit();
   evaluate(frame, &jump);
   std::swap(before_, now_);
   return jump;

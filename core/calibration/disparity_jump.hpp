@@ -44,6 +44,7 @@ struct DisparityJump {
 /// Threads  One caller. Time: linear, except for sorting the tracks.
 class DisparityJumpDetector {
  public:
+  DisparityJumpDetector() = default;
   DisparityJumpDetector(std::size_t capacity, Arena& arena);
 
   /// Sets the calibration in use, and clears the previous frame.
@@ -82,9 +83,10 @@ class DisparityJumpDetector {
     // Derivative of `e` with respect to an error of the motion along the optical axis, in px/m.
     double along = 0;
   };
-  [[nodiscard]] bool row(const StereoObservation& before, const StereoObservation& now,
-                         const Transform& T_now_previous, Row* out) const noexcept;
-  [[nodiscard]] DisparityJump fit(std::span<Row> rows) noexcept;
+  /// Adds the row of a track; a track that measures nothing has none.
+  void add_row(const StereoObservation& before, const StereoObservation& now,
+               const Transform& T_now_previous) noexcept;
+  [[nodiscard]] DisparityJump fit() noexcept;
   void evaluate(std::uint64_t frame, DisparityJump* jump) noexcept;
 
   /// A shift that waits for the next frame.
@@ -98,7 +100,7 @@ class DisparityJumpDetector {
   StereoPair pair_{};
   // Observations, sorted by track.
   BoundedVector<StereoObservation> before_, now_;
-  std::span<Row> rows_;
+  BoundedVector<Row> rows_;
   std::span<double> scratch_;
   // Motion over the frames skipped since before_.
   Transform T_now_before_{};

@@ -11,6 +11,7 @@
 #include "core/math/angle.hpp"
 #include "core/math/robust.hpp"
 #include "core/math/so3.hpp"
+#include "core/memory/fixed_vector.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -54,30 +55,23 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
 
 constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
 
-/// Calls `each` for at most the newest kHeldOutFrames frames whose number is above `after` and at
-/// most `last`.
-template <class Each>
-void for_newest(const TrackLog& log, std::uint64_t after, std::uint64_t last, Each each) noexcept {
-  std::size_t n = 0;
-  for (std::size_t i = log.size(); i-- > 0 && n < kHeldOutFrames && log.frame(i).number > after;) {
-    if (log.frame(i).number > last) continue;
-    each(log.frame(i));
-    ++n;
-  }
+/// At most the newest kHeldOutFrames frames whose number is above `after` and at most `last`, the
+/// newest one first.
+FixedVector<const LoggedFrame*, kHeldOutFrames> newest_frames(
+    const TrackLog& log, std::uint64_t after, std::uint64_t last = kNoLimit) noexcept {
+  FixedVector<const LoggedFrame*, kHeldOutFrames> frames;
+  for (std::size_t i = log.size(); i-- > 0 && !frames.full() && log.frame(i).number > after;)
+    if (log.frame(i).number <= last) (void)frames.push(&log.frame(i));
+  return frames;
 }
 
-/// Fit of camera k on the newest frames after frame number `after` and up to `last`.
-HeldOut fit_on(const TrackLog& log, std::uint64_t after, std::uint64_t last,
+/// Fit of camera k on these frames.
+HeldOut fit_on(const FixedVector<const LoggedFrame*, kHeldOutFrames>& frames,
                const RigCalibration& rig, int k) noexcept {
-  std::array<double, kHeldOutFrames> medians;
-  std::size_t n = 0;
-  for_newest(log, after, last, [&](const LoggedFrame& f) noexcept {
-    if (const double m = median_distance(f, rig, k); m >= 0) medians[n++] = m;
-  });
-  HeldOut h;
-  h.frames = static_cast<int>(n);
-  if (n > 0) h.median_px = median(std::span(medians).first(n));
-  return h;
+  FixedVector<double, kHeldOutFrames> medians;
+  for (const LoggedFrame* f : frames)
+    if (const double m = median_distance(*f, rig, k); m >= 0) (void)medians.push(m);
+  return {static_cast<int>(medians.size()), medians.empty() ? 0 : median(medians.span())};
 }
 
 /// Returns true if held-out frames contradict any camera of `rig`, compared with the fit of
@@ -85,9 +79,9 @@ HeldOut fit_on(const TrackLog& log, std::uint64_t after, std::uint64_t last,
 bool misfits(const TrackLog& log, std::uint64_t newest, const RigCalibration& solved,
              const RigCalibration& rig, double pixel_sigma) noexcept {
   for (int k = 1; k < solved.cameras; ++k) {
-    const HeldOut fit = fit_on(log, newest, kNoLimit, rig, k);
+    const HeldOut fit = fit_on(newest_frames(log, newest), rig, k);
     if (fit.frames < kMinForMean) continue;
-    const double used = fit_on(log, 0, newest, solved, k).median_px;
+    const double used = fit_on(newest_frames(log, 0, newest), solved, k).median_px;
     if (fit.median_px > kUnusualRatio * std::min(std::max(used, pixel_sigma), kMaxFitPx))
       return true;
   }
@@ -113,37 +107,35 @@ double angle_between(const Vec3& a, const Vec3& b) noexcept {
 HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
   HeldOut worst;
   for (int k = 1; k < rig.cameras; ++k) {
-    const HeldOut fit = fit_on(log, after, kNoLimit, rig, k);
+    const HeldOut fit = fit_on(newest_frames(log, after), rig, k);
     if (k == 1 || fit.median_px > worst.median_px) worst = fit;
   }
   return worst;
 }
 
 bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
-  int n = 0;
-  for_newest(log, after, kNoLimit, [&n](const LoggedFrame&) noexcept { ++n; });
-  return n >= kMinForMean;
+  return newest_frames(log, after).size() >= static_cast<std::size_t>(kMinForMean);
 }
 
 bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
                  const RigCalibration& worse, double chance) noexcept {
   double sum = 0, squares = 0;
   int n = 0;
-  for_newest(log, after, kNoLimit, [&](const LoggedFrame& f) noexcept {
+  for (const LoggedFrame* f : newest_frames(log, after)) {
     double gain = 0;
     bool compared = false;
     for (int k = 1; k < better.cameras; ++k) {
-      const double a = median_distance(f, worse, k), b = median_distance(f, better, k);
+      const double a = median_distance(*f, worse, k), b = median_distance(*f, better, k);
       // A calibration without enough matches in this frame cannot be compared.
       if (a < 0 || b < 0) continue;
       gain += a - b;
       compared = true;
     }
-    if (!compared) return;
+    if (!compared) continue;
     sum += gain;
     squares += gain * gain;
     ++n;
-  });
+  }
   if (n < kMinForMean) return true;
   const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
   return mean > chance * std::sqrt(variance / (n - 1));
@@ -234,10 +226,7 @@ double depth_excess(const RigCalibration& rig, const CalibrationOptions& o,
   return worst / o.usable_depth_percent;
 }
 
-namespace {
-
-/// Gates that need no frames but those of the solve.
-Gate check_solution(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
+Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;
   for (int k = 1; k < s.rig.cameras; ++k) {
@@ -254,14 +243,9 @@ Gate check_solution(const AcceptanceInput& q, const CalibrationOptions& o) noexc
   }
   if (s.travelled_m < kMinBaselinesTravelled * s.rig.baseline) return Gate::needs_motion;
   if (s.near < o.min_near_points) return Gate::needs_near_structure;
-  return depth_excess(s.rig, o, q.pixel_sigma) > 1 ? Gate::depth_unknown : Gate::open;
-}
+  if (depth_excess(s.rig, o, q.pixel_sigma) > 1) return Gate::depth_unknown;
 
-}  // namespace
-
-Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
-  const RigSolution& s = *q.solution;
-  if (const Gate gate = check_solution(q, o); gate != Gate::open) return gate;
+  // The gates below need frames that are not in the solve.
   if (q.log == nullptr) return Gate::open;
   if (misfits(*q.log, s.newest, s.rig, s.rig, q.pixel_sigma)) return Gate::does_not_fit;
   if (q.in_use == nullptr || !q.must_be_better || fits_better(*q.log, s.newest, s.rig, *q.in_use))

@@ -34,12 +34,15 @@ struct CovisiblePoint {
   Vec2 by_depth = Vec2::Zero();
 };
 
-/// Calls each(place) for those points of a grid that both cameras see at a depth.
-template <class Each>
-void for_places(const RigCalibration& rig, int k, double depth_m, Each each) noexcept {
-  const auto c = static_cast<std::size_t>(k);
-  const Transform& T = rig.T_camera_left[c];
-  const Camera left(rig.intrinsics[0]), right(rig.intrinsics[c]);
+/// Root mean square, in percent, of what square(place, &value) gives for those points of a grid
+/// that both cameras see at a depth; 0 without any. Points for which it returns false do not count.
+template <class Square>
+double rms_percent(const RigCalibration& rig, std::size_t k, double depth_m,
+                   Square square) noexcept {
+  const Transform& T = rig.T_camera_left[k];
+  const Camera left(rig.intrinsics[0]), right(rig.intrinsics[k]);
+  double sum = 0;
+  int seen = 0;
   for (int row = 0; row < kDepthGrid; ++row) {
     for (int column = 0; column < kDepthGrid; ++column) {
       CovisiblePoint p;
@@ -53,9 +56,13 @@ void for_places(const RigCalibration& rig, int k, double depth_m, Each each) noe
       if (right.project(p.X, &p.at, &p.G) != ProjectStatus::ok || !right.inside(p.at, 0.0))
         continue;
       p.by_depth = p.G * (T.R * p.ray);
-      if (p.by_depth.squaredNorm() > 0) each(p);
+      double value = 0;
+      if (!(p.by_depth.squaredNorm() > 0) || !square(p, &value)) continue;
+      sum += value;
+      ++seen;
     }
   }
+  return seen == 0 ? 0.0 : 100.0 * std::sqrt(std::max(0.0, sum / seen));
 }
 
 /// Derivatives of a relative depth with respect to a rig's parameters, as rows of RigCovariance and
@@ -144,28 +151,22 @@ std::string_view to_string(CalibrationRating rating) noexcept {
 double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept {
   const auto c = static_cast<std::size_t>(k);
   const bool joint = !rig.covariance.empty();
-  double sum = 0;
-  int seen = 0;
-  for_places(rig, k, depth_m, [&](const CovisiblePoint& p) noexcept {
-    sum += depth_variance(rig, c, depth_gradient(p, rig.T_camera_left[c], k, joint), joint);
-    ++seen;
+  return rms_percent(rig, c, depth_m, [&](const CovisiblePoint& p, double* variance) noexcept {
+    *variance = depth_variance(rig, c, depth_gradient(p, rig.T_camera_left[c], k, joint), joint);
+    return true;
   });
-  return seen == 0 ? 0.0 : 100.0 * std::sqrt(std::max(0.0, sum / seen));
 }
 
 double depth_error_percent(const RigCalibration& measured, const RigCalibration& current, int k,
                            double depth_m) noexcept {
   const auto c = static_cast<std::size_t>(k);
   const Camera left(current.intrinsics[0]), right(current.intrinsics[c]);
-  double sum = 0;
-  int seen = 0;
-  for_places(measured, k, depth_m, [&](const CovisiblePoint& p) noexcept {
+  return rms_percent(measured, c, depth_m, [&](const CovisiblePoint& p, double* square) noexcept {
     double relative = 0;
-    if (!depth_difference(left, right, current.T_camera_left[c], p, &relative)) return;
-    sum += relative * relative;
-    ++seen;
+    if (!depth_difference(left, right, current.T_camera_left[c], p, &relative)) return false;
+    *square = relative * relative;
+    return true;
   });
-  return seen == 0 ? 0.0 : 100.0 * std::sqrt(sum / seen);
 }
 
 double reference_depth_m(const RigCalibration& rig, int k, const CalibrationOptions& options,

@@ -65,6 +65,76 @@ struct Monitor::Parts {
     double pAp_ = 0, pg_ = 0, gain_ = 0;
   };
 
+  void clear() noexcept {
+    residuals.reset();
+    windows.reset(options, covariance);
+    offset = {};
+    latest = MonitorResult{};
+    collapsed = standing_over = 0;
+  }
+
+  MonitorResult update(const MonitorFrame& frame) noexcept {
+    if (valid) {
+      watch_collapse(frame);
+      watch_matches(frame);
+    }
+    MonitorResult v = latest;
+    v.offset_frames = offset.frames();
+    if (v.kind == Kind::quiet) {
+      v.evidence = {};
+      v.onset_frame = frame.frame;
+    }
+    v.evidence.rotation_mrad = 1e3 * v.evidence.shift_px / pair.camera.fx;
+    if (collapsed >= options.collapse_frames) {
+      v.evidence = {};
+      v.kind = Kind::collapse;
+      v.onset_frame = collapsed_from;
+    }
+    return v;
+  }
+
+  void watch_collapse(const MonitorFrame& frame) noexcept {
+    const bool missing = frame.expected_stereo >= options.collapse_expected &&
+                         frame.found_stereo < options.collapse_share * frame.expected_stereo;
+    if (missing && collapsed == 0) collapsed_from = frame.frame;
+    // A frame without expected matches (night, a covered lens) does not count.
+    if (missing)
+      ++collapsed;
+    else if (frame.expected_stereo >= options.collapse_expected)
+      collapsed = 0;
+  }
+
+  void watch_matches(const MonitorFrame& frame) noexcept {
+    // If most of the expected matches are missing, the few that are found are chance matches.
+    const detail::StereoResiduals stereo = collapsed > 0
+                                               ? detail::StereoResiduals{}
+                                               : residuals.stereo(pair, frame, options.min_matches);
+    if (!stereo.usable) return;
+    if (!frame.moving) {
+      watch_standing(frame, stereo);
+      return;
+    }
+    standing_over = 0;
+    windows.push(stereo);
+    offset.add(stereo.evidence, pair.T_camera_left, frame.T_now_before);
+    latest = windows.decide();
+  }
+
+  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& stereo) noexcept {
+    // Keep what moving frames have detected.
+    if (latest.kind != Kind::quiet && standing_over < options.collapse_frames) return;
+    latest.statistic = windows.single(stereo.evidence, stereo.spread_now);
+    latest.evidence = {0.5 * latest.statistic, detail::shift_px(stereo.evidence), 0};
+    if (latest.statistic > options.threshold) {
+      if (standing_over++ == 0) standing_from = frame.frame;
+    } else {
+      standing_over = 0;
+    }
+    latest.kind = standing_over >= options.collapse_frames ? Kind::knock : Kind::quiet;
+    latest.undecided = standing_over > 0 && standing_over < options.collapse_frames;
+    latest.onset_frame = standing_from;
+  }
+
   MonitorOptions options{};
   bool valid = false;
   StereoPair pair{};
@@ -75,17 +145,6 @@ struct Monitor::Parts {
   MonitorResult latest{};
   int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
-
-  void clear() noexcept {
-    residuals.reset();
-    windows.reset(options, covariance);
-    offset = {};
-    latest = MonitorResult{};
-    collapsed = standing_over = 0;
-  }
-  void watch_collapse(const MonitorFrame& frame) noexcept;
-  void watch_matches(const MonitorFrame& frame) noexcept;
-  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& stereo) noexcept;
 };
 
 Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
@@ -116,68 +175,6 @@ void Monitor::expect_scatter(double bias_px) noexcept { parts_->windows.expect_s
 
 void Monitor::reset() noexcept { parts_->clear(); }
 
-void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
-  const bool missing = frame.expected_stereo >= options.collapse_expected &&
-                       frame.found_stereo < options.collapse_share * frame.expected_stereo;
-  if (missing && collapsed == 0) collapsed_from = frame.frame;
-  // A frame without expected matches (night, a covered lens) does not count.
-  if (missing)
-    ++collapsed;
-  else if (frame.expected_stereo >= options.collapse_expected)
-    collapsed = 0;
-}
-
-void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
-  // If most of the expected matches are missing, the few that are found are chance matches.
-  const detail::StereoResiduals stereo = collapsed > 0
-                                             ? detail::StereoResiduals{}
-                                             : residuals.stereo(pair, frame, options.min_matches);
-  if (!stereo.usable) return;
-  if (!frame.moving) {
-    watch_standing(frame, stereo);
-    return;
-  }
-  standing_over = 0;
-  windows.push(stereo);
-  offset.add(stereo.evidence, pair.T_camera_left, frame.T_now_before);
-  latest = windows.decide();
-}
-
-void Monitor::Parts::watch_standing(const MonitorFrame& frame,
-                                    const detail::StereoResiduals& stereo) noexcept {
-  // Keep what moving frames have detected.
-  if (latest.kind != Kind::quiet && standing_over < options.collapse_frames) return;
-  latest.statistic = windows.single(stereo.evidence, stereo.spread_now);
-  latest.evidence = {0.5 * latest.statistic, detail::shift_px(stereo.evidence), 0};
-  if (latest.statistic > options.threshold) {
-    if (standing_over++ == 0) standing_from = frame.frame;
-  } else {
-    standing_over = 0;
-  }
-  latest.kind = standing_over >= options.collapse_frames ? Kind::knock : Kind::quiet;
-  latest.undecided = standing_over > 0 && standing_over < options.collapse_frames;
-  latest.onset_frame = standing_from;
-}
-
-MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
-  Parts& p = *parts_;
-  if (p.valid) {
-    p.watch_collapse(frame);
-    p.watch_matches(frame);
-  }
-  MonitorResult v = p.latest;
-  v.offset_frames = p.offset.frames();
-  if (v.kind == Kind::quiet) {
-    v.evidence = {};
-    v.onset_frame = frame.frame;
-  }
-  v.evidence.rotation_mrad = 1e3 * v.evidence.shift_px / p.pair.camera.fx;
-  if (p.collapsed >= p.options.collapse_frames) {
-    v.evidence = {};
-    v.kind = Kind::collapse;
-    v.onset_frame = p.collapsed_from;
-  }
-  return v;
-}
+MonitorResult Monitor::update(const MonitorFrame& frame) noexcept { return parts_->update(frame); }
 
 }  // namespace vergence::calibration

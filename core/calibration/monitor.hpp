@@ -137,6 +137,7 @@ struct MonitorResult {
 /// Errors   None; values that are not finite are left out.
 class Monitor {
  public:
+  Monitor() = default;
   Monitor(const MonitorOptions& options, Arena& arena);
 
   /// Sets the calibration to test and clears all evidence.
@@ -158,7 +159,7 @@ class Monitor {
  private:
   struct Parts;
   // Constructed in the arena.
-  Parts* parts_;
+  Parts* parts_ = nullptr;
 };
 
 }  // namespace vergence::calibration

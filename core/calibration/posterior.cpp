@@ -1,7 +1,6 @@
 #include "core/calibration/posterior.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -56,13 +55,10 @@ RigCovariance noise_only(const RigCovariance& wide) noexcept {
     // Earlier parameters determine this one if only rounding is left of its variance.
     constexpr double rounding = kRigSize * std::numeric_limits<double>::epsilon();
     if (!wide.known(held) || !(variance > rounding * wide(held, held))) continue;
-    std::array<double, kRigSize> with_held;
-    for (int r = 0; r < kRigSize; ++r) with_held[static_cast<std::size_t>(r)] = noise(r, held);
+    const RigCovariance before = noise;
     for (int r = 0; r < kRigSize; ++r)
       for (int c = 0; c <= r; ++c)
-        noise.set(r, c,
-                  noise(r, c) - with_held[static_cast<std::size_t>(r)] *
-                                    with_held[static_cast<std::size_t>(c)] / variance);
+        noise.set(r, c, before(r, c) - before(r, held) * before(c, held) / variance);
   }
   return noise;
 }

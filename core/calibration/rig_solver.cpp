@@ -305,14 +305,6 @@ BundleResult RigSolver::adjust(const BundleOptions& how) noexcept {
   return adjuster_.solve(problem, how);
 }
 
-double RigSolver::residual_scale() noexcept {
-  const std::size_t n = observations_.size();
-  std::copy_n(residuals_.begin(), n, sorted_.begin());
-  // The median of χ² with two degrees of freedom is 2 ln 2.
-  return std::max(
-      0.2, std::sqrt(0.5 * static_cast<double>(median(sorted_.first(n))) / std::numbers::ln2));
-}
-
 void RigSolver::drop_outliers(double limit) noexcept {
   std::size_t kept = 0, begin = 0;
   while (begin < observations_.size()) {
@@ -333,7 +325,11 @@ void RigSolver::drop_outliers(double limit) noexcept {
 }
 
 BundleResult RigSolver::readjust(BundleOptions how, bool last, double tolerance_sigmas) noexcept {
-  const double scale = residual_scale();
+  const std::size_t n = observations_.size();
+  std::copy_n(residuals_.begin(), n, sorted_.begin());
+  // The median of χ² with two degrees of freedom is 2 ln 2.
+  const double scale = std::max(
+      0.2, std::sqrt(0.5 * static_cast<double>(median(sorted_.first(n))) / std::numbers::ln2));
   drop_outliers(kOutlierSigmas * scale);
   how.loss = BundleLoss::cauchy;
   how.loss_threshold = kLossThreshold * scale;
@@ -368,7 +364,6 @@ void RigSolver::describe(RigSolution* s) const noexcept {
     if ((poses_[o.pose] * points_[o.point]).z() < options_.near_baselines * s->rig.baseline)
       ++s->near;
   }
-  s->observations = static_cast<int>(observations_.size());
 }
 
 double RigSolver::length_noise(const BundleResult& r) const noexcept {
@@ -386,35 +381,6 @@ double RigSolver::length_noise(const BundleResult& r) const noexcept {
   const double white = r.covariance_white[1](1, 1), clustered = r.covariance_noise[1](1, 1);
   const double inflation = white > 0 ? std::max(1.0, clustered / white) : 1.0;
   return std::sqrt(std::max(0.0, believed * r.sigma0_squared * inflation)) / driven;
-}
-
-void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexcept {
-  // Scale error of the path from uncertain intrinsics: half of the relative error of the focal
-  // lengths, and 0.31 % per mrad of error of the principal points.
-  constexpr double kScaleByFocal = 0.5, kScaleByRadian = 3.1;
-  RigCalibration& rig = s->rig;
-  for (std::size_t k = 0; k < count_; ++k) {
-    Intrinsics& lens = rig.intrinsics[k];
-    lens = cameras_[k].intrinsics();
-    // Sigmas of intrinsics that were not estimated stay.
-    for (std::size_t i = 0; i < kIntrinsicsSize; ++i)
-      if (const double sigma = r.intrinsics_sigma[k][i]; sigma > 0)
-        (i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4]) = sigma;
-    if (k == 0) continue;
-    rig.T_camera_left[k] = {normalised(T_camera_left_[k].R), T_camera_left_[k].t};
-    rig.covariance_total[k] = r.covariance_total[k];
-    rig.sigma_noise[k] = sigmas(r.covariance_noise[k]);
-    rig.sigma_total[k] = sigmas(r.covariance_total[k]);
-  }
-  rig.covariance = r.covariance;
-  rig.inflation = r.inflation;
-  rig.frames = s->frames;
-  rig.found = log_.frame(log_.size() - 1).stamp;
-  rig.reprojection_px = r.rms_px;
-  const double focal = options_.focal_sigma_percent * 0.01,
-               centre = options_.principal_point_sigma_px / rig.intrinsics[0].fx;
-  const double noise = length_noise(r);
-  rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 
 /// Runs the monitors of one camera over the frames used, with the result as the reference, to
@@ -462,8 +428,34 @@ bool RigSolver::finish(const BundleResult& r, RigSolution* s) noexcept {
     return false;
   }
   s->status = r.has_covariance ? RigSolveStatus::ok : RigSolveStatus::not_observable;
-  if (s->status == RigSolveStatus::ok) write_result(r, s);
-  return s->status == RigSolveStatus::ok;
+  if (!r.has_covariance) return false;
+  // Scale error of the path from uncertain intrinsics: half of the relative error of the focal
+  // lengths, and 0.31 % per mrad of error of the principal points.
+  constexpr double kScaleByFocal = 0.5, kScaleByRadian = 3.1;
+  RigCalibration& rig = s->rig;
+  for (std::size_t k = 0; k < count_; ++k) {
+    Intrinsics& lens = rig.intrinsics[k];
+    lens = cameras_[k].intrinsics();
+    // Sigmas of intrinsics that were not estimated stay.
+    for (std::size_t i = 0; i < kIntrinsicsSize; ++i)
+      if (const double sigma = r.intrinsics_sigma[k][i]; sigma > 0)
+        (i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4]) = sigma;
+    if (k == 0) continue;
+    rig.T_camera_left[k] = {normalised(T_camera_left_[k].R), T_camera_left_[k].t};
+    rig.covariance_total[k] = r.covariance_total[k];
+    rig.sigma_noise[k] = sigmas(r.covariance_noise[k]);
+    rig.sigma_total[k] = sigmas(r.covariance_total[k]);
+  }
+  rig.covariance = r.covariance;
+  rig.inflation = r.inflation;
+  rig.frames = s->frames;
+  rig.found = log_.frame(log_.size() - 1).stamp;
+  rig.reprojection_px = r.rms_px;
+  const double focal = options_.focal_sigma_percent * 0.01,
+               centre = options_.principal_point_sigma_px / rig.intrinsics[0].fx;
+  const double noise = length_noise(r);
+  rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
+  return true;
 }
 
 RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {

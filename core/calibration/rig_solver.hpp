@@ -46,7 +46,6 @@ struct RigSolution {
   std::uint64_t newest = 0;
   int frames = 0;
   int tracks = 0;
-  int observations = 0;
 
   /// Number of tracks nearer than CalibrationOptions::near_baselines.
   int near = 0;
@@ -109,11 +108,9 @@ class RigSolver {
   /// the end, with covariances.
   [[nodiscard]] BundleResult readjust(BundleOptions how, bool last,
                                       double tolerance_sigmas) noexcept;
-  [[nodiscard]] double residual_scale() noexcept;
   void drop_outliers(double limit) noexcept;
   /// Sets status, rig and sigmas. Returns true if they can be used.
   bool finish(const BundleResult& r, RigSolution* s) noexcept;
-  void write_result(const BundleResult& r, RigSolution* s) const noexcept;
   void describe(RigSolution* s) const noexcept;
   /// Relative sigma of the path length by the noise of the tracks, in the last connected piece.
   [[nodiscard]] double length_noise(const BundleResult& r) const noexcept;

@@ -13,7 +13,7 @@
 #include "core/estimator/degradations.hpp"
 #include "core/estimator/detail/covariance_baseline.hpp"
 #include "core/estimator/online_calibrator.hpp"
-#include "core/estimator/transitions.hpp"
+#include "core/estimator/states.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/odometry/drift_covariance.hpp"
 #include "core/odometry/odometry.hpp"
@@ -113,7 +113,8 @@ struct Estimator::Parts {
         length_sigma_percent(o.trust == CalibrationTrust::none
                                  ? kUnlinkedLengthPercent
                                  : o.calibration.max_depth_error_percent) {
-    if (options.online) enter(Degradation::calibration, Reason::unverified_calibration);
+    if (options.online)
+      degradations.enter(Degradation::calibration, Reason::unverified_calibration);
   }
 
   PoseSample process(const RigFrame& given) noexcept {
@@ -209,7 +210,7 @@ struct Estimator::Parts {
   }
 
   void transition(Trigger trigger) noexcept {
-    const Transition* t = find_transition(state, trigger);
+    const auto* t = find_edge(kTransitions, state, trigger);
     if (t == nullptr) return;
     (void)events.push({Kind::state, last, t->from, t->to, t->why, 0, {}});
     state = t->to;
@@ -217,10 +218,6 @@ struct Estimator::Parts {
   void record(Kind kind, const char* why, double value = 0,
               const ChangeEvidence& evidence = {}) noexcept {
     (void)events.push({kind, last, state, state, why, value, evidence});
-  }
-  void enter(Degradation degradation, Reason reason,
-             int left = DegradationLedger::kUntilCleared) noexcept {
-    degradations.enter(degradation, reason, last_number, left);
   }
   [[nodiscard]] bool linked() const noexcept { return odometry.linked() == odometry::Link::linked; }
   /// Number of frames since frame number `onset`.
@@ -245,7 +242,7 @@ struct Estimator::Parts {
       give_up_calibration(kWindowFrames);
     }
     if (out.uneven) {
-      enter(Degradation::late_image, Reason::image_repeated, kWindowFrames);
+      degradations.enter(Degradation::late_image, Reason::image_repeated, kWindowFrames);
       calibrator.monitor().question_pairing();
       // A solve must not mix frames from before with frames that may be out of sync.
       if (calibrator.estimating()) restart_estimation(std::nullopt, last_number);
@@ -290,7 +287,7 @@ struct Estimator::Parts {
     const RigAssessment v =
         calibrator.monitor().update(odometry, out, last_number, moves, calibrator.verified());
     margins = v.margins;
-    degradations.set(Degradation::rig, v.undecided, Reason::recalibrating, last_number);
+    degradations.set(Degradation::rig, v.undecided, Reason::recalibrating);
     if (v.lag_frames != 0) return record_out_of_sync(v.lag_frames);
     if (v.cameras_in_sync) {
       degradations.clear(Degradation::late_image);
@@ -301,15 +298,16 @@ struct Estimator::Parts {
     }
     // Cameras out of sync fit no calibration: other results of the monitor are ignored meanwhile.
     if (degradations.active(Degradation::out_of_sync)) return;
-    if (v.kind == Change::collapse) {
-      give_up_calibration(frames_since(v.onset_frame));
-    } else if (v.kind == Change::drift) {
+    if (v.change.kind == Change::collapse) {
+      give_up_calibration(frames_since(v.change.onset_frame));
+    } else if (v.change.kind == Change::drift) {
       // Only the newest frames describe a drifting rig.
       const auto newest = static_cast<std::uint64_t>(options.calibration.min_frames);
       suspect_rig(CalibrationCause::drift,
-                  std::max(v.onset_frame, last_number - std::min(last_number, newest)), v.evidence);
-    } else if (v.kind == Change::knock) {
-      suspect_rig(CalibrationCause::knock, v.onset_frame, v.evidence);
+                  std::max(v.change.onset_frame, last_number - std::min(last_number, newest)),
+                  v.change.evidence);
+    } else if (v.change.kind == Change::knock) {
+      suspect_rig(CalibrationCause::knock, v.change.onset_frame, v.change.evidence);
     }
   }
 
@@ -327,25 +325,24 @@ struct Estimator::Parts {
   /// Enters the degradations that a posed frame causes.
   void update_degradations(const odometry::FrameOutcome& out, Pairing pairing) noexcept {
     degradations.set(Degradation::pairing, pairing == Pairing::contradicted,
-                     Reason::pairing_ambiguous, last_number);
-    if (out.restarted) enter(Degradation::scene, Reason::map_reset, kWindowFrames + 1);
+                     Reason::pairing_ambiguous);
+    if (out.restarted) degradations.enter(Degradation::scene, Reason::map_reset, kWindowFrames + 1);
     degradations.set(Degradation::frame, out.status != PoseStatus::ok,
-                     out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason,
-                     last_number);
-    if (state == State::recalibrating) enter(Degradation::rig, Reason::recalibrating);
+                     out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason);
+    if (state == State::recalibrating) degradations.enter(Degradation::rig, Reason::recalibrating);
     if (out.moving && !degradations.any_up_to(Degradation::rig))
-      enter(Degradation::dynamic_scene, Reason::dynamic_scene, kWindowFrames);
+      degradations.enter(Degradation::dynamic_scene, Reason::dynamic_scene, kWindowFrames);
     // Errors of degraded frames stay in the window's keyframes and points, and correcting them
     // disturbs later motions. So poses stay degraded for as many frames as were degraded, at most
     // for a window's length.
     if (out.relinked || out.restarted)
       degradations.clear(Degradation::window);
     else if (out.gap_s > 0 || out.map_rebuilt)
-      enter(Degradation::window, Reason::time_gap, kWindowFrames + 1);
+      degradations.enter(Degradation::window, Reason::time_gap, kWindowFrames + 1);
     else if ((out.keyframe || degradations.active(Degradation::window)) &&
              degradations.any_up_to(Degradation::rig))
-      enter(Degradation::window, degradations.strongest(true)->reason,
-            std::min(degradations[Degradation::window].left + 2, kWindowFrames + 1));
+      degradations.enter(Degradation::window, degradations.strongest(true)->reason,
+                         std::min(degradations[Degradation::window].left + 2, kWindowFrames + 1));
   }
 
   /// Weakens or ends the degradations that a posed frame is evidence against.
@@ -391,7 +388,7 @@ struct Estimator::Parts {
     const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
     if (!covariance_baseline.measurable(step_m, sigma_m)) return;
     if (covariance_baseline.update(sigma_m))
-      enter(Degradation::window, Reason::weak_geometry, kWindowFrames + 1);
+      degradations.enter(Degradation::window, Reason::weak_geometry, kWindowFrames + 1);
     margins.uncertainty = covariance_baseline.margin();
   }
 
@@ -405,15 +402,15 @@ struct Estimator::Parts {
   void mark_calibration_unverified() noexcept {
     calibrator.map_lost();
     if (options.online && !degradations.active(Degradation::calibration))
-      enter(Degradation::calibration, Reason::unverified_calibration);
+      degradations.enter(Degradation::calibration, Reason::unverified_calibration);
   }
 
   /// Starts estimating another calibration, because the rig has or may have changed at `onset`.
   void start_estimation(CalibrationCause cause, std::uint64_t onset) noexcept {
     transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed);
     calibrator.start_estimation(cause, onset, last_number);
-    enter(Degradation::rig, Reason::recalibrating);
-    enter(Degradation::calibration, Reason::unverified_calibration);
+    degradations.enter(Degradation::rig, Reason::recalibrating);
+    degradations.enter(Degradation::calibration, Reason::unverified_calibration);
     length_sigma_percent = kUnlinkedLengthPercent;
     odometry.unlink();
   }
@@ -449,7 +446,7 @@ struct Estimator::Parts {
   void record_out_of_sync(double lag_frames) noexcept {
     if (!degradations.active(Degradation::out_of_sync))
       record(Kind::out_of_sync, message(CalibrationCause::out_of_sync), lag_frames);
-    enter(Degradation::out_of_sync, Reason::out_of_sync, 1);
+    degradations.enter(Degradation::out_of_sync, Reason::out_of_sync, 1);
     calibrator.monitor().question_pairing();
     // Frames out of sync would indicate a lag in the monitor's windows long after its end, and must
     // not enter a calibration.
@@ -493,7 +490,6 @@ struct Estimator::Parts {
     record_length_sigma(decision);
     if (decision.accepted) {
       record(Kind::calibration_accepted, "a calibration is accepted", decision.calibration.frames);
-      calibrator.adopt(decision);
       adopt(decision);
       transition(Trigger::calibration_accepted);
       return;
@@ -507,7 +503,7 @@ struct Estimator::Parts {
       return;
     }
     if (calibrator.last_gate() == calibration::Gate::out_of_sync) {
-      enter(Degradation::out_of_sync, Reason::out_of_sync, 1);
+      degradations.enter(Degradation::out_of_sync, Reason::out_of_sync, 1);
       calibrator.monitor().question_pairing();
     }
     transition(Trigger::calibration_rejected);
@@ -525,7 +521,6 @@ struct Estimator::Parts {
       record(Kind::calibration_accepted, "a better calibration is adopted",
              decision.calibration.frames,
              {0, decision.evidence.shift_px, decision.evidence.rotation_mrad});
-      calibrator.adopt_refinement(decision.calibration);
       adopt(decision);
     }
     if (decision.verified && !contradicted) {
@@ -535,18 +530,19 @@ struct Estimator::Parts {
       if (!decision.accepted) verified_by = decision.evidence;
       if (was_suspect) notify_verified();
     } else if (!calibrator.verified() && !degradations.active(Degradation::calibration)) {
-      enter(Degradation::calibration, Reason::unverified_calibration);
+      degradations.enter(Degradation::calibration, Reason::unverified_calibration);
     }
   }
 
   /// Adopts a calibration. Poses depend on it once the map is rebuilt with it; until then the
   /// status of the previous one applies.
   void adopt(const CalibrationDecision& decision) noexcept {
+    calibrator.adopt(decision);
     degradations.clear(Degradation::rig);
     verified_percent = decision.depth_sigma_percent;
     verified_by = {};
-    enter(Degradation::calibration, Reason::unverified_calibration,
-          decision.verified ? 1 : DegradationLedger::kUntilCleared);
+    degradations.enter(Degradation::calibration, Reason::unverified_calibration,
+                       decision.verified ? 1 : DegradationLedger::kUntilCleared);
     odometry.link(decision.calibration);
   }
 

@@ -54,13 +54,17 @@ OnlineCalibrator::~OnlineCalibrator() {
   if (solving_) runner_.wait();
 }
 
+void OnlineCalibrator::set_state(CalibrationTrigger what) noexcept {
+  if (const auto* edge = find_edge(kCalibrationTransitions, state_, what)) state_ = edge->to;
+}
+
 void OnlineCalibrator::adopt(const CalibrationDecision& found) noexcept {
-  state_ = next_state(
-      state_, found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
   rig_ = found.calibration;
   source_ = calibration::CalibrationOrigin::this_drive;
-  clear_prior();
   monitor_.expect_map_rebuild();
+  if (found.is_refinement) return;
+  set_state(found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
+  clear_prior();
   frames_.begin_segment();
 }
 
@@ -69,7 +73,7 @@ void OnlineCalibrator::clear_prior() noexcept {
 }
 
 void OnlineCalibrator::keep() noexcept {
-  state_ = next_state(state_, CalibrationTrigger::kept);
+  set_state(CalibrationTrigger::kept);
   // Measurements from before the rig became suspect do not describe the present rig.
   if (search_.cause != CalibrationCause::requested) clear_prior();
   monitor_.expect_map_rebuild();
@@ -77,15 +81,9 @@ void OnlineCalibrator::keep() noexcept {
 }
 
 void OnlineCalibrator::restore(const RigCalibration& rig) noexcept {
-  state_ = next_state(state_, CalibrationTrigger::contradicted);
+  set_state(CalibrationTrigger::contradicted);
   rig_ = rig;
   keep();
-}
-
-void OnlineCalibrator::adopt_refinement(const RigCalibration& rig) noexcept {
-  rig_ = rig;
-  source_ = calibration::CalibrationOrigin::this_drive;
-  monitor_.expect_map_rebuild();
 }
 
 void OnlineCalibrator::map_rebuilt(const odometry::Odometry& odometry) noexcept {
@@ -107,7 +105,7 @@ void OnlineCalibrator::map_lost() noexcept {
 void OnlineCalibrator::start_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
                                         std::uint64_t now) noexcept {
   search_ = {.cause = cause.value_or(search_.cause), .onset = onset, .since = now};
-  state_ = next_state(state_, CalibrationTrigger::suspected);
+  set_state(CalibrationTrigger::suspected);
   gate_ = Gate::open;
   discard_solve();
   frames_.begin_segment(onset);
@@ -165,16 +163,16 @@ bool OnlineCalibrator::start_last_solve() noexcept {
 }
 
 Gate OnlineCalibrator::gate(bool must_be_better) const noexcept {
-  calibration::AcceptanceInput q;
-  q.solution = &solved_;
-  q.nominal = &nominal_;
-  q.in_use = calibrated() ? &rig_ : nullptr;
-  q.source = source_;
-  q.log = &frames_.log();
-  q.pixel_sigma = options_.odometry.pixel_sigma;
-  q.may_have_changed = !(estimating() && search_.frames_before_change_dropped);
-  q.must_be_better = must_be_better;
-  return calibration::check_acceptance(q, options_.calibration);
+  return calibration::check_acceptance(
+      {.solution = &solved_,
+       .nominal = &nominal_,
+       .in_use = calibrated() ? &rig_ : nullptr,
+       .source = source_,
+       .log = &frames_.log(),
+       .pixel_sigma = options_.odometry.pixel_sigma,
+       .may_have_changed = !(estimating() && search_.frames_before_change_dropped),
+       .must_be_better = must_be_better},
+      options_.calibration);
 }
 
 calibration::Assessment OnlineCalibrator::assess(
@@ -292,7 +290,8 @@ void OnlineCalibrator::plan_search() noexcept {
 
 /// Applies a verification or contradiction and sets the monitor's expected scatter accordingly.
 void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_px) noexcept {
-  const CalibrationState before = std::exchange(state_, next_state(state_, what));
+  const CalibrationState before = state_;
+  set_state(what);
   if (state_ == before) return;
   monitor_.watch(rig_, verified() && solved_from_images());
   // A verified supplied calibration keeps its intrinsics, whose errors vary over the image.

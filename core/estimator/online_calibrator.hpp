@@ -3,15 +3,15 @@
 
 #include "core/calibration/gates.hpp"
 #include "core/estimator/calibration_frames.hpp"
-#include "core/estimator/calibration_states.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/estimator/rig_monitor.hpp"
+#include "core/estimator/states.hpp"
 
 namespace vergence {
 
 /// Calibrates the rig online: collects frames, monitors the calibration in use, runs solves in the
 /// background and decides on their solutions. The estimator passes posed frames and acts on the
-/// decisions. calibration_states.hpp has the states of the calibration in use.
+/// decisions. states.hpp has the states of the calibration in use.
 ///
 /// There are two modes. *Estimating*: there is no calibration, or the one in use is suspect; the
 /// frames since the onset are solved until a solution passes the gates. *Refining* otherwise:
@@ -78,10 +78,8 @@ class OnlineCalibrator {
   /// Call when the map was lost. Logged tracks end there, and earlier measurements no longer apply,
   /// because the rig may have changed meanwhile.
   void map_lost() noexcept;
-  /// Adopts the estimated calibration of this decision.
+  /// Adopts the calibration of this decision. The logged frames of a refined one stay.
   void adopt(const CalibrationDecision& found) noexcept;
-  /// Adopts a refined calibration; the logged frames stay.
-  void adopt_refinement(const RigCalibration& rig) noexcept;
   /// Ends the estimation without a result: the calibration in use is as good and is kept.
   void keep() noexcept;
   /// Adopts an earlier calibration again, because the images fit it.
@@ -122,6 +120,7 @@ class OnlineCalibrator {
   /// Compares the solution with the calibration `current`.
   [[nodiscard]] calibration::Assessment assess(
       const RigCalibration& current, calibration::CalibrationOrigin source) const noexcept;
+  void set_state(CalibrationTrigger what) noexcept;
   /// `misfit_px`: median distance of matches from the epipolar lines beyond their noise.
   void apply_assessment(CalibrationTrigger what, double misfit_px) noexcept;
   /// True if the calibration in use was solved from images together with its intrinsics, in this

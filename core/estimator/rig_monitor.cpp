@@ -58,82 +58,60 @@ RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
                        std::size_t capacity, Arena& arena)
     : options_(options) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k)
-    monitors_[k].emplace(k, options, capacity, arena);
+    (void)monitors_.push({.k = k,
+                          .monitor = calibration::Monitor(options, arena),
+                          .jumps = calibration::DisparityJumpDetector(capacity, arena),
+                          .pairing = calibration::PairingEvidence(capacity, arena)});
   stereo_ = BoundedVector<calibration::StereoObservation>(
       arena.make<calibration::StereoObservation>(capacity, "monitored matches"));
-}
-
-void RigMonitor::expect_scatter(double bias_px) noexcept {
-  for (auto& w : monitors_)
-    if (w) w->monitor.expect_scatter(bias_px);
 }
 
 void RigMonitor::watch(const RigCalibration& rig, bool solved_and_verified) noexcept {
   solved_and_verified_ = solved_and_verified;
   expect_scatter(solved_and_verified ? options_.verified_bias_px : options_.unverified_bias_px);
-  for (auto& w : monitors_) {
-    if (!w) continue;
-    w->pair = calibration::stereo_pair(rig, w->k);
-    (void)w->monitor.set_reference(
-        w->pair, reference_covariance(solved_and_verified, w->pair.T_camera_left.t.norm()));
+  for (CameraMonitors& w : monitors_) {
+    w.pair = calibration::stereo_pair(rig, w.k);
+    (void)w.monitor.set_reference(
+        w.pair, reference_covariance(solved_and_verified, w.pair.T_camera_left.t.norm()));
     // Before the spread of matches is known, a result makes poses `degraded` and raises no knock.
-    w->grace = kMinForMean - 1;
+    w.grace = kMinForMean - 1;
   }
-}
-
-void RigMonitor::set_jump_reference(const RigCalibration& rig) noexcept {
-  for (auto& w : monitors_)
-    if (w) w->jumps.set_reference(calibration::stereo_pair(rig, w->k));
 }
 
 void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
                              bool solved_and_verified) noexcept {
   map_rebuild_pending_ = false;
   watch(rig, solved_and_verified);
-  for (auto& w : monitors_)
-    if (w) w->pairing.reset();
+  for (CameraMonitors& w : monitors_) w.pairing.reset();
   map_rebuilt(map);
 }
 
 /// The next frame is compared with the points created in this one.
 void RigMonitor::map_rebuilt(const odometry::Map& map) noexcept {
-  for (auto& w : monitors_) {
-    if (!w) continue;
+  for (CameraMonitors& w : monitors_) {
     // The next frame differs from a distorted one without a change of the rig.
-    if (w->distorted) {
-      w->jumps.set_reference(w->pair);
+    if (w.distorted) {
+      w.jumps.set_reference(w.pair);
       continue;
     }
-    (void)collect_stereo(map, w->k, 1);
-    w->jumps.rebase(w->pair, stereo_.span());
+    (void)collect_stereo(map, w.k, 1);
+    w.jumps.rebase(w.pair, stereo_.span());
   }
 }
 
 void RigMonitor::begin_unlinked(const RigCalibration& rig) noexcept {
   T_left_world_before_.reset();
   map_rebuild_pending_ = false;
-  for (auto& w : monitors_)
-    if (w) w->T_camera_left_before = rig.T_camera_left[w->k];
+  for (CameraMonitors& w : monitors_) w.T_camera_left_before = rig.T_camera_left[w.k];
   set_jump_reference(rig);
-}
-
-void RigMonitor::question_pairing() noexcept {
-  for (auto& w : monitors_)
-    if (w) w->pairing.question();
-}
-
-void RigMonitor::reset() noexcept {
-  for (auto& w : monitors_)
-    if (w) w->monitor.reset();
 }
 
 void RigMonitor::map_lost() noexcept {
   T_left_world_before_.reset();
   reset();
-  for (auto& w : monitors_) {
-    if (!w) continue;
-    w->jumps.reset();
-    w->pairing.reset();
+  for (CameraMonitors& w : monitors_) {
+    w.jumps.reset();
+    w.pairing.reset();
   }
 }
 
@@ -164,19 +142,18 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   const bool first = outcome.initialised || outcome.restarted;
   if (first) T_left_world_before_.reset();
   const Transform step = step_to(outcome.T_left_world);
-  for (auto& w : monitors_) {
-    if (!w) continue;
-    if (first) w->jumps.reset();
-    if (!both_show(outcome, w->k)) {
-      w->jumps.skip(step);
+  for (CameraMonitors& w : monitors_) {
+    if (first) w.jumps.reset();
+    if (!both_show(outcome, w.k)) {
+      w.jumps.skip(step);
       continue;
     }
-    (void)collect_stereo(odometry.map(), w->k, odometry::kMinFound);
-    w->jumps.set_transform(w->T_camera_left_before);
-    const calibration::DisparityJump jump = w->jumps.next(number, stereo_.span(), step);
-    if (jump.confirmed && !w->pairing.questioned())
+    (void)collect_stereo(odometry.map(), w.k, odometry::kMinFound);
+    w.jumps.set_transform(w.T_camera_left_before);
+    const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
+    if (jump.confirmed && !w.pairing.questioned())
       onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
-    w->T_camera_left_before = odometry.rig().T_camera_left[w->k];
+    w.T_camera_left_before = odometry.rig().T_camera_left[w.k];
   }
   return onset;
 }
@@ -187,28 +164,27 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
   RigAssessment rig;
   rig.cameras_in_sync = true;
   const Transform step = step_to(outcome.T_left_world);
-  for (auto& w : monitors_) {
-    if (!w) continue;
-    const int found = collect_stereo(odometry.map(), w->k, odometry::kMinFound);
-    calibration::PairingEvidence& pairing = w->pairing;
+  for (CameraMonitors& w : monitors_) {
+    const int found = collect_stereo(odometry.map(), w.k, odometry::kMinFound);
+    calibration::PairingEvidence& pairing = w.pairing;
     const double before = pairing.distance_px();
-    pairing.next(number, stereo_.span(), w->pair);
+    pairing.next(number, stereo_.span(), w.pair);
     rig.cameras_in_sync = rig.cameras_in_sync && pairing.cameras_in_sync();
     if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
     rig.margins.lag = std::max(rig.margins.lag, pairing.lag_margin());
 
     // A pose biased by a distorted image changes the disparities of the frames before and after it.
-    w->distorted = pairing.distance_px() > calibration::kMaxFitPx &&
-                   pairing.distance_px() > kUnusualRatio * before;
+    w.distorted = pairing.distance_px() > calibration::kMaxFitPx &&
+                  pairing.distance_px() > kUnusualRatio * before;
     calibration::DisparityJump jump;
-    if (both_show(outcome, w->k) && !w->distorted)
-      jump = w->jumps.next(number, stereo_.span(), step);
+    if (both_show(outcome, w.k) && !w.distorted)
+      jump = w.jumps.next(number, stereo_.span(), step);
     else
-      w->jumps.skip(step);
+      w.jumps.skip(step);
 
     MonitorResult v;
-    if (!map_rebuild_pending_) v = update_monitor(odometry, outcome, number, found, moving, &*w);
-    add_to_assessment(*w, v, jump, verified, &rig);
+    if (!map_rebuild_pending_) v = update_monitor(odometry, outcome, number, found, moving, &w);
+    add_to_assessment(w, v, jump, verified, &rig);
   }
   return rig;
 }
@@ -262,10 +238,7 @@ void RigMonitor::add_to_assessment(const CameraMonitors& w, MonitorResult v,
   }
   rig->margins.jump = std::max(rig->margins.jump, jump.over_limit);
   rig->undecided = rig->undecided || v.undecided || jump.suspected;
-  if (v.kind <= rig->kind) return;
-  rig->kind = v.kind;
-  rig->onset_frame = v.onset_frame;
-  rig->evidence = v.evidence;
+  if (v.kind > rig->change.kind) rig->change = v;
 }
 
 }  // namespace vergence

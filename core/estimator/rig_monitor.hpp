@@ -5,6 +5,7 @@
 #include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/pairing_evidence.hpp"
+#include "core/memory/fixed_vector.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/types/decision_margins.hpp"
 
@@ -12,10 +13,8 @@ namespace vergence {
 
 /// Assessment of the rig after one frame: the worst result of all monitors.
 struct RigAssessment {
-  calibration::MonitorResult::Kind kind = calibration::MonitorResult::Kind::quiet;
-  /// Number of the first frame of the change `kind`.
-  std::uint64_t onset_frame = 0;
-  ChangeEvidence evidence;
+  /// The change of the camera with the most severe one.
+  calibration::MonitorResult change;
   /// Number of frames that a camera's images are late; negative if early.
   int lag_frames = 0;
   /// True if a camera disagrees with the calibration for a cause not yet identified.
@@ -24,6 +23,22 @@ struct RigAssessment {
   bool cameras_in_sync = false;
   /// Largest of all cameras; `uncertainty` is not measured here.
   DecisionMargins margins;
+};
+
+/// Monitors of one additional camera.
+struct CameraMonitors {
+  std::size_t k = 0;
+  calibration::Monitor monitor{};
+  calibration::DisparityJumpDetector jumps{};
+  calibration::PairingEvidence pairing{};
+  // The reference; jumps may be measured against another calibration.
+  calibration::StereoPair pair{};
+  // Number of frames to come whose result is at most `undecided`.
+  int grace = 0;
+  // True if the newest image is distorted, for example by skewed exposures.
+  bool distorted = false;
+  // Transform in the previous frame, with unlinked cameras.
+  Transform T_camera_left_before{};
 };
 
 /// Checks in every frame that the calibration still describes the rig. Each additional camera has a
@@ -48,9 +63,13 @@ class RigMonitor {
   /// is verified, so less scatter is expected.
   void watch(const RigCalibration& rig, bool solved_and_verified) noexcept;
   /// Sets the expected scatter between stretches of a run, in px rms over the image.
-  void expect_scatter(double bias_px) noexcept;
+  void expect_scatter(double bias_px) noexcept {
+    for (CameraMonitors& w : monitors_) w.monitor.expect_scatter(bias_px);
+  }
   /// Sets the calibration that the jump detectors compare with.
-  void set_jump_reference(const RigCalibration& rig) noexcept;
+  void set_jump_reference(const RigCalibration& rig) noexcept {
+    for (CameraMonitors& w : monitors_) w.jumps.set_reference(calibration::stereo_pair(rig, w.k));
+  }
   /// Call when a calibration is adopted; until the map is rebuilt with it only jumps are evaluated.
   void expect_map_rebuild() noexcept { map_rebuild_pending_ = true; }
   [[nodiscard]] bool map_rebuild_pending() const noexcept { return map_rebuild_pending_; }
@@ -76,32 +95,17 @@ class RigMonitor {
                                                              std::uint64_t number) noexcept;
 
   /// Call when an image was repeated: a camera may be a frame late until motion shows otherwise.
-  void question_pairing() noexcept;
+  void question_pairing() noexcept {
+    for (CameraMonitors& w : monitors_) w.pairing.question();
+  }
   /// Clears what the monitors have measured; references and jump detectors stay.
-  void reset() noexcept;
+  void reset() noexcept {
+    for (CameraMonitors& w : monitors_) w.monitor.reset();
+  }
   /// Call when the map was lost: the next frame is not compared with earlier ones.
   void map_lost() noexcept;
 
  private:
-  /// Monitors of one additional camera.
-  struct CameraMonitors {
-    CameraMonitors(std::size_t number, const calibration::MonitorOptions& options,
-                   std::size_t capacity, Arena& arena)
-        : k(number), monitor(options, arena), jumps(capacity, arena), pairing(capacity, arena) {}
-    std::size_t k;
-    // The reference; jumps may be measured against another calibration.
-    calibration::StereoPair pair{};
-    calibration::Monitor monitor;
-    calibration::DisparityJumpDetector jumps;
-    calibration::PairingEvidence pairing;
-    // Number of frames to come whose result is at most `undecided`.
-    int grace = 0;
-    // True if the newest image is distorted, for example by skewed exposures.
-    bool distorted = false;
-    // Transform in the previous frame, with unlinked cameras.
-    Transform T_camera_left_before;
-  };
-
   /// Result of the camera's monitor; the caller handles jumps.
   [[nodiscard]] calibration::MonitorResult update_monitor(const odometry::Odometry& odometry,
                                                           const odometry::FrameOutcome& outcome,
@@ -117,9 +121,7 @@ class RigMonitor {
                          RigAssessment* rig) const noexcept;
 
   const calibration::MonitorOptions& options_;
-  // Element k belongs to camera k; those of the left camera and of cameras that the rig lacks are
-  // empty.
-  std::array<std::optional<CameraMonitors>, kMaxCameras> monitors_;
+  FixedVector<CameraMonitors, kMaxCameras - 1> monitors_;
   BoundedVector<calibration::StereoObservation> stereo_;
   bool solved_and_verified_ = false;
   std::optional<Transform> T_left_world_before_;

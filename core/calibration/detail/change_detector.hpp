@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/calibration/detail/monitor_evidence.hpp"
 #include "core/calibration/detail/monitor_residuals.hpp"
 
 namespace vergence::calibration::detail {
@@ -28,9 +27,8 @@ class EvidenceHistory {
     open_ = Entry{};
     total_ = Evidence{};
   }
-  /// Returns true if the open block is full; use it, then call close_block().
+  /// Returns true if that closed a block, which is block(0) then.
   [[nodiscard]] bool push(const Entry& entry) noexcept;
-  void close_block() noexcept;
 
   [[nodiscard]] std::size_t frames() const noexcept { return count_; }
   /// Number of blocks closed so far, and of those still kept.
@@ -38,7 +36,6 @@ class EvidenceHistory {
   [[nodiscard]] std::size_t blocks() const noexcept { return std::min(closed_, kBlocks); }
   /// Number of frames in the open block.
   [[nodiscard]] std::size_t open_frames() const noexcept { return count_ % kBlock; }
-  [[nodiscard]] const Entry& open() const noexcept { return open_; }
   /// Age 0 is the newest.
   [[nodiscard]] const Entry& recent(std::size_t age) const noexcept {
     return recent_[(count_ - 1 - age) % kRecent];
@@ -48,7 +45,7 @@ class EvidenceHistory {
   }
   /// Sums the evidence of the newest `frames` frames, extended to the edge of the block that holds
   /// the oldest of them.
-  void sum_newest(std::size_t frames, Evidence* sum) const noexcept;
+  [[nodiscard]] Evidence sum_newest(std::size_t frames) const noexcept;
   /// Sum of the evidence of all frames kept.
   [[nodiscard]] Evidence total() const noexcept;
 
@@ -122,6 +119,10 @@ class ChangeDetector {
     // Evidence since the onset, not inflated; that of a ramp is weighted by the ramp.
     Evidence since;
   };
+  struct Theta {
+    Vec5 mean;
+    Mat5 covariance;
+  };
   struct Search {
     // A sudden change, and one that grows from zero.
     Onset step, ramp;
@@ -133,10 +134,10 @@ class ChangeDetector {
   void measure_scatter() noexcept;
   void renew_floor() noexcept;
   [[nodiscard]] Evidence effective(const Evidence& sum) const noexcept;
-  [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean,
-                                        const Mat5& covariance) noexcept;
-  void estimate_reference(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept;
-  void search(const Vec5& mean, Search* found) const noexcept;
+  [[nodiscard]] static double statistic(const Evidence& e, const Theta& reference) noexcept;
+  /// θ by the past before the window, and its covariance.
+  [[nodiscard]] Theta estimate_reference(const Evidence& window) const noexcept;
+  [[nodiscard]] Search search(const Vec5& mean) const noexcept;
   void attribute(std::size_t window, MonitorResult* d) const noexcept;
 
   MonitorOptions options_{};

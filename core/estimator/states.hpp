@@ -1,9 +1,30 @@
 #pragma once
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
 #include "core/types/pose_sample.hpp"
 
+/// State machines of the estimator and of the calibration in use.
 namespace vergence {
+
+/// One edge of a state machine. `why` is written to events.jsonl unchanged.
+template <class S, class T>
+struct Edge {
+  S from;
+  T on;
+  S to;
+  const char* why = "";
+};
+
+/// Returns the edge of this trigger in this state, or nullptr if the trigger has no effect.
+template <class S, class T, std::size_t N>
+[[nodiscard]] constexpr const Edge<S, T>* find_edge(const std::array<Edge<S, T>, N>& edges, S state,
+                                                    T trigger) noexcept {
+  for (const Edge<S, T>& edge : edges)
+    if (edge.from == state && edge.on == trigger) return &edge;
+  return nullptr;
+}
 
 /// Event that can change the estimator's state.
 enum class Trigger : std::uint8_t {
@@ -32,19 +53,11 @@ enum class Trigger : std::uint8_t {
   pose_found_uncalibrated,
 };
 
-/// One edge of the state machine; `why` is written to events.jsonl unchanged.
-struct Transition {
-  State from;
-  Trigger on;
-  State to;
-  const char* why;
-};
-
-/// All edges of the state machine.
+/// All edges of the estimator's state machine.
 inline constexpr auto kTransitions = [] {
   using S = State;
   using T = Trigger;
-  return std::to_array<Transition>({
+  return std::to_array<Edge<S, T>>({
       {S::initialising, T::calibration_given, S::stereo_odometry, "a calibration is supplied"},
       {S::initialising, T::pair_found, S::parallel_monocular,
        "the first pair gave the initial extrinsics"},
@@ -69,19 +82,49 @@ inline constexpr auto kTransitions = [] {
   });
 }();
 
-/// Returns the edge of this trigger in this state, or nullptr if the trigger has no effect.
-[[nodiscard]] constexpr const Transition* find_transition(State state, Trigger trigger) noexcept {
-  for (const Transition& t : kTransitions)
-    if (t.from == state && t.on == trigger) return &t;
-  return nullptr;
-}
+/// State of the calibration in use.
+enum class CalibrationState : std::uint8_t {
+  /// No calibration is in use; one is being estimated.
+  none,
+  /// In use, but not yet compared with an online estimate.
+  unverified,
+  /// In use, and its depths are within the tolerated error.
+  verified,
+  /// The rig seems to have changed; another calibration is being estimated.
+  suspect,
+};
 
-consteval bool transitions_are_deterministic() {
-  for (const Transition& t : kTransitions)
-    if (find_transition(t.from, t.on) != &t) return false;
-  return true;
-}
-static_assert(transitions_are_deterministic(),
-              "a row hides another with the same state and trigger");
+/// Event that can change the state of the calibration in use.
+enum class CalibrationTrigger : std::uint8_t {
+  /// An estimated calibration is adopted.
+  adopted,
+  /// An estimated calibration is adopted whose depths are within the tolerated error.
+  adopted_verified,
+  /// An online estimate verified the calibration in use.
+  verified,
+  /// An online estimate contradicts the calibration in use.
+  contradicted,
+  /// The monitor raised an alarm, or a recalibration was requested.
+  suspected,
+  /// The estimate is no better than the calibration in use, or the images fit an earlier one again.
+  kept,
+};
+
+/// All edges of the calibration's state machine.
+inline constexpr auto kCalibrationTransitions = [] {
+  using S = CalibrationState;
+  using T = CalibrationTrigger;
+  return std::to_array<Edge<S, T>>({
+      {S::none, T::adopted, S::unverified},
+      {S::none, T::adopted_verified, S::verified},
+      {S::unverified, T::verified, S::verified},
+      {S::unverified, T::suspected, S::suspect},
+      {S::verified, T::contradicted, S::unverified},
+      {S::verified, T::suspected, S::suspect},
+      {S::suspect, T::adopted, S::unverified},
+      {S::suspect, T::adopted_verified, S::verified},
+      {S::suspect, T::kept, S::unverified},
+  });
+}();
 
 }  // namespace vergence
