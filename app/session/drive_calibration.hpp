@@ -12,7 +12,7 @@
 #include "app/runtime/signals.hpp"
 #include "app/session/replay_session.hpp"
 #include "app/session/starting_calibration.hpp"
-#include "core/calibration/agreement.hpp"
+#include "core/calibration/posterior.hpp"
 #include "core/calibration/rig_solver.hpp"
 
 namespace vergence::app {

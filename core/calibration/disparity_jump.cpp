@@ -1,9 +1,10 @@
 #include "core/calibration/disparity_jump.hpp"
-#include "core/math/robust.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "core/math/robust.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -14,14 +15,6 @@ constexpr double kUsualShift = 0.12;
 constexpr int kScatterFrames = 20;
 // Maximum number of frames without a measurement between two that are compared.
 constexpr int kMaxSkipped = 2;
-
-Vec3 ray(const Pinhole& k, const Vec2& pixel) noexcept {
-  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy, 1.0};
-}
-
-Vec2 project(const Pinhole& k, const Vec3& p) noexcept {
-  return {k.fx * p.x() / p.z() + k.cx, k.fy * p.y() / p.z() + k.cy};
-}
 
 /// Derivative of project(), in px per unit of `p`.
 Mat23 derivative(const Pinhole& k, const Vec3& p) noexcept {
@@ -40,6 +33,15 @@ double triangulated_depth(const Vec3& left, const Vec3& other,
   return aa > 0 ? a.dot(b) / aa : -1.0;
 }
 
+/// Replaces the content of `into` by observations sorted by track.
+void sort_into(std::span<const StereoObservation> stereo,
+               BoundedVector<StereoObservation>* into) noexcept {
+  into->clear();
+  for (const StereoObservation& s : stereo)
+    if (!into->push(s)) break;
+  std::ranges::sort(*into, {}, &StereoObservation::track);
+}
+
 }  // namespace
 
 DisparityJumpDetector::DisparityJumpDetector(std::size_t capacity, Arena& arena)
@@ -48,70 +50,47 @@ DisparityJumpDetector::DisparityJumpDetector(std::size_t capacity, Arena& arena)
       rows_(arena.make<Row>(capacity, "disparity jump: tracks")),
       scratch_(arena.make<double>(capacity, "disparity jump: medians")) {}
 
-void DisparityJumpDetector::set_reference(const Transform& T_camera_left, const Pinhole& left,
-                                          const Pinhole& camera) noexcept {
-  T_camera_left_ = T_camera_left;
-  left_ = left;
-  camera_ = camera;
-  reset();
-}
-
-void DisparityJumpDetector::rebase(const Transform& T_camera_left, const Pinhole& left,
-                                   const Pinhole& camera,
+void DisparityJumpDetector::rebase(const StereoPair& pair,
                                    std::span<const StereoObservation> stereo) noexcept {
-  T_camera_left_ = T_camera_left;
-  left_ = left;
-  camera_ = camera;
-  count_ = sort_into(stereo, before_);
+  pair_ = pair;
+  sort_into(stereo, &before_);
   T_now_before_ = {};
   skipped_ = 0;
 }
 
 void DisparityJumpDetector::skip(const Transform& T_now_previous) noexcept {
   T_now_before_ = T_now_previous * T_now_before_;
-  if (++skipped_ > kMaxSkipped) count_ = 0;
+  if (++skipped_ > kMaxSkipped) before_.clear();
 }
 
-std::size_t DisparityJumpDetector::sort_into(std::span<const StereoObservation> stereo,
-                                             std::span<StereoObservation> into) noexcept {
-  const std::size_t n = std::min(stereo.size(), into.size());
-  std::copy_n(stereo.begin(), n, into.begin());
-  std::sort(into.begin(), into.begin() + static_cast<std::ptrdiff_t>(n),
-            [](const StereoObservation& a, const StereoObservation& b) noexcept {
-              return a.track < b.track;
-            });
-  return n;
-}
-
-bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObservation& now,
-                                const Transform& T_now_previous, Row* out) const noexcept {
-  const Vec3 a = ray(left_, before.left);
-  const double depth = triangulated_depth(a, ray(camera_, before.right), T_camera_left_);
-  if (!(depth > 0)) return false;
+void DisparityJumpDetector::add_row(const StereoObservation& before, const StereoObservation& now,
+                                    const Transform& T_now_previous) noexcept {
+  const Transform& T = pair_.T_camera_left;
+  const Vec3 a = ray(pair_.left, before.left).homogeneous();
+  const double depth = triangulated_depth(a, ray(pair_.camera, before.right).homogeneous(), T);
+  if (!(depth > 0)) return;
   const Vec3 moved = T_now_previous * Vec3(depth * a);
-  if (!(moved.z() > 0)) return false;
-  const Vec3 other = T_camera_left_ * moved;
-  const Mat23 G = derivative(camera_, other);
-  const Vec2 predicted = project(camera_, other) - project(left_, moved);
-  const Vec2 by_depth = G * T_camera_left_.R.col(2) - derivative(left_, moved).col(2);
+  if (!(moved.z() > 0)) return;
+  const Vec3 other = T * moved;
+  const Mat23 G = derivative(pair_.camera, other);
+  const Vec2 predicted = project(pair_.camera, other) - project(pair_.left, moved);
+  const Vec2 by_depth = G * T.R.col(2) - derivative(pair_.left, moved).col(2);
   // Direction of the epipolar line, along which the point moves in the other image with its depth.
-  const Vec2 farther = G * (T_camera_left_.R * moved);
+  const Vec2 farther = G * (T.R * moved);
   const double length = farther.norm();
-  if (!(length > 0)) return false;
+  if (!(length > 0)) return;
   const Vec2 direction = farther / length;
-  out->e = direction.dot(now.right - now.left - predicted);
-  out->along = direction.dot(by_depth);
-  return std::isfinite(out->e) && std::isfinite(out->along);
+  const Row row{direction.dot(now.right - now.left - predicted), direction.dot(by_depth)};
+  if (std::isfinite(row.e) && std::isfinite(row.along)) (void)rows_.push(row);
 }
 
-DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
+DisparityJump DisparityJumpDetector::fit() noexcept {
   DisparityJump jump;
-  jump.tracks = static_cast<int>(rows.size());
-  if (rows.size() < kMinTracksOfFrame) return jump;
+  if (rows_.size() < kMinTracksOfFrame) return jump;
   double s = 0, along = 0, scale = 0, variance = 0;
   const auto median_by = [&](auto value) noexcept {
-    for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
-    return median(scratch_.first(rows.size()));
+    for (std::size_t i = 0; i < rows_.size(); ++i) scratch_[i] = value(rows_[i]);
+    return median(scratch_.first(rows_.size()));
   };
   s = median_by([](const Row& r) noexcept { return r.e; });
   for (int k = 0; k < kReweightings; ++k) {
@@ -119,7 +98,7 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
                                   return std::abs(r.e - s - along * r.along);
                                 }) / kMedianOfNormal);
     double w = 0, wa = 0, waa = 0, we = 0, wae = 0;
-    for (const Row& r : rows) {
+    for (const Row& r : rows_) {
       const double u = (r.e - s - along * r.along) / (kTukey * scale);
       if (std::abs(u) >= 1) continue;
       const double weight = (1 - u * u) * (1 - u * u);
@@ -142,19 +121,19 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
 }
 
 void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) noexcept {
-  if (pending_.any) {
-    if (!jump->measured && ++pending_.unmeasured < kMaxSkipped) {
+  if (pending_) {
+    if (!jump->measured && ++pending_->unmeasured < kMaxSkipped) {
       jump->suspected = true;
       return;
     }
     jump->confirmed =
-        !jump->measured || std::abs(jump->px + pending_.px) > kMajority * std::abs(pending_.px);
+        !jump->measured || std::abs(jump->px + pending_->px) > kMajority * std::abs(pending_->px);
     if (jump->confirmed) {
-      jump->onset_frame = pending_.frame;
-      jump->px = pending_.px;
-      jump->sigma_px = pending_.sigma_px;
+      jump->onset_frame = pending_->frame;
+      jump->px = pending_->px;
+      jump->sigma_px = pending_->sigma_px;
     }
-    pending_ = Pending{};
+    pending_.reset();
     return;
   }
   if (!jump->measured) return;
@@ -164,7 +143,7 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
   if (measured_ >= kMinForMean) jump->over_limit = std::abs(jump->px) / limit;
   if (jump->over_limit > 1) {
     jump->suspected = true;
-    pending_ = Pending{true, frame, jump->px, jump->sigma_px, 0};
+    pending_ = Pending{frame, jump->px, jump->sigma_px};
     return;
   }
   if (measured_ < kScatterFrames) ++measured_;
@@ -174,24 +153,23 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
 DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
                                           std::span<const StereoObservation> stereo,
                                           const Transform& T_now_previous) noexcept {
-  const std::size_t n = sort_into(stereo, now_);
+  sort_into(stereo, &now_);
   const Transform T_now_before = T_now_previous * T_now_before_;
   T_now_before_ = {};
   skipped_ = 0;
-  std::size_t rows = 0;
-  for (std::size_t i = 0, j = 0; i < count_ && j < n;) {
+  rows_.clear();
+  for (std::size_t i = 0, j = 0; i < before_.size() && j < now_.size();) {
     if (before_[i].track < now_[j].track) {
       ++i;
     } else if (now_[j].track < before_[i].track) {
       ++j;
     } else {
-      if (row(before_[i++], now_[j++], T_now_before, &rows_[rows])) ++rows;
+      add_row(before_[i++], now_[j++], T_now_before);
     }
   }
-  DisparityJump jump = fit(rows_.first(rows));
+  DisparityJump jump = fit();
   evaluate(frame, &jump);
   std::swap(before_, now_);
-  count_ = n;
   return jump;
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/calibration/monitor.hpp"
 #include "core/memory/arena.hpp"
+#include "core/memory/fixed_vector.hpp"
 
 namespace vergence::calibration {
 
@@ -17,7 +19,6 @@ struct DisparityJump {
   double px = 0;
   /// Standard deviation, from the scatter of the tracks.
   double sigma_px = 0;
-  int tracks = 0;
   /// The change over the smallest one that is suspected; 0 until the usual scatter is known.
   double over_limit = 0;
   /// True if the change exceeds the usual scatter; the next frame decides.
@@ -43,22 +44,26 @@ struct DisparityJump {
 /// Threads  One caller. Time: linear, except for sorting the tracks.
 class DisparityJumpDetector {
  public:
+  DisparityJumpDetector() = default;
   DisparityJumpDetector(std::size_t capacity, Arena& arena);
 
-  /// Sets the transform and pinholes in use, and clears the previous frame.
-  void set_reference(const Transform& T_camera_left, const Pinhole& left,
-                     const Pinhole& camera) noexcept;
+  /// Sets the calibration in use, and clears the previous frame.
+  void set_reference(const StereoPair& pair) noexcept {
+    pair_ = pair;
+    reset();
+  }
   /// Changes to another calibration of the same rig and another map; `stereo`, points of the new
   /// map, replace the previous frame. A suspected shift still waits for the next frame.
-  void rebase(const Transform& T_camera_left, const Pinhole& left, const Pinhole& camera,
-              std::span<const StereoObservation> stereo) noexcept;
+  void rebase(const StereoPair& pair, std::span<const StereoObservation> stereo) noexcept;
   /// Changes the transform and keeps the previous frame: for a refined calibration, and for every
   /// frame while the cameras are not linked.
-  void set_transform(const Transform& T_camera_left) noexcept { T_camera_left_ = T_camera_left; }
+  void set_transform(const Transform& T_camera_left) noexcept {
+    pair_.T_camera_left = T_camera_left;
+  }
   /// Call when the map was lost: the next frame is not compared with earlier ones.
   void reset() noexcept {
-    count_ = 0;
-    pending_ = Pending{};
+    before_.clear();
+    pending_.reset();
     T_now_before_ = {};
     skipped_ = 0;
   }
@@ -78,34 +83,29 @@ class DisparityJumpDetector {
     // Derivative of `e` with respect to an error of the motion along the optical axis, in px/m.
     double along = 0;
   };
-  [[nodiscard]] bool row(const StereoObservation& before, const StereoObservation& now,
-                         const Transform& T_now_previous, Row* out) const noexcept;
-  [[nodiscard]] DisparityJump fit(std::span<Row> rows) noexcept;
-  /// Copies observations sorted by track; returns their number.
-  std::size_t sort_into(std::span<const StereoObservation> stereo,
-                        std::span<StereoObservation> into) noexcept;
+  /// Adds the row of a track; a track that measures nothing has none.
+  void add_row(const StereoObservation& before, const StereoObservation& now,
+               const Transform& T_now_previous) noexcept;
+  [[nodiscard]] DisparityJump fit() noexcept;
   void evaluate(std::uint64_t frame, DisparityJump* jump) noexcept;
 
   /// A shift that waits for the next frame.
   struct Pending {
-    bool any = false;
     std::uint64_t frame = 0;
     double px = 0, sigma_px = 0;
     // Number of frames since then without a measurement.
     int unmeasured = 0;
   };
 
-  Transform T_camera_left_{};
-  Pinhole left_{}, camera_{};
+  StereoPair pair_{};
   // Observations, sorted by track.
-  std::span<StereoObservation> before_, now_;
-  std::span<Row> rows_;
+  BoundedVector<StereoObservation> before_, now_;
+  BoundedVector<Row> rows_;
   std::span<double> scratch_;
-  std::size_t count_ = 0;
   // Motion over the frames skipped since before_.
   Transform T_now_before_{};
   int skipped_ = 0;
-  Pending pending_{};
+  std::optional<Pending> pending_;
   // Number of measured frames, at most kScatterFrames.
   int measured_ = 0;
   // Mean square of the shifts that were no jump, in px².

@@ -11,6 +11,7 @@
 #include "core/math/angle.hpp"
 #include "core/math/robust.hpp"
 #include "core/math/so3.hpp"
+#include "core/memory/fixed_vector.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -25,6 +26,9 @@ constexpr double kSuppliedYaw = 1e-3, kOtherYaw = 15e-3;
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
 // Minimum path length of a solve, in baselines.
 constexpr double kMinBaselinesTravelled = 3.0;
+// Systematic error of the measured focal length, relative: at most 3.2 % on recorded sequences
+// after 25 frames (docs/calibration.md).
+constexpr double kSystematicFocal = 0.04;
 
 /// Median distance in px of one frame's matches between the left camera and camera k to the
 /// epipolar lines; negative if there are too few.
@@ -49,107 +53,40 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
   return median(std::span(distance).first(n));
 }
 
-/// Calls `each` for at most the newest kHeldOutFrames frames whose number is above `after` and at
-/// most `last`.
-template <class Each>
-void for_newest(const TrackLog& log, std::uint64_t after, std::uint64_t last, Each each) noexcept {
-  std::size_t n = 0;
-  for (std::size_t i = log.size(); i-- > 0 && n < kHeldOutFrames && log.frame(i).number > after;) {
-    if (log.frame(i).number > last) continue;
-    each(log.frame(i));
-    ++n;
-  }
+constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
+
+/// At most the newest kHeldOutFrames frames whose number is above `after` and at most `last`, the
+/// newest one first.
+FixedVector<const LoggedFrame*, kHeldOutFrames> newest_frames(
+    const TrackLog& log, std::uint64_t after, std::uint64_t last = kNoLimit) noexcept {
+  FixedVector<const LoggedFrame*, kHeldOutFrames> frames;
+  for (std::size_t i = log.size(); i-- > 0 && !frames.full() && log.frame(i).number > after;)
+    if (log.frame(i).number <= last) (void)frames.push(&log.frame(i));
+  return frames;
 }
 
-template <class Each>
-void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept {
-  for_newest(log, after, std::numeric_limits<std::uint64_t>::max(), each);
-}
-
-/// Fit of camera k on the newest frames after frame number `after` and up to `last`.
-HeldOut fit_on(const TrackLog& log, std::uint64_t after, std::uint64_t last,
+/// Fit of camera k on these frames.
+HeldOut fit_on(const FixedVector<const LoggedFrame*, kHeldOutFrames>& frames,
                const RigCalibration& rig, int k) noexcept {
-  std::array<double, kHeldOutFrames> medians;
-  std::size_t n = 0;
-  for_newest(log, after, last, [&](const LoggedFrame& f) noexcept {
-    if (const double m = median_distance(f, rig, k); m >= 0) medians[n++] = m;
-  });
-  HeldOut h;
-  h.frames = static_cast<int>(n);
-  if (n > 0) h.median_px = median(std::span(medians).first(n));
-  return h;
+  FixedVector<double, kHeldOutFrames> medians;
+  for (const LoggedFrame* f : frames)
+    if (const double m = median_distance(*f, rig, k); m >= 0) (void)medians.push(m);
+  return {static_cast<int>(medians.size()), medians.empty() ? 0 : median(medians.span())};
 }
 
-/// Fit of camera k on the newest frames after frame number `after`.
-HeldOut fit_on_held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig,
-                        int k) noexcept {
-  return fit_on(log, after, std::numeric_limits<std::uint64_t>::max(), rig, k);
-}
-
-/// Returns true if held-out frames contradict camera k of `rig`, compared with the fit of `solved`
-/// on its own frames.
-bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
-                  std::uint64_t newest, int k, double pixel_sigma) noexcept {
-  const HeldOut fit = fit_on_held_out(log, newest, rig, k);
-  if (fit.frames < kMinForMean) return false;
-  const HeldOut used = fit_on(log, 0, newest, solved, k);
-  return fit.median_px > kUnusualRatio * std::min(std::max(used.median_px, pixel_sigma), kMaxFitPx);
-}
-
-/// Returns true if contradicted() holds for any camera.
+/// Returns true if held-out frames contradict any camera of `rig`, compared with the fit of
+/// `solved` on its own frames.
 bool misfits(const TrackLog& log, std::uint64_t newest, const RigCalibration& solved,
              const RigCalibration& rig, double pixel_sigma) noexcept {
-  for (int k = 1; k < solved.cameras; ++k)
-    if (contradicted(log, rig, solved, newest, k, pixel_sigma)) return true;
+  for (int k = 1; k < solved.cameras; ++k) {
+    const HeldOut fit = fit_on(newest_frames(log, newest), rig, k);
+    if (fit.frames < kMinForMean) continue;
+    const double used = fit_on(newest_frames(log, 0, newest), solved, k).median_px;
+    if (fit.median_px > kUnusualRatio * std::min(std::max(used, pixel_sigma), kMaxFitPx))
+      return true;
+  }
   return false;
 }
-
-double angle_between(const Vec3& a, const Vec3& b) noexcept {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-}  // namespace
-
-HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
-  HeldOut worst = fit_on_held_out(log, after, rig, 1);
-  for (int k = 2; k < rig.cameras; ++k) {
-    const HeldOut fit = fit_on_held_out(log, after, rig, k);
-    if (fit.median_px > worst.median_px) worst = fit;
-  }
-  return worst;
-}
-
-bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
-  int n = 0;
-  for_held_out(log, after, [&n](const LoggedFrame&) noexcept { ++n; });
-  return n >= kMinForMean;
-}
-
-bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
-                 const RigCalibration& worse, double chance) noexcept {
-  double sum = 0, squares = 0;
-  int n = 0;
-  for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
-    double gain = 0;
-    bool compared = false;
-    for (int k = 1; k < better.cameras; ++k) {
-      const double a = median_distance(f, worse, k), b = median_distance(f, better, k);
-      // A calibration without enough matches in this frame cannot be compared.
-      if (a < 0 || b < 0) continue;
-      gain += a - b;
-      compared = true;
-    }
-    if (!compared) return;
-    sum += gain;
-    squares += gain * gain;
-    ++n;
-  });
-  if (n < kMinForMean) return true;
-  const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
-  return mean > chance * std::sqrt(variance / (n - 1));
-}
-
-namespace {
 
 /// Sigma of the relative depth of a calibration that is the rig's, in percent.
 double current_percent(const RigCalibration& current, int k, double depth,
@@ -161,7 +98,48 @@ double current_percent(const RigCalibration& current, int k, double depth,
                  : kSuppliedYaw * by_turn;
 }
 
+double angle_between(const Vec3& a, const Vec3& b) noexcept {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
 }  // namespace
+
+HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
+  HeldOut worst;
+  for (int k = 1; k < rig.cameras; ++k) {
+    const HeldOut fit = fit_on(newest_frames(log, after), rig, k);
+    if (k == 1 || fit.median_px > worst.median_px) worst = fit;
+  }
+  return worst;
+}
+
+bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
+  return newest_frames(log, after).size() >= static_cast<std::size_t>(kMinForMean);
+}
+
+bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
+                 const RigCalibration& worse, double chance) noexcept {
+  double sum = 0, squares = 0;
+  int n = 0;
+  for (const LoggedFrame* f : newest_frames(log, after)) {
+    double gain = 0;
+    bool compared = false;
+    for (int k = 1; k < better.cameras; ++k) {
+      const double a = median_distance(*f, worse, k), b = median_distance(*f, better, k);
+      // A calibration without enough matches in this frame cannot be compared.
+      if (a < 0 || b < 0) continue;
+      gain += a - b;
+      compared = true;
+    }
+    if (!compared) continue;
+    sum += gain;
+    squares += gain * gain;
+    ++n;
+  }
+  if (n < kMinForMean) return true;
+  const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
+  return mean > chance * std::sqrt(variance / (n - 1));
+}
 
 Assessment assess(const RigCalibration& measured, const RigCalibration& current,
                   CalibrationOrigin source, const TrackLog& log, std::uint64_t after,
@@ -248,10 +226,7 @@ double depth_excess(const RigCalibration& rig, const CalibrationOptions& o,
   return worst / o.usable_depth_percent;
 }
 
-namespace {
-
-/// Gates that need no frames but those of the solve.
-Gate check_solution(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
+Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;
   for (int k = 1; k < s.rig.cameras; ++k) {
@@ -268,19 +243,37 @@ Gate check_solution(const AcceptanceInput& q, const CalibrationOptions& o) noexc
   }
   if (s.travelled_m < kMinBaselinesTravelled * s.rig.baseline) return Gate::needs_motion;
   if (s.near < o.min_near_points) return Gate::needs_near_structure;
-  return depth_excess(s.rig, o, q.pixel_sigma) > 1 ? Gate::depth_unknown : Gate::open;
-}
+  if (depth_excess(s.rig, o, q.pixel_sigma) > 1) return Gate::depth_unknown;
 
-}  // namespace
-
-Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
-  const RigSolution& s = *q.solution;
-  if (const Gate gate = check_solution(q, o); gate != Gate::open) return gate;
+  // The gates below need frames that are not in the solve.
   if (q.log == nullptr) return Gate::open;
   if (misfits(*q.log, s.newest, s.rig, s.rig, q.pixel_sigma)) return Gate::does_not_fit;
-  if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))
-    return Gate::no_better;
-  return Gate::open;
+  if (q.in_use == nullptr || !q.must_be_better || fits_better(*q.log, s.newest, s.rig, *q.in_use))
+    return Gate::open;
+  // A yaw changes depths, but hardly the distances to epipolar lines that are compared above.
+  const Assessment a = assess(s.rig, *q.in_use, q.source, *q.log, s.newest, o, q.pixel_sigma);
+  return (a.nearer || a.log_odds < 0) && !a.worse ? Gate::open : Gate::no_better;
+}
+
+FocalMeasurement check_focal_length(const RigSolution& found,
+                                    const RigCalibration& given) noexcept {
+  FocalMeasurement m;
+  m.configured_px = given.intrinsics[0].fx;
+  const Intrinsics& lens = found.rig.intrinsics[0];
+  if (!(m.configured_px > 0)) return m;
+  const double off = std::abs(lens.fx / m.configured_px - 1);
+  if (found.status == RigSolveStatus::not_converged && off > kFocalPriorSigma) {
+    // The solve has not converged but is already far off, and the true value is farther.
+    m.measured_px = lens.fx;
+    m.contradicted = m.doubted = true;
+  } else if (found.status == RigSolveStatus::ok && lens.sigma[0] > 0) {
+    m.measured_px = lens.fx;
+    m.sigma_px = std::hypot(lens.sigma[0], kSystematicFocal * lens.fx);
+    const double noise = lens.sigma[0] / lens.fx;
+    m.contradicted = off > kSystematicFocal + kCertainSigmas * noise;
+    m.doubted = m.contradicted || log_odds(off, noise, kSystematicFocal, kFocalPriorSigma) < 0;
+  }
+  return m;
 }
 
 }  // namespace vergence::calibration

@@ -1,10 +1,7 @@
 #pragma once
-
-#include "core/calibration/options.hpp"
 #include "core/calibration/rig_solver.hpp"
-#include "core/calibration/track_log.hpp"
 #include "core/math/robust.hpp"
-#include "core/types/calibration.hpp"
+#include "core/types/calibration_decision.hpp"
 
 namespace vergence::calibration {
 
@@ -114,6 +111,7 @@ struct AcceptanceInput {
   const RigCalibration* nominal = nullptr;
   /// Null if no calibration is in use.
   const RigCalibration* in_use = nullptr;
+  CalibrationOrigin source = CalibrationOrigin::elsewhere;
   /// Log with the frames since the snapshot; null to skip the tests on held-out frames.
   const TrackLog* log = nullptr;
   /// Standard deviation of a tracked corner in pixels, for reference_depth_m().
@@ -121,7 +119,7 @@ struct AcceptanceInput {
   /// True if a change of the rig among the frames closes the gate. Only one change may, because a
   /// repeated false detection would close it indefinitely.
   bool may_have_changed = true;
-  /// True if the solution must fit held-out frames better than `in_use`.
+  /// True if the solution must fit held-out frames better than `in_use`, or its depths must differ.
   bool must_be_better = true;
 };
 
@@ -137,5 +135,15 @@ struct AcceptanceInput {
 /// noise counts.
 [[nodiscard]] double depth_excess(const RigCalibration& rig, const CalibrationOptions& options,
                                   double pixel_sigma) noexcept;
+
+/// Compares the configured focal length with the one that the images show.
+///
+/// An error of the focal length scales all distances, and neither epipolar lines nor a solve with
+/// fixed intrinsics show it. A solve that frees every focal length within kFocalPriorSigma does, by
+/// rotations and by the optical flow of straight motion with the known baseline.
+///
+/// `found`: such a solve. `given`: the initial calibration. Pure.
+[[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,
+                                                  const RigCalibration& given) noexcept;
 
 }  // namespace vergence::calibration

@@ -37,6 +37,22 @@ struct MonitorOptions {
   int collapse_expected = 40;
 };
 
+/// The left camera and camera k of a rig: X_k = T_camera_left X_left.
+struct StereoPair {
+  Transform T_camera_left{};
+  Pinhole left{}, camera{};
+};
+[[nodiscard]] StereoPair stereo_pair(const RigCalibration& rig, std::size_t k) noexcept;
+
+/// Normalised coordinates of a pixel.
+[[nodiscard]] inline Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
+  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
+}
+/// Pixel of a point in the camera's frame.
+[[nodiscard]] inline Vec2 project(const Pinhole& k, const Vec3& p) noexcept {
+  return {k.fx * p.x() / p.z() + k.cx, k.fy * p.y() / p.z() + k.cy};
+}
+
 /// A point seen by the left camera and camera k in one frame, in undistorted pixels of each
 /// camera's own K. Its match was searched for in a band wide enough not to depend on the
 /// calibration in use.
@@ -80,7 +96,6 @@ struct MonitorResult {
   bool undecided = false;
   /// Largest statistic of all windows.
   double statistic = 0;
-  double threshold = 0;
 
   /// Fraction of a frame that the camera's images are late (negative: early), if that explains most
   /// of the changes since the reference was set; else 0.
@@ -112,7 +127,7 @@ struct MonitorResult {
 ///
 ///     Arena arena;
 ///     Monitor monitor(options, arena);
-///     if (!monitor.set_reference(T_right_left, left, right, covariance)) return;
+///     if (!monitor.set_reference(pair, covariance)) return;
 ///     const auto verdict = monitor.update(frame);  // each posed frame
 ///     if (verdict.kind != MonitorResult::Kind::quiet) recalibrate(verdict.onset_frame);
 ///
@@ -122,14 +137,14 @@ struct MonitorResult {
 /// Errors   None; values that are not finite are left out.
 class Monitor {
  public:
+  Monitor() = default;
   Monitor(const MonitorOptions& options, Arena& arena);
 
-  /// Sets the calibration to test, X_k = T_camera_left X_left, and clears all evidence.
+  /// Sets the calibration to test and clears all evidence.
   /// `covariance` is of its left perturbation (rad, m) by noise alone: errors of the intrinsics
   /// show in no residual, so the total covariance would make the monitor insensitive. Returns false
   /// if |t| is zero or a value is not finite; then every update() is quiet.
-  bool set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right,
-                     const Mat6& covariance) noexcept;
+  bool set_reference(const StereoPair& pair, const Mat6& covariance) noexcept;
 
   /// Sets the scatter that lens errors are expected to cause between stretches of a run until it is
   /// measured, in px rms over the image; at least monitor.bias_px, the default. It survives
@@ -144,7 +159,7 @@ class Monitor {
  private:
   struct Parts;
   // Constructed in the arena.
-  Parts* parts_;
+  Parts* parts_ = nullptr;
 };
 
 }  // namespace vergence::calibration

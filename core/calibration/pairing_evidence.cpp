@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/calibration/detail/monitor_evidence.hpp"
+#include "core/calibration/detail/monitor_residuals.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/robust.hpp"
 
@@ -12,18 +12,9 @@ namespace {
 
 // Noise of the distance in px, from two positions known to 0.15 px.
 constexpr double kNoise = 0.2;
-// Number of independent points that a frame counts for, because its errors share causes (rolling
-// shutter, a lens). Each counts at most one log-likelihood.
-constexpr double kPointsOfAFrame = 5;
 // Page's reference value: the log ratio by chance of two widths at standstill, each known to a
 // tenth. Without it the sum would drift above any bound.
 constexpr double kReference = 0.25;
-// Threshold for one wrong decision in a million (Wald 1945); takes at least three frames.
-constexpr double kDecided = 13.8;
-
-Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
-  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
-}
 
 }  // namespace
 
@@ -34,34 +25,28 @@ PairingEvidence::PairingEvidence(std::size_t capacity, Arena& arena)
       early_px_(arena.make<float>(capacity, "pairing: distances, left late")) {}
 
 void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> points,
-                           const Transform& T_camera_left, const Pinhole& left,
-                           const Pinhole& camera) noexcept {
-  if (frame != frame_ + 1) count_ = 0;
+                           const StereoPair& pair) noexcept {
+  if (frame != frame_ + 1) before_.clear();
   frame_ = frame;
-  points = points.first(std::min(points.size(), before_.size()));
-  std::sort(points.begin(), points.end(),
-            [](const StereoObservation& a, const StereoObservation& b) noexcept {
-              return a.track < b.track;
-            });
-  const EpipolarGeometry lines(T_camera_left);
+  points = points.first(std::min(points.size(), before_.capacity()));
+  std::ranges::sort(points, {}, &StereoObservation::track);
+  const EpipolarGeometry lines(pair.T_camera_left);
   const auto distance = [&](const Vec2& in_left, const Vec2& in_camera) noexcept {
     double d = 0;
-    (void)lines.sampson(ray(left, in_left), ray(camera, in_camera), &d, nullptr);
-    return static_cast<float>(std::abs(d) * camera.fx);
+    (void)lines.sampson(ray(pair.left, in_left), ray(pair.camera, in_camera), &d, nullptr);
+    return static_cast<float>(std::abs(d) * pair.camera.fx);
   };
   std::size_t n = 0, both = 0;
   for (const StereoObservation& now : points) {
     now_[n++] = distance(now.left, now.right);
-    const auto end = before_.begin() + static_cast<std::ptrdiff_t>(count_);
-    const auto before = std::lower_bound(
-        before_.begin(), end, now.track,
-        [](const StereoObservation& o, std::uint32_t track) noexcept { return o.track < track; });
-    if (before == end || before->track != now.track) continue;
+    const auto* before =
+        std::ranges::lower_bound(before_, now.track, {}, &StereoObservation::track);
+    if (before == before_.end() || before->track != now.track) continue;
     late_px_[both] = distance(before->left, now.right);
     early_px_[both++] = distance(now.left, before->right);
   }
-  std::copy(points.begin(), points.end(), before_.begin());
-  count_ = points.size();
+  before_.clear();
+  for (const StereoObservation& now : points) (void)before_.push(now);
   distance_px_ = n > 0 ? static_cast<double>(median(now_.first(n))) : 0;
   if (both < kMinTracksOfFrame) return;
   const double now = std::max(distance_px_, kNoise);
@@ -81,23 +66,6 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
   if (lag_frames() != 0) question();
   if (cameras_in_sync()) questioned_ = false;
   if (std::max(shifted_[0], shifted_[1]) < 1) usual_px_ += detail::kFastUpdate * (now - usual_px_);
-}
-
-double PairingEvidence::lag_margin() const noexcept {
-  return std::max(shifted_[0], shifted_[1]) / kDecided;
-}
-
-int PairingEvidence::lag_frames() const noexcept {
-  if (lag_margin() < 1) return 0;
-  return shifted_[0] > shifted_[1] ? 1 : -1;
-}
-
-bool PairingEvidence::cameras_in_sync() const noexcept {
-  return std::min(in_step_[0], in_step_[1]) >= kDecided;
-}
-
-bool PairingEvidence::suspected() const noexcept {
-  return std::max(shifted_[0], shifted_[1]) >= 0.5 * kPointsOfAFrame;
 }
 
 }  // namespace vergence::calibration

@@ -2,6 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "core/geometry/epipolar.hpp"
+#include "core/math/linear_solve.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -41,6 +46,41 @@ void assume_transforms(double sigma, RigCalibration* rig) noexcept {
       rig->covariance.set(row, row, own * own);
     }
   }
+}
+
+RigCovariance noise_only(const RigCovariance& wide) noexcept {
+  RigCovariance noise = wide;
+  for (int held = intrinsic_row(0); held < intrinsic_row(0) + 4; ++held) {
+    const double variance = noise(held, held);
+    // Earlier parameters determine this one if only rounding is left of its variance.
+    constexpr double rounding = kRigSize * std::numeric_limits<double>::epsilon();
+    if (!wide.known(held) || !(variance > rounding * wide(held, held))) continue;
+    const RigCovariance before = noise;
+    for (int r = 0; r < kRigSize; ++r)
+      for (int c = 0; c <= r; ++c)
+        noise.set(r, c, before(r, c) - before(r, held) * before(c, held) / variance);
+  }
+  return noise;
+}
+
+double agreement(const RigCalibration& a, const RigCalibration& b, int k) noexcept {
+  const RigCovariance first = noise_only(a.covariance), second = noise_only(b.covariance);
+  const auto c = static_cast<std::size_t>(k);
+  // The transform's five parameters: rotation, and t along two directions orthogonal to it.
+  const Transform &Ta = a.T_camera_left[c], &Tb = b.T_camera_left[c];
+  Eigen::Matrix<double, 6, 5> basis = Eigen::Matrix<double, 6, 5>::Zero();
+  basis.topLeftCorner<3, 3>().setIdentity();
+  basis.bottomRightCorner<3, 2>() = tangent_basis(Ta.t.normalized());
+  Vec6 way;
+  way << log_so3(Tb.R * Ta.R.transpose()), Tb.t - Ta.t;
+  Mat6 C;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      C(i, j) = first(extrinsic_row(k) + i, extrinsic_row(k) + j) +
+                second(extrinsic_row(k) + i, extrinsic_row(k) + j);
+  const Mat5 own = basis.transpose() * C * basis;
+  const Vec5 d = basis.transpose() * way;
+  return d.dot(ldlt_solve(own, d)) / 5;
 }
 
 }  // namespace vergence::calibration

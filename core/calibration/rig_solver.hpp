@@ -46,7 +46,6 @@ struct RigSolution {
   std::uint64_t newest = 0;
   int frames = 0;
   int tracks = 0;
-  int observations = 0;
 
   /// Number of tracks nearer than CalibrationOptions::near_baselines.
   int near = 0;
@@ -95,43 +94,27 @@ class RigSolver {
     std::uint16_t frame;
     std::uint16_t observation;
   };
-  [[nodiscard]] static Vec2 observed_pixel(const LoggedObservation& s, int k) noexcept {
-    return s.raw[static_cast<std::size_t>(k)].cast<double>();
-  }
-  [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras,
-                                                   std::size_t features) noexcept;
-  [[nodiscard]] bool choose_candidate(const RigCalibration& rig) noexcept;
-  [[nodiscard]] bool begin_with(const RigSolveRequest& request) noexcept;
+  /// Sets T_camera_left_ to the request's, or to those of the logged frame that fits best.
+  [[nodiscard]] bool place_cameras(const RigSolveRequest& request) noexcept;
   void choose_frames() noexcept;
-  void sort_tracks() noexcept;
   void make_points() noexcept;
-  void hold_pieces() noexcept;
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
+  void hold_pieces() noexcept;
   [[nodiscard]] BundleOptions bundle_options(const RigSolveRequest& request,
                                              bool focal_lengths) const noexcept;
+  [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] BundleResult adjust_robustly(BundleOptions how) noexcept;
   /// Removes the outliers of the last adjustment and adjusts again with Cauchy's loss. `last`: to
   /// the end, with covariances.
   [[nodiscard]] BundleResult readjust(BundleOptions how, bool last,
                                       double tolerance_sigmas) noexcept;
+  void drop_outliers(double limit) noexcept;
   /// Sets status, rig and sigmas. Returns true if they can be used.
   bool finish(const BundleResult& r, RigSolution* s) noexcept;
-  [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
-  [[nodiscard]] double residual_scale() noexcept;
-  void drop_outliers(double limit) noexcept;
-  void write_result(const BundleResult& r, RigSolution* s) const noexcept;
   void describe(RigSolution* s) const noexcept;
   /// Relative sigma of the path length by the noise of the tracks, in the last connected piece.
   [[nodiscard]] double length_noise(const BundleResult& r) const noexcept;
-  void watch_frames(RigSolution* s) noexcept;
-  /// Result of running the monitors of one camera over the frames used, with the solution as the
-  /// reference.
-  struct Watch {
-    int lag_frames = 0;
-    double offset_frames = 0;
-    std::uint64_t changed_at = 0;
-  };
-  [[nodiscard]] Watch watch_camera(int k, const RigCalibration& rig) noexcept;
+  void watch_frames(std::size_t k, RigSolution* s) noexcept;
 
   const CalibrationOptions& options_;
   TrackLog log_;
@@ -140,13 +123,12 @@ class RigSolver {
   double expected_scatter_px_;
   PairingEvidence pairing_;
   DisparityJumpDetector jumps_;
-  std::size_t max_frames_;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
-  int count_ = 0;
+  std::size_t count_;
   BoundedVector<Transform> poses_;
   // Per pose, 1 if it begins a piece that no track connects to earlier poses.
-  BoundedVector<std::uint8_t> held_;
+  std::span<std::uint8_t> held_;
   // Buffer of hold_pieces().
   std::span<int> ties_;
   // Index of each pose in the log.

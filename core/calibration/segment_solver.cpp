@@ -21,9 +21,8 @@ std::optional<RigSolution> SegmentSolver::add(const TrackLog& tracks) noexcept {
   std::optional<RigSolution> solved;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const LoggedFrame& f = tracks.frame(i);
-    if (any_ && f.number <= newest_) continue;
-    any_ = true;
-    newest_ = f.number;
+    if (f.number < next_) continue;
+    next_ = f.number + 1;
     ++taken_;
     solver_.log().append(f);
     if (solver_.log().size() == frames_) solved = solve();
@@ -37,22 +36,19 @@ std::optional<RigSolution> SegmentSolver::end() noexcept {
 }
 
 std::optional<RigSolution> SegmentSolver::solve() noexcept {
-  RigSolveRequest request;
-  request.rig = start_;
-  request.from_rig = true;
-  request.given = &given_;
-  const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;
+  RigSolveRequest request{.rig = start_, .from_rig = true, .given = &given_};
   // Drift is applied to a copy, because a failed solve must not age the prior.
-  RigCalibration known = known_;
-  if (any_known_) {
-    let_drift((newest - known.found).to_seconds() / 3600.0, options_, &known);
-    request.known = &known;
+  std::optional<RigCalibration> known = known_;
+  if (known) {
+    const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;
+    let_drift((newest - known->found).to_seconds() / 3600.0, options_, &*known);
+    request.known = &*known;
   }
   RigSolution s = solver_.solve(request);
   solver_.log().clear();
   if (s.status == RigSolveStatus::ok && kind_ == Kind::joined) {
-    start_ = known_ = s.rig;
-    any_known_ = true;
+    start_ = s.rig;
+    known_ = s.rig;
   }
   return s;
 }

@@ -39,12 +39,13 @@ class SegmentSolver {
 
   Kind kind_;
   CalibrationOptions options_;
-  RigCalibration given_, start_, known_;
-  bool any_known_ = false;
+  RigCalibration given_, start_;
+  // Posterior of the stretches solved so far, if they are joined.
+  std::optional<RigCalibration> known_;
   std::size_t frames_;
   RigSolver solver_;
-  std::uint64_t newest_ = 0, taken_ = 0;
-  bool any_ = false;
+  // Number of the first frame that was not added yet, and of frames added.
+  std::uint64_t next_ = 0, taken_ = 0;
 };
 
 }  // namespace vergence::calibration

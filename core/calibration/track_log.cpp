@@ -22,10 +22,7 @@ void TrackLog::begin(const LoggedFrame& frame) noexcept {
 void TrackLog::push(const LoggedObservation& observation) noexcept {
   const std::size_t at = slot(size_ - 1);
   std::span<LoggedObservation>& held = frames_[at].observations;
-  if (held.size() == capacity_) {
-    ++left_out_;
-    return;
-  }
+  if (held.size() == capacity_) return;
   held = observations_.subspan(at * capacity_, held.size() + 1);
   held.back() = observation;
 }
@@ -46,20 +43,16 @@ void TrackLog::scale_about(const Vec3& centre, double factor) noexcept {
   }
 }
 
-void TrackLog::copy(const TrackLog& from, std::size_t frames) noexcept {
+void TrackLog::copy(const TrackLog& from) noexcept {
   clear();
   first_ = 0;
-  const std::size_t n = std::min({frames, from.size(), frames_.size()});
+  const std::size_t n = std::min(from.size(), frames_.size());
   for (std::size_t i = from.size() - n; i < from.size(); ++i) append(from.frame(i));
 }
 
 void TrackLog::append(const LoggedFrame& frame) noexcept {
   begin(frame);
-  const std::size_t at = slot(size_ - 1), count = std::min(frame.observations.size(), capacity_);
-  std::copy_n(frame.observations.begin(), count,
-              observations_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
-  frames_[at].observations = observations_.subspan(at * capacity_, count);
-  left_out_ += frame.observations.size() - count;
+  for (const LoggedObservation& observation : frame.observations) push(observation);
 }
 
 }  // namespace vergence::calibration

@@ -19,9 +19,7 @@ struct LoggedObservation {
   float sigma = 0;
   std::array<Eigen::Vector2f, kMaxCameras> raw{};
 
-  [[nodiscard]] bool by(int k) const noexcept {
-    return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0;
-  }
+  [[nodiscard]] bool by(std::size_t k) const noexcept { return ((cameras >> k) & 1U) != 0; }
 };
 
 /// One rig frame of the log. `T_camera_left` is from the cameras' own poses if unlinked, else from
@@ -42,8 +40,8 @@ struct LoggedFrame {
 
 /// Ring of the newest moving rig frames with their tracks, from which a calibration is solved.
 ///
-/// If full, the oldest frame is dropped; observations of a frame beyond its capacity are left out
-/// and counted. Not thread-safe. Memory from the arena at construction.
+/// If full, the oldest frame is dropped; observations of a frame beyond its capacity are left out.
+/// Not thread-safe. Memory from the arena at construction.
 class TrackLog {
  public:
   TrackLog(std::size_t frames, std::size_t observations, Arena& arena);
@@ -58,15 +56,14 @@ class TrackLog {
   void scale_about(const Vec3& centre, double factor) noexcept;
   /// Copies a frame of another log with its observations.
   void append(const LoggedFrame& frame) noexcept;
-  /// Replaces the content by the newest `frames` frames of another log.
-  void copy(const TrackLog& from, std::size_t frames) noexcept;
+  /// Replaces the content by the newest frames of another log, as many as there is room for.
+  void copy(const TrackLog& from) noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   /// Frame i; 0 is the oldest.
   [[nodiscard]] LoggedFrame& frame(std::size_t i) noexcept { return frames_[slot(i)]; }
   [[nodiscard]] const LoggedFrame& frame(std::size_t i) const noexcept { return frames_[slot(i)]; }
-  [[nodiscard]] std::uint64_t left_out() const noexcept { return left_out_; }
 
  private:
   [[nodiscard]] std::size_t slot(std::size_t i) const noexcept {
@@ -77,7 +74,6 @@ class TrackLog {
   std::span<LoggedObservation> observations_;
   std::size_t capacity_;
   std::size_t first_ = 0, size_ = 0;
-  std::uint64_t left_out_ = 0;
 };
 
 }  // namespace vergence::calibration

@@ -1,9 +1,6 @@
 #include "core/estimator/calibration_frames.hpp"
 
-#include <algorithm>
 #include <limits>
-
-#include "core/calibration/gates.hpp"
 
 namespace vergence {
 namespace {
@@ -63,14 +60,8 @@ void CalibrationFrames::add(odometry::Odometry& odometry, const odometry::FrameO
   frames_still_ = 0;
 }
 
-bool CalibrationFrames::standing() const noexcept { return frames_still_ > options_.min_frames; }
-
 void CalibrationFrames::begin_segment(std::uint64_t number) noexcept {
   log_.drop_before(number);
-  begin_segment();
-}
-
-void CalibrationFrames::begin_segment() noexcept {
   solved_frames_ = 0;
   logged_ = log_.size();
   required_ = min_frames();
@@ -81,29 +72,8 @@ void CalibrationFrames::clear() noexcept {
   begin_segment();
 }
 
-bool CalibrationFrames::enough() const noexcept { return logged_ >= required_ && enough_for_any(); }
-
-bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= min_to_solve(); }
-
-bool CalibrationFrames::new_since_solve() const noexcept {
-  return log_.size() >= solved_frames_ + kMinForMean;
-}
-
 void CalibrationFrames::require(std::size_t frames) noexcept {
   required_ = std::max(std::min(max_frames(), frames), logged_ + kMinForMean);
-}
-
-std::size_t CalibrationFrames::max_frames() const noexcept {
-  return static_cast<std::size_t>(options_.max_frames);
-}
-
-std::size_t CalibrationFrames::min_to_solve() const noexcept {
-  // With the held-out frames, a supplied calibration is evaluated as soon as a new one is solved.
-  return min_frames() - std::min<std::size_t>(min_frames(), kMinForMean);
-}
-
-std::size_t CalibrationFrames::min_frames() const noexcept {
-  return static_cast<std::size_t>(options_.min_frames);
 }
 
 }  // namespace vergence

@@ -1,6 +1,9 @@
 #pragma once
+#include <algorithm>
+
 #include "core/calibration/options.hpp"
 #include "core/calibration/track_log.hpp"
+#include "core/math/robust.hpp"
 #include "core/odometry/odometry.hpp"
 
 namespace vergence {
@@ -22,23 +25,24 @@ class CalibrationFrames {
   void add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
            const RigFrame& frame) noexcept;
   /// Returns true if no frame was logged for so long that the rig must be standing still.
-  [[nodiscard]] bool standing() const noexcept;
+  [[nodiscard]] bool standing() const noexcept { return frames_still_ > options_.min_frames; }
   void restart_standing() noexcept { frames_still_ = 0; }
 
   /// Begins another segment with the logged frames from `number` on; drops older ones.
-  void begin_segment(std::uint64_t number) noexcept;
-  void begin_segment() noexcept;
+  void begin_segment(std::uint64_t number = 0) noexcept;
   /// Drops the segment's frames before `number`; the segment continues.
   void drop_before(std::uint64_t number) noexcept { log_.drop_before(number); }
   /// Drops all frames and begins another segment.
   void clear() noexcept;
 
   /// True if there are enough frames for the next solve.
-  [[nodiscard]] bool enough() const noexcept;
+  [[nodiscard]] bool enough() const noexcept { return logged_ >= required_ && enough_for_any(); }
   /// True if there are enough frames for any solve.
-  [[nodiscard]] bool enough_for_any() const noexcept;
+  [[nodiscard]] bool enough_for_any() const noexcept { return log_.size() >= min_to_solve(); }
   /// True if enough frames were logged since solve_begun() to make another solve worthwhile.
-  [[nodiscard]] bool new_since_solve() const noexcept;
+  [[nodiscard]] bool new_since_solve() const noexcept {
+    return log_.size() >= solved_frames_ + kMinForMean;
+  }
   void solve_begun() noexcept { solved_frames_ = log_.size(); }
   /// Number of the segment's frames in the newest solve.
   [[nodiscard]] std::size_t solved_frames() const noexcept { return solved_frames_; }
@@ -51,11 +55,18 @@ class CalibrationFrames {
   /// Makes the next solve wait for a full segment.
   void require_full() noexcept { required_ = max_frames(); }
   /// Capacity of the log, and number of frames of a full segment.
-  [[nodiscard]] std::size_t max_frames() const noexcept;
+  [[nodiscard]] std::size_t max_frames() const noexcept {
+    return static_cast<std::size_t>(options_.max_frames);
+  }
   /// Minimum number of frames of the first solve of an estimation.
-  [[nodiscard]] std::size_t min_frames() const noexcept;
-  /// Minimum number of frames of any solve; enough to verify a supplied calibration.
-  [[nodiscard]] std::size_t min_to_solve() const noexcept;
+  [[nodiscard]] std::size_t min_frames() const noexcept {
+    return static_cast<std::size_t>(options_.min_frames);
+  }
+  /// Minimum number of frames of any solve: with the held-out frames, a supplied calibration is
+  /// evaluated as soon as a new one is solved.
+  [[nodiscard]] std::size_t min_to_solve() const noexcept {
+    return min_frames() - std::min<std::size_t>(min_frames(), kMinForMean);
+  }
 
   [[nodiscard]] const calibration::TrackLog& log() const noexcept { return log_; }
 

@@ -32,11 +32,11 @@ enum class Degradation : std::uint8_t {
 };
 inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradation::window) + 1;
 
-/// The degradations that apply, each with its reason, first frame, and number of frames of evidence
-/// that ends it. A pose is `ok` while there are none, otherwise `degraded` for the strongest
+/// The degradations that apply, each with its reason and the number of frames of evidence that ends
+/// it. A pose is `ok` while there are none, otherwise `degraded` for the strongest
 /// reason.
 ///
-///     ledger.enter(Degradation::scene, Reason::map_reset, frame.number, 10);
+///     ledger.enter(Degradation::scene, Reason::map_reset, 10);
 ///     if (const DegradationLedger::Entry* why = ledger.strongest(true)) use(why->reason);
 ///     ledger.weaken(Degradation::scene);  // one frame of evidence against it
 ///
@@ -49,24 +49,18 @@ class DegradationLedger {
   struct Entry {
     /// Reason::none if the degradation does not apply.
     Reason reason = Reason::none;
-    std::uint64_t since = 0;
     /// Number of frames of evidence that end the degradation.
     int left = 0;
   };
 
-  /// Enters a degradation, or renews it and keeps its first frame.
-  void enter(Degradation degradation, Reason reason, std::uint64_t frame,
-             int left = kUntilCleared) noexcept {
-    Entry& e = at(degradation);
-    e = {reason, e.reason == Reason::none ? frame : e.since, left};
+  /// Enters or renews a degradation.
+  void enter(Degradation degradation, Reason reason, int left = kUntilCleared) noexcept {
+    at(degradation) = {reason, left};
   }
   void clear(Degradation degradation) noexcept { at(degradation) = {}; }
   /// Enters the degradation if it applies, otherwise ends it.
-  void set(Degradation degradation, bool applies, Reason reason, std::uint64_t frame) noexcept {
-    if (applies)
-      enter(degradation, reason, frame);
-    else
-      clear(degradation);
+  void set(Degradation degradation, bool applies, Reason reason) noexcept {
+    at(degradation) = applies ? Entry{reason, kUntilCleared} : Entry{};
   }
   /// Counts one frame of evidence against a degradation. Returns true if that ended it.
   bool weaken(Degradation degradation) noexcept {

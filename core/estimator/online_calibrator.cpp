@@ -1,17 +1,17 @@
 #include "core/estimator/online_calibrator.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "core/calibration/posterior.hpp"
-#include "core/estimator/detail/solution_review.hpp"
 
 namespace vergence {
 namespace {
 
 using calibration::Gate;
-using calibration::RigSolution;
+using calibration::RigSolveStatus;
 
 std::size_t max_tracks(const EstimatorOptions& o) noexcept {
   return static_cast<std::size_t>(o.odometry.features);
@@ -23,23 +23,20 @@ double misfit_px(const CalibrationDecision& d) noexcept {
   return std::sqrt(std::max(0.0, before * before - after * after));
 }
 
-/// Clears the extrinsics of the prior when another rig is adopted; the intrinsics stay.
-void clear_rig(std::optional<RigCalibration>* refined) noexcept {
-  if (*refined) calibration::assume_transforms(calibration::kUnknownTransform, &**refined);
-}
-
 }  // namespace
 
 OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
                                    const RigCalibration& nominal, Arena& arena,
-                                   BackgroundRunner& solver)
+                                   BackgroundRunner& runner)
     : options_(options),
-      rig_(rig),
+      given_(rig),
       nominal_(nominal),
+      rig_(rig),
       state_(options.trust == CalibrationTrust::none ? CalibrationState::none
                                                      : CalibrationState::unverified),
       frames_(options.calibration, max_tracks(options), arena),
-      solve_(options, rig, max_tracks(options), arena, solver),
+      runner_(runner),
+      solver_(options.calibration, options.monitor, rig.cameras, max_tracks(options), arena),
       monitor_(options.monitor, rig.cameras, max_tracks(options), arena) {
   if (!calibrated()) return;
   monitor_.watch(rig_, false);
@@ -53,34 +50,40 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   frames_.require(frames_.min_to_solve());
 }
 
+OnlineCalibrator::~OnlineCalibrator() {
+  if (solving_) runner_.wait();
+}
+
+void OnlineCalibrator::set_state(CalibrationTrigger what) noexcept {
+  if (const auto* edge = find_edge(kCalibrationTransitions, state_, what)) state_ = edge->to;
+}
+
 void OnlineCalibrator::adopt(const CalibrationDecision& found) noexcept {
-  state_ = next_state(
-      state_, found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
   rig_ = found.calibration;
   source_ = calibration::CalibrationOrigin::this_drive;
-  clear_rig(&refined_);
   monitor_.expect_map_rebuild();
+  if (found.is_refinement) return;
+  set_state(found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
+  clear_prior();
   frames_.begin_segment();
 }
 
+void OnlineCalibrator::clear_prior() noexcept {
+  if (refined_) calibration::assume_transforms(calibration::kUnknownTransform, &*refined_);
+}
+
 void OnlineCalibrator::keep() noexcept {
-  state_ = next_state(state_, CalibrationTrigger::kept);
+  set_state(CalibrationTrigger::kept);
   // Measurements from before the rig became suspect do not describe the present rig.
-  if (search_.cause != CalibrationCause::requested) clear_rig(&refined_);
+  if (search_.cause != CalibrationCause::requested) clear_prior();
   monitor_.expect_map_rebuild();
   frames_.begin_segment();
 }
 
 void OnlineCalibrator::restore(const RigCalibration& rig) noexcept {
-  state_ = next_state(state_, CalibrationTrigger::contradicted);
+  set_state(CalibrationTrigger::contradicted);
   rig_ = rig;
   keep();
-}
-
-void OnlineCalibrator::adopt_refinement(const RigCalibration& rig) noexcept {
-  rig_ = rig;
-  source_ = calibration::CalibrationOrigin::this_drive;
-  monitor_.expect_map_rebuild();
 }
 
 void OnlineCalibrator::map_rebuilt(const odometry::Odometry& odometry) noexcept {
@@ -88,13 +91,13 @@ void OnlineCalibrator::map_rebuilt(const odometry::Odometry& odometry) noexcept 
 }
 
 void OnlineCalibrator::clear_frames() noexcept {
-  solve_.discard();
+  discard_solve();
   frames_.clear();
   monitor_.reset();
 }
 
 void OnlineCalibrator::map_lost() noexcept {
-  clear_rig(&refined_);
+  clear_prior();
   clear_frames();
   monitor_.map_lost();
 }
@@ -102,9 +105,9 @@ void OnlineCalibrator::map_lost() noexcept {
 void OnlineCalibrator::start_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
                                         std::uint64_t now) noexcept {
   search_ = {.cause = cause.value_or(search_.cause), .onset = onset, .since = now};
-  state_ = next_state(state_, CalibrationTrigger::suspected);
+  set_state(CalibrationTrigger::suspected);
   gate_ = Gate::open;
-  solve_.discard();
+  discard_solve();
   frames_.begin_segment(onset);
   frames_.restart_standing();
   monitor_.begin_unlinked(rig_);
@@ -116,52 +119,91 @@ Reason OnlineCalibrator::missing() const noexcept {
   return gate_ == Gate::needs_near_structure ? Reason::needs_near_structure : Reason::none;
 }
 
-bool OnlineCalibrator::can_solve() const noexcept { return !solve_.running() && frames_.enough(); }
-
 void OnlineCalibrator::start_solve() noexcept {
   frames_.solve_begun();
-  BackgroundSolve::Request request;
-  request.rig = rig_;
-  request.for_new_rig = estimating();
-  RigCalibration prior;
+  const calibration::TrackLog& log = frames_.log();
+  solver_.log().copy(log);
+  // The prior of the intrinsics is the initial calibration, not earlier results of these frames, so
+  // that no measurement counts twice.
+  request_ = {.rig = rig_, .from_rig = !estimating(), .given = &given_};
   if (refined_) {
-    prior = *refined_;
-    request.prior = &prior;
-    const calibration::TrackLog& log = frames_.log();
+    prior_ = *refined_;
+    request_.known = &prior_;
     // The age of a supplied calibration is unknown, and its sigmas include it.
     const Stamp newest = log.frame(log.size() - 1).stamp,
-                found = prior.found == Stamp{} ? newest : prior.found;
-    const double hours = (newest - found).to_seconds() / 3600.0;
+                found = prior_.found == Stamp{} ? newest : prior_.found;
     if (estimating())
-      calibration::assume_transforms(calibration::kUnknownTransform, &prior);
+      calibration::assume_transforms(calibration::kUnknownTransform, &prior_);
     else
-      calibration::let_drift(hours, options_.calibration, &prior);
+      calibration::let_drift((newest - found).to_seconds() / 3600.0, options_.calibration, &prior_);
   }
-  solve_.start(frames_.log(), request);
+  solving_ = true;
+  discarded_ = false;
+  frames_since_start_ = 0;
+  next_decision_ = std::min(kMinForMean, options_.calibration.adopt_after);
+  runner_.start(TaskRef(task_));
 }
 
-SolutionReview OnlineCalibrator::review() const noexcept {
-  return {solve_.solved(),
-          {.options = options_,
-           .nominal = nominal_,
-           .in_use = calibrated() ? &rig_ : nullptr,
-           .source = source_,
-           .log = frames_.log(),
-           .focal = solve_.focal_check(),
-           .may_have_changed = !(estimating() && search_.frames_before_change_dropped)}};
+void OnlineCalibrator::run_solve() noexcept {
+  solved_ = solver_.solve(request_);
+  solved_focal_ = {};
+  if (options_.calibration.intrinsics != calibration::IntrinsicsEstimation::full || focal_known_ ||
+      solved_.status != RigSolveStatus::ok)
+    return;
+  const calibration::RigSolution found = solver_.free_focal_lengths(request_);
+  solved_focal_ = calibration::check_focal_length(found, given_);
+  solved_.solve_ms += found.solve_ms;
+}
+
+bool OnlineCalibrator::start_last_solve() noexcept {
+  const bool more = estimating() || frames_.new_since_solve();
+  if (solving_ || !more || !frames_.enough_for_any()) return false;
+  start_solve();
+  return true;
+}
+
+Gate OnlineCalibrator::gate(bool must_be_better) const noexcept {
+  return calibration::check_acceptance(
+      {.solution = &solved_,
+       .nominal = &nominal_,
+       .in_use = calibrated() ? &rig_ : nullptr,
+       .source = source_,
+       .log = &frames_.log(),
+       .pixel_sigma = options_.odometry.pixel_sigma,
+       .may_have_changed = !(estimating() && search_.frames_before_change_dropped),
+       .must_be_better = must_be_better},
+      options_.calibration);
+}
+
+calibration::Assessment OnlineCalibrator::assess(
+    const RigCalibration& current, calibration::CalibrationOrigin source) const noexcept {
+  return calibration::assess(solved_.rig, current, source, frames_.log(), solved_.newest,
+                             options_.calibration, options_.odometry.pixel_sigma);
 }
 
 std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
                                                             std::uint64_t number) noexcept {
-  solve_.clear_waited();
-  if (!solve_.running() || !solve_.next_frame()) return std::nullopt;
-  // The decision waits for enough held-out frames. At standstill none are logged.
-  if (!solve_.outdated(estimating()) && !review().held_out_enough()) return std::nullopt;
-  // An estimate is adopted as soon as the frames after its snapshot confirm it, and rejected only
-  // when more of them would not help. A refinement waits only for its held-out frames.
-  if (solve_.for_new_rig() && !solve_.outdated(estimating()) && !solve_.must_decide()) {
-    if (review().gate() != Gate::open) {
-      solve_.postpone();
+  waited_ms_ = 0;
+  if (!solving_ || ++frames_since_start_ < next_decision_) return std::nullopt;
+  if (options_.adoption == Adoption::after_fixed_frames) {
+    const auto begin = std::chrono::steady_clock::now();
+    runner_.wait();
+    waited_ms_ =
+        std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  } else if (runner_.busy()) {
+    return std::nullopt;
+  }
+  if (!outdated()) {
+    // The decision waits for enough held-out frames; a failed solution needs none. At standstill
+    // none are logged.
+    if (solved_.status == RigSolveStatus::ok &&
+        !calibration::held_out_enough(frames_.log(), solved_.newest))
+      return std::nullopt;
+    // An estimate is adopted as soon as the frames after its snapshot confirm it, and rejected only
+    // when more of them would not help. A refinement waits only for its held-out frames.
+    const int adopt_after = options_.calibration.adopt_after;
+    if (!request_.from_rig && frames_since_start_ < adopt_after && gate() != Gate::open) {
+      next_decision_ = std::min(next_decision_ + kMinForMean, adopt_after);
       return std::nullopt;
     }
   }
@@ -170,52 +212,63 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
 
 std::optional<CalibrationDecision> OnlineCalibrator::decide_now(Stamp stamp,
                                                                 std::uint64_t number) noexcept {
-  if (!solve_.running()) return std::nullopt;
-  solve_.finish();
+  if (!solving_) return std::nullopt;
+  runner_.wait();
   return evaluate(stamp, number, true);
-}
-
-bool OnlineCalibrator::start_last_solve() noexcept {
-  const bool more = estimating() || frames_.new_since_solve();
-  if (solve_.running() || !more || !frames_.enough_for_any()) return false;
-  start_solve();
-  return true;
 }
 
 std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::uint64_t number,
                                                               bool last) noexcept {
-  solve_.close();
-  if (solve_.outdated(estimating())) return std::nullopt;
+  solving_ = false;
+  if (outdated()) return std::nullopt;
+  gate_ = gate(false);
   // Frames of two rigs or out of sync cannot measure a focal length.
-  const Gate gate = review().gate(false);
-  if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
-    solve_.focal_check().accept(frames_.solved_frames() >= frames_.max_frames());
-  CalibrationDecision d = solve_.for_new_rig() ? evaluate_estimate(stamp, number)
-                                               : evaluate_refinement(stamp, number, last);
+  if (gate_ != Gate::rig_changed && gate_ != Gate::out_of_sync && solved_focal_.measured_px > 0) {
+    focal_ = solved_focal_;
+    focal_known_ = frames_.solved_frames() >= frames_.max_frames() && !focal_.doubted;
+  }
+  CalibrationDecision d;
+  d.stamp = stamp;
+  d.calibration = solved_.rig;
+  d.is_refinement = request_.from_rig;
+  d.latency_frames = static_cast<int>(number - search_.since);
+  d.onset_frame = search_.onset;
+  d.held_out_after_px = calibration::held_out(frames_.log(), solved_.newest, solved_.rig).median_px;
+  if (calibrated())
+    d.held_out_before_px = calibration::held_out(frames_.log(), solved_.newest, rig_).median_px;
+  d.focal = focal_;
+  d.solve_ms = solved_.solve_ms;
   // One knock changes the rig in one solve only.
-  const bool changed = solve_.solved().changed_at > 0;
+  const bool changed = solved_.changed_at > 0;
   d.not_rigid = std::exchange(search_.changed_in_solve, changed) && changed;
-  d.offset_frames = solve_.solved().offset_frames;
+  d.offset_frames = solved_.offset_frames;
+  if (d.is_refinement)
+    evaluate_refinement(last, &d);
+  else
+    evaluate_estimate(&d);
   return d;
 }
 
-CalibrationDecision OnlineCalibrator::evaluate_estimate(Stamp stamp,
-                                                        std::uint64_t number) noexcept {
-  const SolutionReview solution = review();
-  gate_ = solution.gate();
-  CalibrationDecision d = solution.decision(stamp);
-  d.cause = search_.cause;
-  d.latency_frames = static_cast<int>(number - search_.since);
-  d.onset_frame = search_.onset;
-  d.accepted = gate_ == Gate::open;
-  d.reason = calibration::reason(gate_);
-  solution.assess_next(&d);
-  if (!d.accepted) plan_search();
-  return d;
+void OnlineCalibrator::evaluate_estimate(CalibrationDecision* d) noexcept {
+  gate_ = gate();
+  d->cause = search_.cause;
+  d->accepted = gate_ == Gate::open;
+  d->reason = calibration::reason(gate_);
+  if (solved_.status == RigSolveStatus::ok) {
+    // The depth errors are those with the solution as the calibration in use.
+    const calibration::Assessment then =
+        assess(solved_.rig, calibration::CalibrationOrigin::this_drive);
+    d->reference_depth_m = then.depth_m;
+    d->depth_sigma_percent = then.sigma_percent;
+    // An error of the focal length scales all distances.
+    d->verified = then.verified && !d->focal.doubted;
+    if (calibrated()) d->depth_error_percent = assess(rig_, source_).difference_percent;
+  }
+  if (!d->accepted) plan_search();
 }
 
 void OnlineCalibrator::plan_search() noexcept {
-  const RigSolution& found = solve_.solved();
+  const calibration::RigSolution& found = solved_;
   if (gate_ == Gate::depth_unknown || gate_ == Gate::needs_motion ||
       gate_ == Gate::needs_near_structure) {
     // More frames help: sigmas fall with the root of their number.
@@ -237,7 +290,8 @@ void OnlineCalibrator::plan_search() noexcept {
 
 /// Applies a verification or contradiction and sets the monitor's expected scatter accordingly.
 void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_px) noexcept {
-  const CalibrationState before = std::exchange(state_, next_state(state_, what));
+  const CalibrationState before = state_;
+  set_state(what);
   if (state_ == before) return;
   monitor_.watch(rig_, verified() && solved_from_images());
   // A verified supplied calibration keeps its intrinsics, whose errors vary over the image.
@@ -245,27 +299,19 @@ void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_p
     monitor_.expect_scatter(std::max(options_.monitor.verified_bias_px, misfit_px));
 }
 
-CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint64_t number,
-                                                          bool last) noexcept {
-  const RigSolution& found = solve_.solved();
-  const SolutionReview solution = review();
-  gate_ = solution.gate(false);
-  CalibrationDecision d = solution.decision(stamp);
-  d.cause = CalibrationCause::refinement;
-  d.latency_frames = static_cast<int>(number - search_.since);
-  d.onset_frame = search_.onset;
-  d.is_refinement = true;
-  if (found.status == calibration::RigSolveStatus::ok) {
-    const calibration::Assessment a = solution.assess(rig_, source_);
-    d.reference_depth_m = a.depth_m;
-    d.depth_sigma_percent = a.sigma_percent;
-    d.depth_error_percent = a.difference_percent;
-    d.evidence = a.evidence;
-    d.certainty = a.certainty;
-    if (a.contradicted) d.cause = CalibrationCause::contradicted;
+void OnlineCalibrator::evaluate_refinement(bool last, CalibrationDecision* d) noexcept {
+  d->cause = CalibrationCause::refinement;
+  if (solved_.status == RigSolveStatus::ok) {
+    const calibration::Assessment a = assess(rig_, source_);
+    d->reference_depth_m = a.depth_m;
+    d->depth_sigma_percent = a.sigma_percent;
+    d->depth_error_percent = a.difference_percent;
+    d->evidence = a.evidence;
+    d->certainty = a.certainty;
+    if (a.contradicted) d->cause = CalibrationCause::contradicted;
     // At the end no held-out frames are left; the solution of more frames is better.
     const calibration::TrackLog& log = frames_.log();
-    const bool better = last && log.frame(log.size() - 1).number == found.newest
+    const bool better = last && log.frame(log.size() - 1).number == solved_.newest
                             ? source_ == calibration::CalibrationOrigin::this_drive
                             : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
@@ -273,26 +319,25 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint
     const bool certain = a.sigma_percent <= options_.calibration.max_depth_error_percent;
     if (gate_ == Gate::open && verified() && !certain && !a.contradicted) gate_ = Gate::no_better;
     // Frames that contradict earlier measurements verify nothing.
-    d.verified = gate_ == Gate::open
-                     ? certain
-                     : a.verified && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
-    d.verified = d.verified && !d.focal.doubted;
-    if (d.verified)
-      apply_assessment(CalibrationTrigger::verified, misfit_px(d));
-    else if (a.contradicted || d.focal.contradicted)
-      apply_assessment(CalibrationTrigger::contradicted, misfit_px(d));
+    d->verified = gate_ == Gate::open
+                      ? certain
+                      : a.verified && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
+    d->verified = d->verified && !d->focal.doubted;
+    if (d->verified)
+      apply_assessment(CalibrationTrigger::verified, misfit_px(*d));
+    else if (a.contradicted || d->focal.contradicted)
+      apply_assessment(CalibrationTrigger::contradicted, misfit_px(*d));
   }
-  d.accepted = gate_ == Gate::open;
-  d.reason = calibration::reason(gate_);
-  if (d.accepted && d.cause == CalibrationCause::contradicted) clear_rig(&refined_);
+  d->accepted = gate_ == Gate::open;
+  d->reason = calibration::reason(gate_);
+  if (d->accepted && d->cause == CalibrationCause::contradicted) clear_prior();
   plan_refinement();
-  return d;
 }
 
 /// Closes a full segment, whose result is the prior of the next one. A segment that later frames
 /// contradict is closed as well, because its frames are of another rig.
 void OnlineCalibrator::plan_refinement() noexcept {
-  const RigSolution& found = solve_.solved();
+  const calibration::RigSolution& found = solved_;
   const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;
   if (gate_ == Gate::does_not_fit) {
     frames_.begin_segment(found.newest + 1);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/calibration/gates.hpp"
 #include "core/calibration/posterior.hpp"
-#include "core/geometry/epipolar.hpp"
 
 namespace vergence {
 namespace {
@@ -26,15 +26,6 @@ Mat6 reference_covariance(bool solved_and_verified, double length) noexcept {
   return spread.cwiseAbs2().asDiagonal();
 }
 
-Pinhole pinhole(const RigCalibration& rig, int k) noexcept {
-  const Intrinsics& lens = rig.intrinsics[static_cast<std::size_t>(k)];
-  return {lens.fx, lens.fy, lens.cx, lens.cy};
-}
-
-const Transform& transform(const RigCalibration& rig, int k) noexcept {
-  return rig.T_camera_left[static_cast<std::size_t>(k)];
-}
-
 /// A rotation by σ about the axis that epipolar lines do not show moves all points by f σ.
 ChangeEvidence to_evidence(const calibration::DisparityJump& jump, double focal_px) noexcept {
   const double sigmas = jump.px / jump.sigma_px, px = std::abs(jump.px);
@@ -42,106 +33,86 @@ ChangeEvidence to_evidence(const calibration::DisparityJump& jump, double focal_
 }
 
 /// True if the left camera and camera k gave structured images.
-bool both_show(const odometry::FrameOutcome& outcome, int k) noexcept {
-  return (outcome.structured & 1U) != 0 &&
-         ((outcome.structured >> static_cast<unsigned>(k)) & 1U) != 0;
+bool both_show(const odometry::FrameOutcome& outcome, std::size_t k) noexcept {
+  return (outcome.structured & 1U) != 0 && ((outcome.structured >> k) & 1U) != 0;
+}
+
+/// Number of points that camera k should show at this pose.
+int expected_stereo(const odometry::Odometry& odometry, std::size_t k,
+                    const Transform& T_camera_world) noexcept {
+  const Camera& camera = odometry.front_end().lens(static_cast<int>(k)).raw();
+  int n = 0;
+  for (const MapPoint& p : odometry.map().points()) {
+    Vec2 at;
+    if (p.stage == odometry::PointStage::active && p.now.by(0) &&
+        camera.project(T_camera_world * p.p_world, &at, nullptr) == ProjectStatus::ok &&
+        camera.inside(at, 0.0))
+      ++n;
+  }
+  return n;
 }
 
 }  // namespace
 
 RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
                        std::size_t capacity, Arena& arena)
-    : options_(options), cameras_(cameras) {
-  for (int k = 1; k < cameras; ++k)
-    monitors_[static_cast<std::size_t>(k)].emplace(options, capacity, arena);
+    : options_(options) {
+  for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k)
+    (void)monitors_.push({.k = k,
+                          .monitor = calibration::Monitor(options, arena),
+                          .jumps = calibration::DisparityJumpDetector(capacity, arena),
+                          .pairing = calibration::PairingEvidence(capacity, arena)});
   stereo_ = BoundedVector<calibration::StereoObservation>(
       arena.make<calibration::StereoObservation>(capacity, "monitored matches"));
 }
 
-void RigMonitor::expect_scatter(double bias_px) noexcept {
-  for (int k = 1; k < cameras_; ++k) camera(k).monitor.expect_scatter(bias_px);
-}
-
 void RigMonitor::watch(const RigCalibration& rig, bool solved_and_verified) noexcept {
-  rig_ = rig;
   solved_and_verified_ = solved_and_verified;
   expect_scatter(solved_and_verified ? options_.verified_bias_px : options_.unverified_bias_px);
-  for (int k = 1; k < cameras_; ++k) {
-    const Transform& T = transform(rig_, k);
-    set_monitor_reference(k, T, reference_covariance(solved_and_verified, T.t.norm()));
+  for (CameraMonitors& w : monitors_) {
+    w.pair = calibration::stereo_pair(rig, w.k);
+    (void)w.monitor.set_reference(
+        w.pair, reference_covariance(solved_and_verified, w.pair.T_camera_left.t.norm()));
+    // Before the spread of matches is known, a result makes poses `degraded` and raises no knock.
+    w.grace = kMinForMean - 1;
   }
-}
-
-void RigMonitor::set_jump_reference(const RigCalibration& rig) noexcept {
-  for (int k = 1; k < cameras_; ++k)
-    camera(k).jumps.set_reference(transform(rig, k), pinhole(rig, 0), pinhole(rig, k));
-}
-
-void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
-                                       const Mat6& covariance) noexcept {
-  CameraMonitors& w = camera(k);
-  (void)w.monitor.set_reference(T_camera_left, pinhole(rig_, 0), pinhole(rig_, k), covariance);
-  // Before the spread of matches is known, a result makes poses `degraded` and raises no knock.
-  w.grace = kMinForMean - 1;
 }
 
 void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
                              bool solved_and_verified) noexcept {
   map_rebuild_pending_ = false;
   watch(rig, solved_and_verified);
-  for (int k = 1; k < cameras_; ++k) camera(k).pairing.reset();
+  for (CameraMonitors& w : monitors_) w.pairing.reset();
   map_rebuilt(map);
 }
 
 /// The next frame is compared with the points created in this one.
 void RigMonitor::map_rebuilt(const odometry::Map& map) noexcept {
-  for (int k = 1; k < cameras_; ++k) {
+  for (CameraMonitors& w : monitors_) {
     // The next frame differs from a distorted one without a change of the rig.
-    if (camera(k).distorted) {
-      camera(k).jumps.set_reference(transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k));
+    if (w.distorted) {
+      w.jumps.set_reference(w.pair);
       continue;
     }
-    (void)collect_stereo(map, k, 1);
-    camera(k).jumps.rebase(transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k), stereo_.span());
+    (void)collect_stereo(map, w.k, 1);
+    w.jumps.rebase(w.pair, stereo_.span());
   }
 }
 
 void RigMonitor::begin_unlinked(const RigCalibration& rig) noexcept {
   T_left_world_before_.reset();
   map_rebuild_pending_ = false;
-  for (int k = 1; k < cameras_; ++k) camera(k).T_camera_left_before = transform(rig, k);
+  for (CameraMonitors& w : monitors_) w.T_camera_left_before = rig.T_camera_left[w.k];
   set_jump_reference(rig);
-}
-
-void RigMonitor::question_pairing() noexcept {
-  for (int k = 1; k < cameras_; ++k) camera(k).pairing.question();
-}
-
-void RigMonitor::reset() noexcept {
-  for (int k = 1; k < cameras_; ++k) camera(k).monitor.reset();
 }
 
 void RigMonitor::map_lost() noexcept {
   T_left_world_before_.reset();
-  for (int k = 1; k < cameras_; ++k) {
-    camera(k).monitor.reset();
-    camera(k).jumps.reset();
-    camera(k).pairing.reset();
+  reset();
+  for (CameraMonitors& w : monitors_) {
+    w.jumps.reset();
+    w.pairing.reset();
   }
-}
-
-int RigMonitor::expected_stereo(const odometry::Odometry& odometry, int k,
-                                const Transform& T_left_world) const noexcept {
-  const Transform T = transform(rig_, k) * T_left_world;
-  const Camera& camera = odometry.front_end().lens(k).raw();
-  int n = 0;
-  for (const MapPoint& p : odometry.map().points()) {
-    Vec2 at;
-    if (p.stage == odometry::PointStage::active && p.now.by(0) &&
-        camera.project(T * p.p_world, &at, nullptr) == ProjectStatus::ok && camera.inside(at, 0.0))
-      ++n;
-  }
-  return n;
 }
 
 Transform RigMonitor::step_to(const Transform& T_left_world) noexcept {
@@ -151,16 +122,15 @@ Transform RigMonitor::step_to(const Transform& T_left_world) noexcept {
   return step;
 }
 
-int RigMonitor::collect_stereo(const odometry::Map& map, int k, int min_found) noexcept {
-  const auto c = static_cast<std::size_t>(k);
+int RigMonitor::collect_stereo(const odometry::Map& map, std::size_t k, int min_found) noexcept {
   stereo_.clear();
   int found = 0;
   for (const MapPoint& p : map.points()) {
     if (!p.followed() || p.found < min_found || !p.now.by(0)) continue;
-    if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
+    if (((p.in_images >> k) & 1U) == 0) continue;
     if (p.stage == odometry::PointStage::active) ++found;
-    (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
-                        static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
+    (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[k].cast<double>(),
+                        static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[k])), p.id});
   }
   return found;
 }
@@ -172,95 +142,20 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   const bool first = outcome.initialised || outcome.restarted;
   if (first) T_left_world_before_.reset();
   const Transform step = step_to(outcome.T_left_world);
-  for (int k = 1; k < cameras_; ++k) {
-    CameraMonitors& w = camera(k);
+  for (CameraMonitors& w : monitors_) {
     if (first) w.jumps.reset();
-    if (!both_show(outcome, k)) {
+    if (!both_show(outcome, w.k)) {
       w.jumps.skip(step);
       continue;
     }
-    (void)collect_stereo(odometry.map(), k, odometry::kMinFound);
+    (void)collect_stereo(odometry.map(), w.k, odometry::kMinFound);
     w.jumps.set_transform(w.T_camera_left_before);
     const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
     if (jump.confirmed && !w.pairing.questioned())
       onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
-    w.T_camera_left_before = transform(odometry.rig(), k);
+    w.T_camera_left_before = odometry.rig().T_camera_left[w.k];
   }
   return onset;
-}
-
-MonitorResult RigMonitor::update_monitor(int k, const odometry::Odometry& odometry,
-                                         const odometry::FrameOutcome& outcome,
-                                         std::uint64_t number, int found, bool moving) noexcept {
-  CameraMonitors& w = camera(k);
-  calibration::MonitorFrame f;
-  f.frame = number;
-  f.moving = moving;
-  f.stereo = stereo_.span();
-  f.expected_stereo = outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
-  f.found_stereo = found;
-  MonitorResult v = w.monitor.update(f);
-  if (w.grace > 0) {
-    --w.grace;
-    // A wrong new reference is not a knock, but no pose based on it is `ok`.
-    const bool suspect =
-        solved_and_verified_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
-                                 w.pairing.distance_px() > calibration::kMaxFitPx);
-    v = MonitorResult{};
-    v.undecided = suspect;
-  }
-  return v;
-}
-
-void RigMonitor::update_pairing(int k, std::uint64_t number, RigAssessment* rig) noexcept {
-  calibration::PairingEvidence& pairing = camera(k).pairing;
-  const double before = pairing.distance_px();
-  pairing.next(number, stereo_.span(), transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k));
-  // A pose biased by a distorted image changes the disparities of the frames before and after it.
-  camera(k).distorted = pairing.distance_px() > calibration::kMaxFitPx &&
-                        pairing.distance_px() > kUnusualRatio * before;
-  rig->cameras_in_sync = rig->cameras_in_sync && pairing.cameras_in_sync();
-  if (pairing.lag_frames() != 0) rig->lag_frames = pairing.lag_frames();
-  rig->margins.lag = std::max(rig->margins.lag, pairing.lag_margin());
-}
-
-calibration::DisparityJump RigMonitor::update_jumps(int k, const odometry::FrameOutcome& outcome,
-                                                    std::uint64_t number,
-                                                    const Transform& step) noexcept {
-  if (both_show(outcome, k) && !camera(k).distorted)
-    return camera(k).jumps.next(number, stereo_.span(), step);
-  camera(k).jumps.skip(step);
-  return {};
-}
-
-void RigMonitor::add_to_assessment(int k, MonitorResult v, const calibration::DisparityJump& jump,
-                                   bool verified, RigAssessment* rig) const noexcept {
-  using Kind = MonitorResult::Kind;
-  // A lag moves matches off the epipolar lines, and changes disparities whenever the speed changes.
-  // So no change of the rig is reported while cameras may be out of sync.
-  const calibration::PairingEvidence& pairing = camera(k).pairing;
-  const bool may_lag = pairing.suspected() || pairing.questioned();
-  // One frame over the threshold decides nothing until the next one confirms it.
-  if (!v.undecided && !may_lag)
-    rig->margins.change = std::max(rig->margins.change, v.statistic / options_.threshold);
-  const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
-  if (may_lag || (!verified && change)) {
-    v.undecided = v.undecided || v.kind != Kind::quiet || pairing.suspected();
-    v.kind = Kind::quiet;
-  }
-  if (jump.confirmed && may_lag) {
-    v.undecided = true;
-  } else if (jump.confirmed && v.kind < Kind::knock) {
-    v.kind = Kind::knock;
-    v.onset_frame = jump.onset_frame;
-    v.evidence = to_evidence(jump, pinhole(rig_, k).fx);
-  }
-  rig->margins.jump = std::max(rig->margins.jump, jump.over_limit);
-  rig->undecided = rig->undecided || v.undecided || jump.suspected;
-  if (v.kind <= rig->kind) return;
-  rig->kind = v.kind;
-  rig->onset_frame = v.onset_frame;
-  rig->evidence = v.evidence;
 }
 
 RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
@@ -269,15 +164,81 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
   RigAssessment rig;
   rig.cameras_in_sync = true;
   const Transform step = step_to(outcome.T_left_world);
-  for (int k = 1; k < cameras_; ++k) {
-    const int found = collect_stereo(odometry.map(), k, odometry::kMinFound);
-    update_pairing(k, number, &rig);
-    const calibration::DisparityJump jump = update_jumps(k, outcome, number, step);
+  for (CameraMonitors& w : monitors_) {
+    const int found = collect_stereo(odometry.map(), w.k, odometry::kMinFound);
+    calibration::PairingEvidence& pairing = w.pairing;
+    const double before = pairing.distance_px();
+    pairing.next(number, stereo_.span(), w.pair);
+    rig.cameras_in_sync = rig.cameras_in_sync && pairing.cameras_in_sync();
+    if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
+    rig.margins.lag = std::max(rig.margins.lag, pairing.lag_margin());
+
+    // A pose biased by a distorted image changes the disparities of the frames before and after it.
+    w.distorted = pairing.distance_px() > calibration::kMaxFitPx &&
+                  pairing.distance_px() > kUnusualRatio * before;
+    calibration::DisparityJump jump;
+    if (both_show(outcome, w.k) && !w.distorted)
+      jump = w.jumps.next(number, stereo_.span(), step);
+    else
+      w.jumps.skip(step);
+
     MonitorResult v;
-    if (!map_rebuild_pending_) v = update_monitor(k, odometry, outcome, number, found, moving);
-    add_to_assessment(k, v, jump, verified, &rig);
+    if (!map_rebuild_pending_) v = update_monitor(odometry, outcome, number, found, moving, &w);
+    add_to_assessment(w, v, jump, verified, &rig);
   }
   return rig;
+}
+
+MonitorResult RigMonitor::update_monitor(const odometry::Odometry& odometry,
+                                         const odometry::FrameOutcome& outcome,
+                                         std::uint64_t number, int found, bool moving,
+                                         CameraMonitors* w) noexcept {
+  calibration::MonitorFrame f;
+  f.frame = number;
+  f.moving = moving;
+  f.stereo = stereo_.span();
+  if (outcome.images_good)
+    f.expected_stereo =
+        expected_stereo(odometry, w->k, w->pair.T_camera_left * outcome.T_left_world);
+  f.found_stereo = found;
+  MonitorResult v = w->monitor.update(f);
+  if (w->grace > 0) {
+    --w->grace;
+    // A wrong new reference is not a knock, but no pose based on it is `ok`.
+    const bool suspect =
+        solved_and_verified_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
+                                 w->pairing.distance_px() > calibration::kMaxFitPx);
+    v = MonitorResult{};
+    v.undecided = suspect;
+  }
+  return v;
+}
+
+void RigMonitor::add_to_assessment(const CameraMonitors& w, MonitorResult v,
+                                   const calibration::DisparityJump& jump, bool verified,
+                                   RigAssessment* rig) const noexcept {
+  using Kind = MonitorResult::Kind;
+  // A lag moves matches off the epipolar lines, and changes disparities whenever the speed changes.
+  // So no change of the rig is reported while cameras may be out of sync.
+  const bool may_lag = w.pairing.suspected() || w.pairing.questioned();
+  // One frame over the threshold decides nothing until the next one confirms it.
+  if (!v.undecided && !may_lag)
+    rig->margins.change = std::max(rig->margins.change, v.statistic / options_.threshold);
+  const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
+  if (may_lag || (!verified && change)) {
+    v.undecided = v.undecided || v.kind != Kind::quiet || w.pairing.suspected();
+    v.kind = Kind::quiet;
+  }
+  if (jump.confirmed && may_lag) {
+    v.undecided = true;
+  } else if (jump.confirmed && v.kind < Kind::knock) {
+    v.kind = Kind::knock;
+    v.onset_frame = jump.onset_frame;
+    v.evidence = to_evidence(jump, w.pair.camera.fx);
+  }
+  rig->margins.jump = std::max(rig->margins.jump, jump.over_limit);
+  rig->undecided = rig->undecided || v.undecided || jump.suspected;
+  if (v.kind > rig->change.kind) rig->change = v;
 }
 
 }  // namespace vergence

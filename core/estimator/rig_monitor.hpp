@@ -5,6 +5,7 @@
 #include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/pairing_evidence.hpp"
+#include "core/memory/fixed_vector.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/types/decision_margins.hpp"
 
@@ -12,10 +13,8 @@ namespace vergence {
 
 /// Assessment of the rig after one frame: the worst result of all monitors.
 struct RigAssessment {
-  calibration::MonitorResult::Kind kind = calibration::MonitorResult::Kind::quiet;
-  /// Number of the first frame of the change `kind`.
-  std::uint64_t onset_frame = 0;
-  ChangeEvidence evidence;
+  /// The change of the camera with the most severe one.
+  calibration::MonitorResult change;
   /// Number of frames that a camera's images are late; negative if early.
   int lag_frames = 0;
   /// True if a camera disagrees with the calibration for a cause not yet identified.
@@ -24,6 +23,22 @@ struct RigAssessment {
   bool cameras_in_sync = false;
   /// Largest of all cameras; `uncertainty` is not measured here.
   DecisionMargins margins;
+};
+
+/// Monitors of one additional camera.
+struct CameraMonitors {
+  std::size_t k = 0;
+  calibration::Monitor monitor{};
+  calibration::DisparityJumpDetector jumps{};
+  calibration::PairingEvidence pairing{};
+  // The reference; jumps may be measured against another calibration.
+  calibration::StereoPair pair{};
+  // Number of frames to come whose result is at most `undecided`.
+  int grace = 0;
+  // True if the newest image is distorted, for example by skewed exposures.
+  bool distorted = false;
+  // Transform in the previous frame, with unlinked cameras.
+  Transform T_camera_left_before{};
 };
 
 /// Checks in every frame that the calibration still describes the rig. Each additional camera has a
@@ -48,9 +63,13 @@ class RigMonitor {
   /// is verified, so less scatter is expected.
   void watch(const RigCalibration& rig, bool solved_and_verified) noexcept;
   /// Sets the expected scatter between stretches of a run, in px rms over the image.
-  void expect_scatter(double bias_px) noexcept;
+  void expect_scatter(double bias_px) noexcept {
+    for (CameraMonitors& w : monitors_) w.monitor.expect_scatter(bias_px);
+  }
   /// Sets the calibration that the jump detectors compare with.
-  void set_jump_reference(const RigCalibration& rig) noexcept;
+  void set_jump_reference(const RigCalibration& rig) noexcept {
+    for (CameraMonitors& w : monitors_) w.jumps.set_reference(calibration::stereo_pair(rig, w.k));
+  }
   /// Call when a calibration is adopted; until the map is rebuilt with it only jumps are evaluated.
   void expect_map_rebuild() noexcept { map_rebuild_pending_ = true; }
   [[nodiscard]] bool map_rebuild_pending() const noexcept { return map_rebuild_pending_; }
@@ -76,67 +95,34 @@ class RigMonitor {
                                                              std::uint64_t number) noexcept;
 
   /// Call when an image was repeated: a camera may be a frame late until motion shows otherwise.
-  void question_pairing() noexcept;
+  void question_pairing() noexcept {
+    for (CameraMonitors& w : monitors_) w.pairing.question();
+  }
   /// Clears what the monitors have measured; references and jump detectors stay.
-  void reset() noexcept;
+  void reset() noexcept {
+    for (CameraMonitors& w : monitors_) w.monitor.reset();
+  }
   /// Call when the map was lost: the next frame is not compared with earlier ones.
   void map_lost() noexcept;
 
  private:
-  /// Monitors of one additional camera.
-  struct CameraMonitors {
-    CameraMonitors(const calibration::MonitorOptions& options, std::size_t capacity, Arena& arena)
-        : monitor(options, arena), jumps(capacity, arena), pairing(capacity, arena) {}
-    calibration::Monitor monitor;
-    calibration::DisparityJumpDetector jumps;
-    calibration::PairingEvidence pairing;
-    // Number of frames to come whose result is at most `undecided`.
-    int grace = 0;
-    // True if the newest image is distorted, for example by skewed exposures.
-    bool distorted = false;
-    // Transform in the previous frame, with unlinked cameras.
-    Transform T_camera_left_before;
-  };
-
-  [[nodiscard]] CameraMonitors& camera(int k) noexcept {
-    return *monitors_[static_cast<std::size_t>(k)];
-  }
-  [[nodiscard]] const CameraMonitors& camera(int k) const noexcept {
-    return *monitors_[static_cast<std::size_t>(k)];
-  }
-  void set_monitor_reference(int k, const Transform& T_camera_left,
-                             const Mat6& covariance) noexcept;
-  /// Result of camera k's monitor; the caller handles jumps.
-  [[nodiscard]] calibration::MonitorResult update_monitor(int k, const odometry::Odometry& odometry,
+  /// Result of the camera's monitor; the caller handles jumps.
+  [[nodiscard]] calibration::MonitorResult update_monitor(const odometry::Odometry& odometry,
                                                           const odometry::FrameOutcome& outcome,
                                                           std::uint64_t number, int found,
-                                                          bool moving) noexcept;
+                                                          bool moving, CameraMonitors* w) noexcept;
   /// Motion of the left camera since the previous monitored frame.
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Fills `stereo_` with camera k's matches. Returns the number of active points among them.
-  int collect_stereo(const odometry::Map& map, int k, int min_found) noexcept;
-  /// Adds the matches in `stereo_` to camera k's pairing evidence, and fills in whether the cameras
-  /// are in sync.
-  void update_pairing(int k, std::uint64_t number, RigAssessment* rig) noexcept;
-  /// Compares the disparities in `stereo_` with those of the previous frame.
-  [[nodiscard]] calibration::DisparityJump update_jumps(int k,
-                                                        const odometry::FrameOutcome& outcome,
-                                                        std::uint64_t number,
-                                                        const Transform& step) noexcept;
-  /// Combines camera k's results into the assessment of the rig, which is that of the worst camera.
-  void add_to_assessment(int k, calibration::MonitorResult v,
+  int collect_stereo(const odometry::Map& map, std::size_t k, int min_found) noexcept;
+  /// Combines the camera's results into the assessment of the rig, which is that of the worst one.
+  void add_to_assessment(const CameraMonitors& w, calibration::MonitorResult v,
                          const calibration::DisparityJump& jump, bool verified,
                          RigAssessment* rig) const noexcept;
-  /// Number of points that camera k should show at this pose.
-  [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
-                                    const Transform& T_left_world) const noexcept;
 
   const calibration::MonitorOptions& options_;
-  const int cameras_;
-  // Element k belongs to camera k ≥ 1; element 0 is empty.
-  std::array<std::optional<CameraMonitors>, kMaxCameras> monitors_;
+  FixedVector<CameraMonitors, kMaxCameras - 1> monitors_;
   BoundedVector<calibration::StereoObservation> stereo_;
-  RigCalibration rig_{};
   bool solved_and_verified_ = false;
   std::optional<Transform> T_left_world_before_;
   bool map_rebuild_pending_ = false;

@@ -20,8 +20,8 @@
 
 #include "app/runtime/background_thread.hpp"
 #include "app/session/drive_calibration.hpp"
-#include "core/calibration/agreement.hpp"
 #include "core/calibration/health.hpp"
+#include "core/calibration/posterior.hpp"
 #include "core/calibration/segment_solver.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"

@@ -20,7 +20,58 @@ constexpr double kRelease = 0.5;
 // Ratio of gains by which a drift must exceed a knock. The best step explains 8/9 of a ramp; this
 // is the middle between that and a ramp that explains nothing more, on a logarithmic scale.
 constexpr double kRampGain = 1.06;
+// Ratio to the expected scatter above which a block's offset is a change of the rig.
+constexpr double kMaxOfExpected = 20;
+// Length of the running mean, in blocks: half a minute at 30 Hz.
+constexpr std::uint64_t kMaxBlocks = 60;
+
 }  // namespace
+
+bool EvidenceHistory::push(const Entry& entry) noexcept {
+  recent_[count_ % kRecent] = entry;
+  if (count_ % kBlock == 0) open_ = Entry{entry.frame, {}};
+  open_.evidence.add(entry.evidence);
+  if (++count_ % kBlock != 0) return false;
+  if (closed_ >= kBlocks) total_.add(blocks_[closed_ % kBlocks].evidence, -1.0);
+  total_.add(open_.evidence);
+  blocks_[closed_ % kBlocks] = open_;
+  ++closed_;
+  open_ = Entry{};
+  return true;
+}
+
+Evidence EvidenceHistory::sum_newest(std::size_t frames) const noexcept {
+  Evidence sum = open_.evidence;
+  const std::size_t open = open_frames();
+  const std::size_t count =
+      std::min((frames - std::min(frames, open) + kBlock - 1) / kBlock, blocks());
+  for (std::size_t i = 0; i < count; ++i) sum.add(block(i).evidence);
+  return sum;
+}
+
+Evidence EvidenceHistory::total() const noexcept {
+  Evidence sum = total_;
+  sum.add(open_.evidence);
+  return sum;
+}
+
+void BlockScatter::add(const Evidence& block, const Evidence& past, double lambda) noexcept {
+  if (!(block.n > 0) || !(past.n > 0)) return;
+  const Cholesky<5> of_block(block.A), of_past(past.A);
+  if (!of_block.ok() || !of_past.ok()) return;
+  const Vec5 d = of_block.solve(block.g) - of_past.solve(past.g);
+  const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
+  const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
+  const double limit = kMaxOfExpected * std::max(variance(), lambda / block.n);
+  // The comparison also rejects NaN.
+  if (!(scatter < limit)) return;
+  if (blocks_ == kMaxBlocks) {
+    sum_ -= sum_ / static_cast<double>(blocks_);
+    --blocks_;
+  }
+  sum_ += scatter;
+  ++blocks_;
+}
 
 void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
   options_ = options;
@@ -53,14 +104,14 @@ void ChangeDetector::renew_floor() noexcept {
 /// Measures the scatter of the completed block against those before it.
 void ChangeDetector::measure_scatter() noexcept {
   // A possible change of the rig must not be counted as scatter.
-  if (history_.closed() == 0 || newest_statistic_ > kRelease * options_.threshold) return;
+  if (history_.closed() == 1 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
   // The rig may have drifted since older blocks.
   const std::size_t recent =
       static_cast<std::size_t>(options_.long_window) / EvidenceHistory::kBlock;
-  for (std::size_t i = 0; i < std::min(history_.blocks(), recent); ++i)
+  for (std::size_t i = 1; i <= std::min(history_.closed() - 1, recent); ++i)
     past.add(history_.block(i).evidence);
-  scatter_.add(history_.open().evidence, past, lambda_);
+  scatter_.add(history_.block(0).evidence, past, lambda_);
   renew_floor();
 }
 
@@ -89,17 +140,13 @@ void ChangeDetector::follow_spread(const StereoResiduals& e) noexcept {
 bool ChangeDetector::stands_out(const StereoResiduals& e) const noexcept {
   if (history_.frames() == 0)
     return single(e.evidence, kFirstLife * e.spread_now) > options_.threshold;
-  Vec5 mean;
-  Mat5 covariance;
-  estimate_reference(Evidence{}, &mean, &covariance);
-  return statistic(effective(e.evidence), mean, covariance) > options_.threshold;
+  return statistic(effective(e.evidence), estimate_reference({})) > options_.threshold;
 }
 
 void ChangeDetector::push(const StereoResiduals& e) noexcept {
   const bool out = stands_out(e);
   if (pending_ && out) {
     add(*pending_);
-    pending_.reset();
   } else if (out && over_ == 0) {
     pending_ = e;
     return;
@@ -110,45 +157,36 @@ void ChangeDetector::push(const StereoResiduals& e) noexcept {
 
 void ChangeDetector::add(const StereoResiduals& e) noexcept {
   follow_spread(e);
-  if (!history_.push({e.frame, e.evidence})) return;
-  measure_scatter();
-  history_.close_block();
+  if (history_.push({e.frame, e.evidence})) measure_scatter();
 }
 
 Evidence ChangeDetector::effective(const Evidence& sum) const noexcept {
-  Evidence e;
-  e.add(sum, 1.0 / (lambda_ + bias2_ * sum.n));
-  return e;
+  return sum.scaled(1.0 / (lambda_ + bias2_ * sum.n));
 }
 
-double ChangeDetector::statistic(const Evidence& e, const Vec5& mean,
-                                 const Mat5& covariance) noexcept {
-  return gain(e.A + e.A * covariance * e.A, e.g - e.A * mean);
+double ChangeDetector::statistic(const Evidence& e, const Theta& reference) noexcept {
+  return gain(e.A + e.A * reference.covariance * e.A, e.g - e.A * reference.mean);
 }
 
-void ChangeDetector::estimate_reference(const Evidence& window, Vec5* mean,
-                                        Mat5* covariance) const noexcept {
+ChangeDetector::Theta ChangeDetector::estimate_reference(const Evidence& window) const noexcept {
   Evidence past = history_.total();
   past.add(window, -1.0);
   // Without the floor: the window and the past share most of the slow error, and the window's own
   // floor covers the rest.
-  Evidence e;
-  e.add(past, 1.0 / lambda_);
+  const Evidence e = past.scaled(1.0 / lambda_);
   // This is (C⁻¹ + A)⁻¹ in a form that needs neither inverse.
   const Mat5 spread = Mat5::Identity() + covariance_ * e.A;
-  *covariance = lu_solve(spread, covariance_);
-  *mean = *covariance * e.g;
+  const Mat5 covariance = lu_solve(spread, covariance_);
+  return {covariance * e.g, covariance};
 }
 
 double ChangeDetector::single(const Evidence& frame, double spread) const noexcept {
-  Evidence e;
-  e.add(frame, 1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n));
-  return statistic(e, Vec5::Zero(), covariance_);
+  return statistic(frame.scaled(1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n)),
+                   {Vec5::Zero(), covariance_});
 }
 
 MonitorResult ChangeDetector::decide() noexcept {
   MonitorResult d;
-  d.threshold = options_.threshold;
   const std::size_t count = history_.frames();
   if (count == 0) return d;
   d.onset_frame = history_.recent(0).frame;
@@ -160,17 +198,13 @@ MonitorResult ChangeDetector::decide() noexcept {
     if (detector_[w] <= EvidenceHistory::kRecent) {
       for (; summed < detector_[w]; ++summed) sum.add(history_.recent(summed).evidence);
     } else {
-      history_.sum_newest(detector_[w], &sum);
+      sum = history_.sum_newest(detector_[w]);
     }
     const Evidence inflated = effective(sum);
-    double largest = statistic(inflated, Vec5::Zero(), covariance_);
+    double largest = statistic(inflated, {Vec5::Zero(), covariance_});
     // Only this comparison shows a change smaller than the reference's own error.
-    if (count >= 2 * detector_[w]) {
-      Vec5 reference;
-      Mat5 covariance;
-      estimate_reference(sum, &reference, &covariance);
-      largest = std::max(largest, statistic(inflated, reference, covariance));
-    }
+    if (count >= 2 * detector_[w])
+      largest = std::max(largest, statistic(inflated, estimate_reference(sum)));
     if (largest > d.statistic) d.statistic = largest, window = detector_[w];
   }
   newest_statistic_ = d.statistic;
@@ -181,7 +215,8 @@ MonitorResult ChangeDetector::decide() noexcept {
   return d;
 }
 
-void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
+ChangeDetector::Search ChangeDetector::search(const Vec5& mean) const noexcept {
+  Search found;
   // Sums Σ e, Σ age e and Σ age² e from the newest entry back, from which a ramp's sums follow.
   Evidence zeroth, first, second;
   const auto visit = [&](const Entry& entry, double age, int frames) {
@@ -192,13 +227,13 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
       if (const double g = gain(sum.A, sum.g - sum.A * mean) / lambda_; g > best->gain)
         *best = Onset{g, entry.frame, sum};
     };
-    keep(&found->step, zeroth);
+    keep(&found.step, zeroth);
     if (2 * frames < options_.long_window) return;
     // The weight of an entry is 1 − age/frames.
     Evidence ramp = zeroth;
     ramp.g -= first.g / frames;
     ramp.A += (second.A / frames - 2 * first.A) / frames;
-    keep(&found->ramp, ramp);
+    keep(&found.ramp, ramp);
   };
   // Single frames back to the edge of a block, then blocks.
   constexpr std::size_t block = EvidenceHistory::kBlock;
@@ -212,20 +247,15 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
     visit(history_.block(b), static_cast<double>(oldest) - 0.5 * (block - 1),
           static_cast<int>(oldest) + 1);
   }
+  return found;
 }
 
 void ChangeDetector::attribute(std::size_t window, MonitorResult* d) const noexcept {
   // Subtract the offset before the window if it is known: a slightly wrong reference is not an
   // onset.
   Vec5 mean = Vec5::Zero();
-  if (history_.frames() >= 2 * window) {
-    Evidence sum;
-    Mat5 covariance;
-    history_.sum_newest(window, &sum);
-    estimate_reference(sum, &mean, &covariance);
-  }
-  Search found;
-  search(mean, &found);
+  if (history_.frames() >= 2 * window) mean = estimate_reference(history_.sum_newest(window)).mean;
+  const Search found = search(mean);
   const bool ramp = found.ramp.gain > kRampGain * found.step.gain;
   d->kind = ramp ? MonitorResult::Kind::drift : MonitorResult::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;

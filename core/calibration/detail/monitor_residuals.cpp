@@ -13,10 +13,6 @@ namespace {
 // for Gaussian errors at kTukey.
 constexpr double kTukeySpread = 1.46;
 
-Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
-  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
-}
-
 double tukey(double squared, double limit) noexcept {
   const double u = 1.0 - squared / (limit * limit);
   return u > 0 ? u * u : 0.0;
@@ -28,38 +24,37 @@ void MonitorResiduals::reset() noexcept {
   for (Memory& m : memories_) m.used = false;
 }
 
-StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame& frame,
-                                         int min_matches, bool follow) noexcept {
-  const double f = 0.5 * (c.right.fx + c.right.fy);
-  rows_ = 0;
+StereoResiduals MonitorResiduals::stereo(const StereoPair& pair, const MonitorFrame& frame,
+                                         int min_matches) noexcept {
+  const EpipolarGeometry epipolar(pair.T_camera_left);
+  const double f = 0.5 * (pair.camera.fx + pair.camera.fy);
+  rows_.clear();
   for (const StereoObservation& s : frame.stereo) {
-    if (rows_ == kMaxObservations) break;
     if (!(s.sigma_px > 0) || !s.left.allFinite() || !s.right.allFinite()) continue;
-    StereoRow& row = stereo_[rows_];
-    const Vec2 left = ray(c.left, s.left), right = ray(c.right, s.right);
-    if (!c.epipolar.to_line(left, right, &row.r, &row.J)) continue;
+    StereoRow row{};
+    if (!epipolar.to_line(ray(pair.left, s.left), ray(pair.camera, s.right), &row.r, &row.J))
+      continue;
     row.r *= f;
     row.J *= f;
     // The errors of both images add up across the line.
     row.inverse_sigma2 = 1.0 / (2.0 * s.sigma_px * s.sigma_px);
     row.track = s.track;
-    if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) ++rows_;
+    if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) (void)rows_.push(row);
   }
   StereoResiduals result;
   result.frame = frame.frame;
-  if (rows_ < static_cast<std::size_t>(min_matches)) return result;
+  if (rows_.size() < static_cast<std::size_t>(min_matches)) return result;
 
   Vec5 fit = Vec5::Zero();
   for (int round = 0; round < kReweightings; ++round) {
     const auto rest = [&](const StereoRow& row) { return row.r + row.J.dot(fit); };
-    for (std::size_t i = 0; i < rows_; ++i)
-      sizes_[i] = std::abs(rest(stereo_[i])) * std::sqrt(stereo_[i].inverse_sigma2);
+    for (std::size_t i = 0; i < rows_.size(); ++i)
+      sizes_[i] = std::abs(rest(rows_[i])) * std::sqrt(rows_[i].inverse_sigma2);
     const double scale =
-        std::max(median(std::span(sizes_).first(rows_)) / kMedianOfNormal, kMinScale);
+        std::max(median(std::span(sizes_).first(rows_.size())) / kMedianOfNormal, kMinScale);
     result.evidence = Evidence{};
     Evidence& e = result.evidence;
-    for (std::size_t i = 0; i < rows_; ++i) {
-      StereoRow& row = stereo_[i];
+    for (StereoRow& row : rows_) {
       const double d = rest(row);
       row.weight = row.inverse_sigma2 * tukey(d * d * row.inverse_sigma2, kTukey * scale);
       if (row.weight == 0) continue;
@@ -70,9 +65,8 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     fit = with_prior(e.A).solve(e.g);
   }
   result.usable =
-      std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
-                    [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
-  measure_spread(result.evidence, fit, follow && result.usable, &result);
+      std::ranges::count_if(rows_, [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
+  measure_spread(result.evidence, fit, frame.moving && result.usable, &result);
   return result;
 }
 
@@ -83,8 +77,7 @@ void MonitorResiduals::measure_spread(const Evidence& evidence, const Vec5& fit,
   // sum of the track's earlier contributions.
   const Mat5 whiten = with_prior(evidence.A).whitening();
   double now = 0, before = 0;
-  for (std::size_t i = 0; i < rows_; ++i) {
-    const StereoRow& row = stereo_[i];
+  for (const StereoRow& row : rows_) {
     const Vec5 x = row.weight * (row.r + row.J.dot(fit)) * row.J;
     const Vec5 white = whiten * x;
     now += white.squaredNorm();

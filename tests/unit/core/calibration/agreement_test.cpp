@@ -1,4 +1,4 @@
-#include "core/calibration/agreement.hpp"
+#include "core/calibration/posterior.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "core/calibration/detail/depth.hpp"
 #include "core/calibration/health.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/parallel_rig.hpp"

@@ -28,7 +28,7 @@ class Street {
  public:
   explicit Street(const Transform& believed, std::uint64_t seed = 1)
       : detector_(2 * kTracks, arena_), random_(seed) {
-    detector_.set_reference(believed, kPinhole, kPinhole);
+    detector_.set_reference({believed, kPinhole, kPinhole});
     for (std::size_t i = 0; i < kTracks; ++i) points_.push_back(fresh());
   }
 
@@ -155,7 +155,7 @@ TEST(DisparityJump, vibrationRaisesTheThresholdForTwentyFrames) {
 TEST(DisparityJump, tooFewTracksMeasureNothing) {
   Arena arena;
   DisparityJumpDetector detector(10, arena);
-  detector.set_reference(rig(0), kPinhole, kPinhole);
+  detector.set_reference({rig(0), kPinhole, kPinhole});
   const std::vector<StereoObservation> same(
       40, StereoObservation{Vec2(600, 180), Vec2(580, 180), 0.2, 1});
   for (std::uint64_t i = 0; i < 4; ++i)

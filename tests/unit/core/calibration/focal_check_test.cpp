@@ -1,9 +1,8 @@
-#include "core/calibration/focal_check.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "core/calibration/gates.hpp"
 #include "tests/unit/core/calibration/feature_log.hpp"
 
 namespace vergence::test {

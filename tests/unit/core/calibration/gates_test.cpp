@@ -32,7 +32,8 @@ struct Case {
         further != nullptr ? test::rig_of(drive, *further) : test::rig_of(drive);
     solution.rig = rig;
     for (std::size_t k = 1; k < static_cast<std::size_t>(solution.rig.cameras); ++k)
-      solution.rig.sigma_noise[k] = {1e-4, 1e-4, 1e-4, 1e-3, 2e-3, 2e-3};
+      solution.rig.sigma_noise[k] =
+          solution.rig.sigma_total[k] = {1e-4, 1e-4, 1e-4, 1e-3, 2e-3, 2e-3};
     solution.newest = 29;
     solution.frames = 30;
     solution.tracks = 900;

@@ -74,12 +74,12 @@ class ModeDrive {
     using namespace calibration::detail;
     const auto looks = std::make_unique<MonitorResiduals>();
     looks->reset();
-    const Reference reference{EpipolarGeometry(o.T_right_left), o.left, o.right};
+    const calibration::StereoPair pair{o.T_right_left, o.left, o.right};
     MonitorTrial trial(o);
     for (int i = 0; i < frames; ++i) {
       (void)trial.step();
       const calibration::MonitorFrame& f = trial.frame();
-      const StereoResiduals stereo = looks->stereo(reference, f, 30, f.moving);
+      const StereoResiduals stereo = looks->stereo(pair, f, 30);
       if (!stereo.usable) continue;
       use(f, stereo);
     }

@@ -1,5 +1,5 @@
 // Measured scatter between stretches of a drive, from blocks drawn with a known scatter.
-#include "core/calibration/detail/monitor_scatter.hpp"
+#include "core/calibration/detail/change_detector.hpp"
 
 #include <gtest/gtest.h>
 

@@ -84,7 +84,7 @@ TEST(Monitor, evidenceStatesTheShiftOfAPitch) {
     // Rows move by f tan(pitch), a little more towards the corners; 0.003° are its noise here.
     EXPECT_NEAR(e.rotation_mrad, 1e3 * degrees / kRadian, 0.05 + 0.1 * 1e3 * degrees / kRadian);
     EXPECT_NEAR(e.shift_px, 1e-3 * e.rotation_mrad * o.right.fx, 1e-9);
-    EXPECT_GT(2 * e.log_likelihood_ratio, trial.verdict().threshold);
+    EXPECT_GT(2 * e.log_likelihood_ratio, MonitorOptions{}.threshold);
   }
 }
 
@@ -197,7 +197,7 @@ TEST(Monitor, nonFiniteMatchesAreIgnored) {
 TEST(Monitor, invalidReferenceIsRefused) {
   MonitorTrial trial(street(8, 12));
   const Pinhole k{1247, 1247, 511.5, 383.5};
-  EXPECT_FALSE(trial.monitor().set_reference(Transform{}, k, k, Mat6::Zero()));
+  EXPECT_FALSE(trial.monitor().set_reference({Transform{}, k, k}, Mat6::Zero()));
   EXPECT_EQ(trial.step().kind, Kind::quiet);
 }
 

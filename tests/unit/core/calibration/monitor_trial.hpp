@@ -28,7 +28,7 @@ class MonitorTrial {
         drive_(drive),
         monitor_(options, *arena_),
         epipolar_(T_right_left) {
-    (void)monitor_.set_reference(T_right_left, drive.left, drive.right, covariance);
+    (void)monitor_.set_reference({T_right_left, drive.left, drive.right}, covariance);
   }
 
   /// The next frame.
@@ -110,8 +110,7 @@ struct TrialReference {
   MonitorTrial trial(drive);
   for (int i = 0; i < kFrames; ++i) {
     (void)trial.step();
-    const auto found =
-        residuals->stereo({EpipolarGeometry(T), drive.left, drive.right}, trial.frame(), 30, true);
+    const auto found = residuals->stereo({T, drive.left, drive.right}, trial.frame(), 30);
     sum.add(found.evidence);
     inflation += found.spread_life / kFrames;
   }

@@ -69,7 +69,7 @@ Seen drive(const Case& c) {
                         pixel(knock * (T_right_left * (right * world[k])), &random), 0.15,
                         static_cast<std::uint32_t>(k)});
     if (i == kFault) evidence.question();
-    evidence.next(static_cast<std::uint64_t>(i + 1), points, T_right_left, kLens, kLens);
+    evidence.next(static_cast<std::uint64_t>(i + 1), points, {T_right_left, kLens, kLens});
     EXPECT_EQ(evidence.questioned() && evidence.cameras_in_sync(), false) << c.name;
     if (i < kFault) seen.before = seen.before || evidence.lag_frames() != 0;
     if (fault) seen.in_step_during = seen.in_step_during || evidence.cameras_in_sync();
@@ -110,8 +110,8 @@ TEST(PairingEvidence, noiseOfAStandingRigIsNoLag) {
                    0.5,
                    k};
     }
-    evidence.next(static_cast<std::uint64_t>(i + 1), points, {Mat3::Identity(), {-0.5, 0, 0}},
-                  kLens, kLens);
+    evidence.next(static_cast<std::uint64_t>(i + 1), points,
+                  {{Mat3::Identity(), {-0.5, 0, 0}}, kLens, kLens});
     ASSERT_EQ(evidence.lag_frames(), 0) << i;
     ASSERT_FALSE(evidence.suspected()) << i;
   }
@@ -124,7 +124,7 @@ TEST(PairingEvidence, distanceFromEpipolarLinesIsMeasured) {
   std::vector<StereoObservation> points;
   for (std::uint32_t k = 0; k < 40; ++k)
     points.push_back({Vec2(10.0 * k, 8.0 * k), Vec2(10.0 * k - 5, 8.0 * k + 2), 0.15, k});
-  evidence.next(1, points, T_right_left, kLens, kLens);
+  evidence.next(1, points, {T_right_left, kLens, kLens});
   // Two pixels across, shared by the two images.
   EXPECT_NEAR(evidence.distance_px(), std::sqrt(2.0), 1e-6);
 }

@@ -13,8 +13,8 @@ namespace {
 TEST(DegradationLedger, strongestIsReported) {
   DegradationLedger ledger;
   EXPECT_EQ(ledger.strongest(true), nullptr);
-  ledger.enter(Degradation::window, Reason::time_gap, 7, 3);
-  ledger.enter(Degradation::rig, Reason::recalibrating, 8);
+  ledger.enter(Degradation::window, Reason::time_gap, 3);
+  ledger.enter(Degradation::rig, Reason::recalibrating);
   ASSERT_NE(ledger.strongest(true), nullptr);
   EXPECT_EQ(ledger.strongest(true)->reason, Reason::recalibrating);
   EXPECT_TRUE(ledger.any_up_to(Degradation::rig));
@@ -26,24 +26,13 @@ TEST(DegradationLedger, strongestIsReported) {
 TEST(DegradationLedger, entryEndsAfterItsEvidence) {
   DegradationLedger ledger;
   EXPECT_FALSE(ledger.weaken(Degradation::scene));
-  ledger.enter(Degradation::scene, Reason::map_reset, 5, 2);
+  ledger.enter(Degradation::scene, Reason::map_reset, 2);
   EXPECT_FALSE(ledger.weaken(Degradation::scene));
   EXPECT_TRUE(ledger.weaken(Degradation::scene));
   EXPECT_FALSE(ledger.active(Degradation::scene));
-  ledger.enter(Degradation::rig, Reason::recalibrating, 5);
+  ledger.enter(Degradation::rig, Reason::recalibrating);
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(ledger.weaken(Degradation::rig));
   EXPECT_TRUE(ledger.active(Degradation::rig));
-}
-
-TEST(DegradationLedger, entryKeepsItsFirstFrame) {
-  DegradationLedger ledger;
-  for (std::uint64_t frame = 11; frame < 15; ++frame)
-    ledger.set(Degradation::frame, true, Reason::few_inliers, frame);
-  EXPECT_EQ(ledger[Degradation::frame].since, 11U);
-  ledger.set(Degradation::frame, false, Reason::few_inliers, 15);
-  EXPECT_FALSE(ledger.active(Degradation::frame));
-  ledger.set(Degradation::frame, true, Reason::few_inliers, 16);
-  EXPECT_EQ(ledger[Degradation::frame].since, 16U);
 }
 
 // A camera that gives the same image again and again while the rig drives on.

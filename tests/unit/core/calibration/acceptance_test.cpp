@@ -1,13 +1,11 @@
-#include "core/estimator/detail/solution_review.hpp"
-
+// Solutions that are compared with the calibration in use by epipolar lines and by depths.
 #include <gtest/gtest.h>
 
+#include "core/calibration/gates.hpp"
 #include "tests/unit/core/calibration/feature_log.hpp"
 
-namespace vergence {
+namespace vergence::calibration {
 namespace {
-
-using calibration::Gate;
 
 /// A solve that found the true rig, frames that it does not rest on, and a calibration in use that
 /// is turned from it.
@@ -19,37 +17,33 @@ struct Review {
 
   test::FeatureDriveOptions drive;
   Arena arena;
-  calibration::TrackLog log{20, 300, arena};
-  EstimatorOptions options;
-  calibration::FocalCheck focal{false};
+  TrackLog log{20, 300, arena};
+  CalibrationOptions options;
   RigCalibration truth = test::rig_of(drive), in_use = truth;
-  calibration::RigSolution solved;
+  RigSolution solved;
 
   explicit Review(const Vec3& turned) {
     test::FeatureDrive d(drive);
     test::log_drive(d, 20, {}, log);
     in_use.T_camera_left[1].R = exp_so3(turned) * truth.T_camera_left[1].R;
-    calibration::RigSolution& s = solved;
-    s.status = calibration::RigSolveStatus::ok;
+    RigSolution& s = solved;
+    s.status = RigSolveStatus::ok;
     s.rig = truth;
     s.newest = kNewest;
-    s.frames = options.calibration.max_frames;
+    s.frames = options.max_frames;
     s.travelled_m = 100;
     s.near = 1000;
     for (int row = extrinsic_row(1); row < extrinsic_row(1) + 3; ++row)
       s.rig.covariance.set(row, row, kSigma * kSigma);
   }
   [[nodiscard]] Gate gate() const {
-    const SolutionReview review(
-        solved, {options, truth, &in_use, calibration::CalibrationOrigin::elsewhere, log, focal});
-    return review.gate();
+    return check_acceptance(
+        {.solution = &solved, .nominal = &truth, .in_use = &in_use, .log = &log}, options);
   }
-  [[nodiscard]] bool lines_tell() const {
-    return calibration::fits_better(log, kNewest, truth, in_use);
-  }
+  [[nodiscard]] bool lines_tell() const { return fits_better(log, kNewest, truth, in_use); }
 };
 
-TEST(SolutionReview, pitchIsAcceptedByEpipolarLines) {
+TEST(Acceptance, pitchIsAcceptedByEpipolarLines) {
   // The pitch moves every row by 0.7 px.
   const Review r({1e-3, 0, 0});
   EXPECT_TRUE(r.lines_tell());
@@ -58,7 +52,7 @@ TEST(SolutionReview, pitchIsAcceptedByEpipolarLines) {
 
 // 1 mrad is 2.7 % of the depth at 20 m, which the solve holds to 0.27 %; of epipolar lines it moves
 // those in the image's corners, by less than the matches scatter.
-TEST(SolutionReview, yawIsAcceptedByDepth) {
+TEST(Acceptance, yawIsAcceptedByDepth) {
   for (const double yaw : {1e-3, -1e-3}) {
     const Review r({0, yaw, 0});
     ASSERT_FALSE(r.lines_tell()) << yaw;
@@ -67,10 +61,10 @@ TEST(SolutionReview, yawIsAcceptedByDepth) {
 }
 
 // A measurement whose depth does not differ by more than chance leaves the calibration unchanged.
-TEST(SolutionReview, toleratedYawIsNoBetter) {
+TEST(Acceptance, toleratedYawIsNoBetter) {
   for (const double yaw : {0.0, 1.5e-4, -1.5e-4})
     EXPECT_EQ(Review({0, yaw, 0}).gate(), Gate::no_better) << yaw;
 }
 
 }  // namespace
-}  // namespace vergence
+}  // namespace vergence::calibration
