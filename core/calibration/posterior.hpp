@@ -10,7 +10,8 @@ inline constexpr double kUnknownTransform = 0.2;
 /// Sigma of the transforms of a calibration that states none, in the same units: twice the yaw of
 /// 26 mrad that a recorded rig has in its principal points instead.
 inline constexpr double kSuppliedTransform = 0.05;
-/// Usual RigCalibration::inflation: 5 to 45 on recorded drives.
+/// Usual RigCalibration::inflation of a solve of 15 to 25 frames: 5 to 37 on recorded sequences
+/// (build/bench/calibration_bench solves).
 inline constexpr double kUsualInflation = 20;
 
 /// Widens the joint covariance of a calibration by the random walk of `hours`. Pure.
