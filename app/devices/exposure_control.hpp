@@ -46,7 +46,8 @@ class ExposureControl final : public FrameObserver {
   ~ExposureControl() override { settle(); }
 
   void on_frame(std::size_t k, const Frame& frame) noexcept override;
-  /// Ends the thread. Called by the owner after the last frame; may be called twice.
+  /// Carries out a pending request and ends the thread. Called by the owner after the last frame;
+  /// may be called twice.
   void settle() noexcept { thread_.stop(); }
   [[nodiscard]] ExposureCounters counters() const noexcept;
 

@@ -84,7 +84,14 @@ class SessionRunner {
     start_source();
     std::future<void> estimating = start_estimating();
     service_.ready();
-    watch(estimating);
+    try {
+      watch(estimating);
+    } catch (...) {
+      // The future waits for the estimator, which waits for the end of the source.
+      source_.stop();
+      halt_source();
+      throw;
+    }
     estimating.get();
     progress_.finish();
     source_.finish(&progress_);

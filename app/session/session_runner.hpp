@@ -24,7 +24,7 @@ struct SessionOptions {
 /// Processes a source by estimator and comparison into a session directory: set-up, monitoring,
 /// events, comparison, summary, report and result, equal for devices and recordings.
 ///
-///     const auto source = std::make_unique<LiveSource>(request);
+///     const std::unique_ptr<FrameSource> source = …;
 ///     SessionOptions options;
 ///     options.out = "sessions/monday";
 ///     const ExitCode code = run_session(*source, request.configuration, options, signals);

@@ -52,7 +52,9 @@ void TrackLog::copy(const TrackLog& from) noexcept {
 
 void TrackLog::append(const LoggedFrame& frame) noexcept {
   begin(frame);
-  for (const LoggedObservation& observation : frame.observations) push(observation);
+  const std::size_t at = slot(size_ - 1), count = std::min(frame.observations.size(), capacity_);
+  frames_[at].observations = observations_.subspan(at * capacity_, count);
+  std::copy_n(frame.observations.begin(), count, frames_[at].observations.begin());
 }
 
 }  // namespace vergence::calibration

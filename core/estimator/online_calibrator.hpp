@@ -155,7 +155,8 @@ class OnlineCalibrator {
   // Number of frames after the start of the solve at which the next decision is due.
   int next_decision_ = 0;
   float waited_ms_ = 0;
-  // Used by the solver's thread during a solve.
+  // Used by the solver's thread during a solve, which also reads options_, given_ and
+  // focal_known_.
   calibration::RigSolver solver_;
   calibration::RigSolveRequest request_;
   RigCalibration prior_;

@@ -176,8 +176,8 @@ class Odometry {
                  double dt, FrameOutcome* out) noexcept;
   void adopt(const RigCalibration& rig) noexcept;
   /// Changes to a calibration and keeps the map: undistorts the window's pixels with the new
-  /// intrinsics, triangulates points again, and keeps the newest pose. This frame becomes a
-  /// keyframe with new points. Returns false if its matches do not fit the calibration.
+  /// intrinsics, triangulates points again, and keeps the newest pose. Returns false if this
+  /// frame's matches do not fit the calibration; otherwise the frame is a keyframe with new points.
   [[nodiscard]] bool reexpress_map(const RigCalibration& rig, FrameOutcome* out) noexcept;
   /// Changes back to the previous calibration if a map can be built with it.
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;

@@ -250,11 +250,12 @@ bool Odometry::reexpress_map(const RigCalibration& rig, FrameOutcome* out) noexc
       held == 0 ? 1
                 : std::min(1.0, static_cast<double>(newest.inliers) / static_cast<double>(held));
   if (newest.found) map_.move_world(newest.T_left_world.inverse() * motion_.T_left_world());
+  if (!evidence.fits()) return false;
   // Unlinked cameras have followed fewer points than linked ones can.
   (void)new_points(0, out);
   keyframe_points_ = map_.observe(newest_slot);
   out->keyframe = true;
-  return evidence.fits();
+  return true;
 }
 
 bool Odometry::resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {

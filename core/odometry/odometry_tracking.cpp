@@ -35,20 +35,22 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
-  // Try the prediction, then with a larger range, then the best pose so far, or if there is none
-  // the last one as the image has turned since.
+  // Try the prediction, then with a larger range, then the last pose as the image has turned since;
+  // but an attempt that gave a better pose is continued from there.
   PoseFit best;
+  bool better = false;
   for (const int attempt : {0, 1, 2}) {
     const int coarsest = attempt == 0 ? 2 : 3;
-    Transform start = best.inliers > 0 ? best.T_left_world : predicted;
-    if (attempt == 2 && best.inliers == 0)
+    Transform start = better ? best.T_left_world : predicted;
+    if (attempt == 2 && !better)
       start = Transform{front_end_.turn_since_kept(), Vec3::Zero()} * motion_.T_left_world();
     // A quarter of the points is enough for MLESAC, for a third of the work.
     front_end_.follow_sample(map_, start, options_.features / 4, coarsest);
     clock.mark(Stage::track);
     fit = this->fit(start, true);
     clock.mark(Stage::pose);
-    if (sample_agrees(fit, kChanceShare) && fit.inliers > best.inliers) best = fit;
+    better = sample_agrees(fit, kChanceShare) && fit.inliers > best.inliers;
+    if (better) best = fit;
     if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
