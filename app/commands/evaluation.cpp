@@ -40,8 +40,9 @@ struct InsMount {
   bool axes_only = false;
 };
 
-/// The mount between two trajectories' bodies; the drawing it is told against is the nearest of:
-/// the same axes, forward-left-up against a camera's, and the reverse. Not ok: a status only.
+/// The mount between two trajectories' bodies. `nominal` is the nearest of three: the same axes,
+/// forward-left-up against a camera's axes, and the reverse. If the status is not `ok`, only the
+/// status is set.
 struct FoundMount {
   MountStatus status = MountStatus::too_few;
   Mount mount{};
@@ -492,7 +493,7 @@ class Evaluation {
       throw InputError(a_.estimate.string() +
                        ": is not a session directory with ins.csv; pass a REFERENCE");
   }
-  /// One unit given is the estimate's, and also the reference's where that has none to be told by.
+  /// A single stamp unit applies to the estimate, and to the reference if its own is not known.
   [[nodiscard]] TrajectoryFile read_reference() const {
     constexpr std::string_view kOption =
         "--time-unit ,s (or ,ms ,us ,ns: the reference's follows the comma)";
@@ -531,7 +532,8 @@ class Evaluation {
     for (std::size_t i = 0; i < with.poses.size(); ++i)
       without.poses[i].stamp = with.poses[i].stamp;
   }
-  /// Brings the reference to the estimate's body. Stamps stay: a clock offset is told, not applied.
+  /// Brings the reference to the estimate's body. Stamps stay: a clock offset is reported, not
+  /// applied.
   void bring_reference() {
     Transform T_ref_est;
     if (is_ins_) {
