@@ -104,8 +104,9 @@ class RigSolver {
                                              bool focal_lengths) const noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] BundleResult adjust_robustly(BundleOptions how) noexcept;
-  /// Removes the outliers of the last adjustment and adjusts again with Cauchy's loss. `last`: to
-  /// the end, with covariances.
+  /// Removes the outliers of the last adjustment and adjusts again with Cauchy's loss, until a step
+  /// is at most `tolerance_sigmas` standard deviations by white noise. `last`: with covariances,
+  /// and with enough steps for that.
   [[nodiscard]] BundleResult readjust(BundleOptions how, bool last,
                                       double tolerance_sigmas) noexcept;
   void drop_outliers(double limit) noexcept;
