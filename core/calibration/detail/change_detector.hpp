@@ -14,6 +14,7 @@ class EvidenceHistory {
  public:
   /// Number of individual frames, among which an onset is exact.
   static constexpr std::size_t kRecent = 64;
+  /// Number of frames of a block: half a second at 30 Hz.
   static constexpr std::size_t kBlock = 15;
   // Number of blocks over which a drift is traced: two minutes at 30 Hz.
   static constexpr std::size_t kBlocks = 240;
@@ -87,6 +88,7 @@ class BlockScatter {
   }
 
  private:
+  // Two seconds at 30 Hz, chosen: after as many blocks the measurement outweighs the expectation.
   static constexpr double kExpectedBlocks = 4;
   double expected2_ = 0, sum_ = 0;
   std::uint64_t blocks_ = 0;
