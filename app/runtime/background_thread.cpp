@@ -45,6 +45,15 @@ void await_change(const std::atomic<std::uint32_t>& counter, std::uint32_t old) 
 // Thread names indexed by Role.
 constexpr std::array kNames{"vergence-calib", "vergence-front", "vergence-right"};
 
+void set_up_thread(BackgroundThread::Role role) noexcept {
+  using Role = BackgroundThread::Role;
+  (void)pthread_setname_np(pthread_self(), kNames.at(static_cast<std::size_t>(role)));
+  // On Linux the priority is the calling thread's own, in spite of the name. A refusal costs
+  // nothing but that share.
+  if (role == Role::solver) (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+  if (role != Role::reader) AllocationGuard::seal_thread();
+}
+
 }  // namespace
 
 BackgroundThread::BackgroundThread(Role role) : thread_([this, role] { work(role); }) {}
@@ -73,17 +82,46 @@ void BackgroundThread::wait() noexcept {
 }
 
 void BackgroundThread::work(Role role) noexcept {
-  (void)pthread_setname_np(pthread_self(), kNames.at(static_cast<std::size_t>(role)));
-  // On Linux the priority is the calling thread's own, in spite of the name. A refusal costs
-  // nothing but that share.
-  if (role == Role::solver) (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
-  if (role != Role::reader) AllocationGuard::seal_thread();
+  set_up_thread(role);
   for (std::uint32_t answered = 0;; ++answered) {
     await_change(asked_, answered);
     if (stop_) return;
     (*task_)();
     done_.fetch_add(1, std::memory_order_release);
     done_.notify_one();
+  }
+}
+
+ThreadRunner::ThreadRunner(BackgroundThread::Role role) : thread_([this, role] { work(role); }) {}
+
+ThreadRunner::~ThreadRunner() {
+  state_ = ended;
+  state_.notify_one();
+  thread_.join();
+}
+
+void ThreadRunner::run(TaskRef here, TaskRef there) noexcept {
+  there_ = there;
+  state_.store(offered, std::memory_order_release);
+  state_.notify_one();
+  here();
+  std::uint32_t now = offered;
+  if (state_.compare_exchange_strong(now, idle, std::memory_order_acquire))
+    there();
+  else if (now == taken)
+    await_change(state_, taken);
+}
+
+void ThreadRunner::work(BackgroundThread::Role role) noexcept {
+  set_up_thread(role);
+  for (std::uint32_t now = state_; now != ended; now = state_) {
+    if (now == offered && state_.compare_exchange_strong(now, taken, std::memory_order_acquire)) {
+      (*there_)();
+      state_.store(idle, std::memory_order_release);
+      state_.notify_one();
+      now = idle;
+    }
+    await_change(state_, now);
   }
 }
 

@@ -44,21 +44,26 @@ class BackgroundThread final : public BackgroundRunner {
   std::thread thread_;
 };
 
-/// PairRunner with one such thread: runs `here` on the caller and `there` on the thread, in
-/// parallel.
+/// PairRunner with a second thread, which waits as a BackgroundThread does. If that thread has not
+/// started `there` when the caller is done with `here`, because its core is busy, the caller runs
+/// both.
+///
+/// Threads, memory, errors  As BackgroundThread.
 class ThreadRunner final : public PairRunner {
  public:
-  explicit ThreadRunner(BackgroundThread::Role role = BackgroundThread::Role::front_end)
-      : thread_(role) {}
+  explicit ThreadRunner(BackgroundThread::Role role = BackgroundThread::Role::front_end);
+  ~ThreadRunner() override;
 
-  void run(TaskRef here, TaskRef there) noexcept override {
-    thread_.start(there);
-    here();
-    thread_.wait();
-  }
+  void run(TaskRef here, TaskRef there) noexcept override;
 
  private:
-  BackgroundThread thread_;
+  enum State : std::uint32_t { idle, offered, taken, ended };
+  void work(BackgroundThread::Role role) noexcept;
+
+  // Written while `idle`.
+  std::optional<TaskRef> there_{};
+  std::atomic<std::uint32_t> state_{idle};
+  std::thread thread_;
 };
 
 /// Runs the two halves of a front end on one thread, or on two or more in parallel.

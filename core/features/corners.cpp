@@ -61,29 +61,27 @@ bool crowded(const Corner& c, std::span<const Corner> others, float distance) no
   });
 }
 
-/// Finds the best corner of each free cell in rows [first, last) of the grid, at found[cell]; score
-/// 0 if there is none.
-void scan_rows(const ImageView& image, const CornerOptions& options, const Grid& grid,
-               const bool* occupied, int first, int last, Corner* found) noexcept {
+/// Finds the best corner of each free cell in a row of the grid, at found[cell]; score 0 if there
+/// is none.
+void scan_row(const ImageView& image, const CornerOptions& options, const Grid& grid,
+              const bool* occupied, int row, Corner* found) noexcept {
   alignas(64) std::array<float, detail::kMaxBlock * detail::kMaxBlock> score;
   std::array<float, detail::kMaxBlock> bound;
   const int low = std::max(options.border, detail::kTensorRadius + 2);
-  for (int r = first; r < last; ++r) {
-    for (int c = 0; c < grid.columns; ++c) {
-      const int cell = r * grid.columns + c;
-      found[cell] = {};
-      if (occupied[cell]) continue;
-      const int x0 = std::max(c * grid.cell, low) - 1, y0 = std::max(r * grid.cell, low) - 1;
-      const int x1 = std::min((c + 1) * grid.cell, image.width - std::max(low, kRightMargin)) + 1;
-      const int y1 = std::min((r + 1) * grid.cell, image.height - low) + 1;
-      if (x1 - x0 < 4 || y1 - y0 < 4) continue;
-      detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data(), bound.data());
-      Corner best = best_corner(score.data(), bound.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
-      if (!(best.score > kFlat)) continue;
-      best.x += static_cast<float>(x0);
-      best.y += static_cast<float>(y0);
-      found[cell] = best;
-    }
+  for (int c = 0; c < grid.columns; ++c) {
+    const int cell = row * grid.columns + c;
+    found[cell] = {};
+    if (occupied[cell]) continue;
+    const int x0 = std::max(c * grid.cell, low) - 1, y0 = std::max(row * grid.cell, low) - 1;
+    const int x1 = std::min((c + 1) * grid.cell, image.width - std::max(low, kRightMargin)) + 1;
+    const int y1 = std::min((row + 1) * grid.cell, image.height - low) + 1;
+    if (x1 - x0 < 4 || y1 - y0 < 4) continue;
+    detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data(), bound.data());
+    Corner best = best_corner(score.data(), bound.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
+    if (!(best.score > kFlat)) continue;
+    best.x += static_cast<float>(x0);
+    best.y += static_cast<float>(y0);
+    found[cell] = best;
   }
 }
 
@@ -102,13 +100,9 @@ void find_corners(const ImageView& image, const CornerOptions& options,
   for (const Corner& c : taken) occupied[static_cast<std::size_t>(grid.index(c.x, c.y))] = true;
 
   std::array<Corner, kMaxGridCells> found;
-  auto upper = [&]() noexcept {
-    scan_rows(image, options, grid, occupied.data(), 0, grid.rows / 2, found.data());
-  };
-  auto lower = [&]() noexcept {
-    scan_rows(image, options, grid, occupied.data(), grid.rows / 2, grid.rows, found.data());
-  };
-  runner.run(TaskRef(upper), TaskRef(lower));
+  for_each_index(runner, static_cast<std::size_t>(grid.rows), [&](std::size_t row) noexcept {
+    scan_row(image, options, grid, occupied.data(), static_cast<int>(row), found.data());
+  });
 
   const auto end = std::remove_if(found.begin(), found.begin() + grid.cells(),
                                   [](const Corner& c) { return !(c.score > 0.F); });

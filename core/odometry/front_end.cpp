@@ -104,8 +104,7 @@ void FrontEnd::rebuild_lenses() noexcept {
 
 ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
   std::array<bool, kMaxCameras> structured{}, repeated{};
-  const auto build = [&](int k) noexcept {
-    const auto i = static_cast<std::size_t>(k);
+  const auto build = [&](std::size_t i) noexcept {
     const ImageView& image = frame.images[i];
     if (image.empty() || image.width != rig_.intrinsics[i].width ||
         image.height != rig_.intrinsics[i].height)
@@ -117,7 +116,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     repeated[i] = structured[i] && f == fingerprints_[i];
     fingerprints_[i] = f;
   };
-  for_each_camera(build);
+  for_each_index(runner_, static_cast<std::size_t>(cameras_), build);
   ImageCheck check;
   bool any_new = false;
   for (int k = 0; k < cameras_; ++k) {
@@ -193,18 +192,22 @@ void FrontEnd::follow_into_all(Map& map, const Transform& T_left_world, int coar
                                float max_shift, int stride) noexcept {
   const features::AlignOptions how{.coarsest = coarsest, .max_shift = max_shift};
   const std::span<MapPoint> points = map.points();
-  const auto one = [&](int k) noexcept {
-    const auto c = static_cast<std::size_t>(k);
-    const bool structured = has_camera(structured_, k);
-    int active = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      followed_[c][i].found = false;
-      if (!structured || !points[i].followed()) continue;
-      if (stride > 1 && (points[i].stage != PointStage::active || active++ % stride != 0)) continue;
-      followed_[c][i] = follow(points[i], T_left_world, k, how);
-    }
-  };
-  for_each_camera(one);
+  std::array<std::uint16_t, kMaxPoints> chosen;
+  std::size_t n = 0;
+  int active = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::span<Followed>& of_camera : followed_)
+      if (!of_camera.empty()) of_camera[i].found = false;
+    if (!points[i].followed()) continue;
+    if (stride > 1 && (points[i].stage != PointStage::active || active++ % stride != 0)) continue;
+    chosen[n++] = static_cast<std::uint16_t>(i);
+  }
+  for_each_index(runner_, n * static_cast<std::size_t>(cameras_), [&](std::size_t j) noexcept {
+    const std::size_t k = j / n, i = chosen[j % n];
+    const int camera = static_cast<int>(k);
+    if (has_camera(structured_, camera))
+      followed_[k][i] = follow(points[i], T_left_world, camera, how);
+  });
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].now.cameras = 0;
     for (int k = 0; k < cameras_; ++k)

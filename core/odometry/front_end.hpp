@@ -160,15 +160,6 @@ class FrontEnd {
     Followed left, stereo;
   };
 
-  /// Calls f(k) for every camera, the left one in parallel with the others.
-  template <class F>
-  void for_each_camera(const F& f) noexcept {
-    auto left = [&]() noexcept { f(0); };
-    auto others = [&]() noexcept {
-      for (int k = 1; k < cameras_; ++k) f(k);
-    };
-    runner_.run(TaskRef(left), TaskRef(others));
-  }
   [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k,
                                 const features::AlignOptions& how) const noexcept;
   /// Follows every stride-th active point, or with stride 1 every followed point.

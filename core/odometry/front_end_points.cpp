@@ -76,13 +76,8 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool swapped,
 }
 
 void FrontEnd::match_all(std::span<const features::Corner> corners, bool swapped) noexcept {
-  const std::size_t half = corners.size() / 2;
-  const auto some = [&](std::size_t begin, std::size_t end) noexcept {
-    for (std::size_t i = begin; i < end; ++i) match_stereo(corners[i], swapped, &fresh_[i]);
-  };
-  auto first = [&]() noexcept { some(0, half); };
-  auto second = [&]() noexcept { some(half, corners.size()); };
-  runner_.run(TaskRef(first), TaskRef(second));
+  for_each_index(runner_, corners.size(),
+                 [&](std::size_t i) noexcept { match_stereo(corners[i], swapped, &fresh_[i]); });
 }
 
 void FrontEnd::detect_new(const Map* map, const FrameWorkload& effort, int min_corners) noexcept {
@@ -153,6 +148,7 @@ bool FrontEnd::swapped() noexcept {
 
 void FrontEnd::add_points(const Transform& T_left_world, PointStage stage, Map* map) noexcept {
   const Transform T_world_left = T_left_world.inverse();
+  map->reuse_slots();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     const NewPoint& f = fresh_[i];
     if (!f.usable) continue;

@@ -5,16 +5,18 @@
 namespace vergence::odometry {
 
 void Map::clear() noexcept {
-  for (MapPoint& p : points_) p.stage = PointStage::free;
+  for (MapPoint& p : points()) p.stage = PointStage::free;
   order_.clear();
-  next_point_ = 0;
+  next_point_ = used_ = 0;
 }
 
 MapPoint* Map::make_point() noexcept {
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    MapPoint& p = points_[(next_point_ + i) % points_.size()];
+    const std::size_t slot = (next_point_ + i) % points_.size();
+    MapPoint& p = points_[slot];
     if (p.stage != PointStage::free) continue;
-    next_point_ = (next_point_ + i + 1) % points_.size();
+    next_point_ = slot + 1;
+    used_ = std::max(used_, next_point_);
     p.id = next_id_++;
     p.missed = 0;
     p.found = 0;
@@ -32,7 +34,7 @@ void Map::drop_oldest_keyframe() noexcept {
   const std::size_t slot = order_[0];
   std::rotate(order_.begin(), order_.begin() + 1, order_.end());
   order_.truncate(order_.size() - 1);
-  for (MapPoint& p : points_) {
+  for (MapPoint& p : points()) {
     if (p.stage == PointStage::free) continue;
     p.seen[slot].cameras = 0;
     if (p.stage != PointStage::dormant) continue;
@@ -40,6 +42,7 @@ void Map::drop_oldest_keyframe() noexcept {
                                    [&](std::uint8_t s) { return p.seen[s].cameras != 0; });
     if (!still) p.stage = PointStage::free;
   }
+  while (used_ > 0 && points_[used_ - 1].stage == PointStage::free) --used_;
 }
 
 std::size_t Map::make_keyframe(const Keyframe& keyframe) noexcept {
@@ -48,13 +51,13 @@ std::size_t Map::make_keyframe(const Keyframe& keyframe) noexcept {
   while (std::find(order_.begin(), order_.end(), slot) != order_.end()) ++slot;
   (void)order_.push(static_cast<std::uint8_t>(slot));
   keyframes_[slot] = keyframe;
-  for (MapPoint& p : points_) p.seen[slot].cameras = 0;
+  for (MapPoint& p : points()) p.seen[slot].cameras = 0;
   return slot;
 }
 
 int Map::observe(std::size_t slot) noexcept {
   int seen = 0;
-  for (MapPoint& p : points_) {
+  for (MapPoint& p : points()) {
     if (!p.followed()) continue;
     p.seen[slot] = p.now;
     seen += p.now.by(0) ? 1 : 0;
@@ -63,7 +66,7 @@ int Map::observe(std::size_t slot) noexcept {
 }
 
 void Map::scale_about(const Vec3& centre, double factor) noexcept {
-  for (MapPoint& p : points_) {
+  for (MapPoint& p : points()) {
     if (p.stage == PointStage::free) continue;
     p.p_world = centre + factor * (p.p_world - centre);
     p.T_origin_world = scaled_about(p.T_origin_world, centre, factor);
@@ -77,7 +80,7 @@ void Map::scale_about(const Vec3& centre, double factor) noexcept {
 
 void Map::move_world(const Transform& T_old_new) noexcept {
   const Transform T_new_old = T_old_new.inverse();
-  for (MapPoint& p : points_) {
+  for (MapPoint& p : points()) {
     if (p.stage == PointStage::free) continue;
     p.p_world = T_new_old * p.p_world;
     p.T_origin_world = p.T_origin_world * T_old_new;

@@ -83,7 +83,6 @@ struct MapPoint {
   Vec3 ray = Vec3::UnitZ();
   /// Derivative of that ray's x and y with respect to the raw pixel.
   Mat2 d_ray_d_pixel = Mat2::Identity();
-  features::Patch patch{};
 
   /// Observations in the current frame that agree with the pose.
   PointObservation now{};
@@ -98,6 +97,7 @@ struct MapPoint {
   Eigen::Vector2f logged_at{};
   std::array<Eigen::Vector2f, kMaxCameras> raw{};
   std::array<PointObservation, kMaxWindow> seen{};
+  features::Patch patch{};
 
   /// True if the position is accurate enough to constrain poses.
   [[nodiscard]] bool constrains_poses() const noexcept {
@@ -125,10 +125,9 @@ class Map {
   void clear() noexcept;
   /// Returns a cleared free slot, or null if there is none.
   [[nodiscard]] MapPoint* make_point() noexcept;
-  /// Start of the search for the next free slot. If all points created since are free again,
-  /// rewind() restores the order of slots, in which residuals are summed.
-  [[nodiscard]] std::size_t cursor() const noexcept { return next_point_; }
-  void rewind(std::size_t cursor) noexcept { next_point_ = cursor; }
+  /// Call before a frame's points are made, which then take the first free slots: few slots are in
+  /// use and stay in the cache, and points that were only tried leave no trace.
+  void reuse_slots() noexcept { next_point_ = 0; }
   /// Returns the slot of a new keyframe without observations; drops the oldest one if the window is
   /// full.
   [[nodiscard]] std::size_t make_keyframe(const Keyframe& keyframe) noexcept;
@@ -140,8 +139,9 @@ class Map {
   /// Changes the world frame: poses become T_left_world · T_old_new, and points follow.
   void move_world(const Transform& T_old_new) noexcept;
 
-  [[nodiscard]] std::span<MapPoint> points() noexcept { return points_; }
-  [[nodiscard]] std::span<const MapPoint> points() const noexcept { return points_; }
+  /// All slots up to the last one in use; some of them are free.
+  [[nodiscard]] std::span<MapPoint> points() noexcept { return points_.first(used_); }
+  [[nodiscard]] std::span<const MapPoint> points() const noexcept { return points_.first(used_); }
   [[nodiscard]] Keyframe& keyframe(std::size_t slot) noexcept { return keyframes_[slot]; }
   [[nodiscard]] const Keyframe& keyframe(std::size_t slot) const noexcept {
     return keyframes_[slot];
@@ -156,6 +156,8 @@ class Map {
   std::size_t window_;
   // Start of the search for a free slot.
   std::size_t next_point_ = 0;
+  // One more than the last slot in use.
+  std::size_t used_ = 0;
   std::uint32_t next_id_ = 1;
   std::array<Keyframe, kMaxWindow> keyframes_{};
   FixedVector<std::uint8_t, kMaxWindow> order_;

@@ -196,7 +196,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     make_keyframe(frame.stamp, &out);
     out.T_left_world = motion_.T_left_world();
   } else if (frames_untried_ >= kFramesUntilTrial && out.images_good && link_ == Link::linked) {
-    cursor_before_trial_ = map_.cursor();
+    trial_ = true;
     frames_untried_ = 0;
     out.effort.points_percent = effort.points_percent;
     // As many points as an `ok` pose needs suffice for an evaluation, whatever the time budget.

@@ -208,8 +208,8 @@ class Odometry {
   int frames_lost_ = 0;
   // True if the additional cameras find hardly any of their points where expected.
   bool stereo_fails_ = false;
-  // Map cursor before the trial candidates that belong to no keyframe, if there are any.
-  std::optional<std::size_t> cursor_before_trial_;
+  // True if the candidates are a trial that belongs to no keyframe.
+  bool trial_ = false;
   // Number of frames since new points were tried.
   int frames_untried_ = 0;
   // Number of active points when the last keyframe was made.

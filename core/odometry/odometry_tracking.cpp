@@ -166,7 +166,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
           p.now.drop(k);
       }
       kept += p.now.cameras != 0 ? 1 : 0;
-      if (cursor_before_trial_) {
+      if (trial_) {
         p.stage = PointStage::free;
         continue;
       }
@@ -188,8 +188,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
   others_move_ = few_fit && others;
   new_points_.add(tried, others ? kept : tried);
   frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
-  if (cursor_before_trial_) map_.rewind(*cursor_before_trial_);
-  cursor_before_trial_.reset();
+  trial_ = false;
 }
 
 }  // namespace vergence::odometry

@@ -1,4 +1,7 @@
 #pragma once
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
 #include <type_traits>
 
 namespace vergence {
@@ -35,6 +38,22 @@ class SequentialRunner final : public PairRunner {
     there();
   }
 };
+
+/// Calls f(i) for i = 0 … n − 1, from both tasks of the runner. Each takes the next few indices in
+/// turn, so that neither waits long for the other, even if its core is busy with something else.
+/// Calls must not depend on each other.
+template <class F>
+void for_each_index(PairRunner& runner, std::size_t n, const F& f) noexcept {
+  // Number of turns: few enough that the shared counter costs nothing.
+  constexpr std::size_t kTurns = 32;
+  const std::size_t turn = n / kTurns + 1;
+  std::atomic<std::size_t> next{0};
+  auto take = [&]() noexcept {
+    for (std::size_t i = next.fetch_add(turn); i < n; i = next.fetch_add(turn))
+      for (const std::size_t end = std::min(n, i + turn); i < end; ++i) f(i);
+  };
+  runner.run(TaskRef(take), TaskRef(take));
+}
 
 /// Runs one long task in the background: the calibration solver's thread, supplied by the app.
 ///

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
+#include <vector>
 
 namespace vergence::app {
 namespace {
@@ -48,14 +51,38 @@ TEST(BackgroundThread, resultIsVisibleWhenNotBusy) {
 TEST(ThreadRunner, runsOneHalfOnEachThread) {
   ThreadRunner runner;
   std::thread::id here_id, there_id, there_again;
-  auto here = [&] { here_id = std::this_thread::get_id(); };
-  auto there = [&] { there_id = std::this_thread::get_id(); };
-  auto again = [&] { there_again = std::this_thread::get_id(); };
+  std::atomic<int> started{0};
+  // While the second half has not started, the caller may still run it.
+  const auto here_until = [&](int count) {
+    here_id = std::this_thread::get_id();
+    while (started < count) std::this_thread::yield();
+  };
+  auto here = [&] { here_until(1); };
+  auto there = [&] {
+    ++started;
+    there_id = std::this_thread::get_id();
+  };
+  auto here_again = [&] { here_until(2); };
+  auto again = [&] {
+    ++started;
+    there_again = std::this_thread::get_id();
+  };
   runner.run(TaskRef(here), TaskRef(there));
-  runner.run(TaskRef(here), TaskRef(again));
+  runner.run(TaskRef(here_again), TaskRef(again));
   EXPECT_EQ(here_id, std::this_thread::get_id());
   EXPECT_NE(there_id, std::this_thread::get_id());
   EXPECT_EQ(there_id, there_again);
+}
+
+TEST(ThreadRunner, everyIndexIsVisitedOnceWithEitherRunner) {
+  ThreadRunner two;
+  SequentialRunner one;
+  for (PairRunner* runner : {static_cast<PairRunner*>(&two), static_cast<PairRunner*>(&one)})
+    for (const std::size_t n : {0U, 1U, 2U, 31U, 32U, 33U, 1000U}) {
+      std::vector<int> visits(n);
+      for_each_index(*runner, n, [&](std::size_t i) noexcept { ++visits[i]; });
+      EXPECT_EQ(std::count(visits.begin(), visits.end(), 1), static_cast<std::ptrdiff_t>(n));
+    }
 }
 
 TEST(ThreadRunner, waitsForTheSlowerHalf) {

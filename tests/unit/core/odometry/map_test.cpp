@@ -45,16 +45,28 @@ TEST(Map, fullMapRefusesUntilAPointIsFreed) {
   for (const PointObservation& s : again->seen) EXPECT_EQ(s.cameras, 0);
 }
 
-TEST(Map, rewoundPointsKeepTheOrderOfSlots) {
+TEST(Map, triedPointsLeaveNoTraceInTheOrderOfSlots) {
   Filled f(3);
   (void)f.point(PointStage::active);
-  const std::size_t cursor = f.map.cursor();
-  MapPoint* const tried = f.map.make_point();
-  (void)f.map.make_point();
+  MapPoint* const tried = f.point(PointStage::candidate);
+  (void)f.point(PointStage::candidate);
   for (MapPoint& p : f.map.points())
     if (p.stage == PointStage::candidate) p.stage = PointStage::free;
-  f.map.rewind(cursor);
+  f.map.reuse_slots();
   EXPECT_EQ(f.map.make_point(), tried);
+}
+
+TEST(Map, pointsEndWithTheLastSlotInUse) {
+  Filled f(1);
+  EXPECT_TRUE(f.map.points().empty());
+  (void)f.point(PointStage::active);
+  MapPoint* const last = f.point(PointStage::candidate);
+  EXPECT_EQ(f.map.points().size(), 2U);
+  last->stage = PointStage::free;
+  // The second keyframe drops the first one.
+  (void)f.keyframe();
+  (void)f.keyframe();
+  EXPECT_EQ(f.map.points().size(), 1U);
 }
 
 TEST(Map, fullWindowDropsItsOldestKeyframe) {
