@@ -44,8 +44,9 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     Transform start = better ? best.T_left_world : predicted;
     if (attempt == 2 && !better)
       start = Transform{front_end_.turn_since_kept(), Vec3::Zero()} * motion_.T_left_world();
-    // A quarter of the points is enough for MLESAC, for a third of the work.
-    front_end_.follow_sample(map_, start, options_.features / 4, coarsest);
+    // A quarter of the points is enough for MLESAC, for a third of the work, unless hardly any of
+    // them is found.
+    front_end_.follow_sample(map_, start, options_.features / (attempt == 0 ? 4 : 1), coarsest);
     clock.mark(Stage::track);
     fit = this->fit(start, true);
     clock.mark(Stage::pose);

@@ -50,7 +50,8 @@ bool PoseEstimator::others_move(const Map& map, const Transform& T_left_world) n
   collect(map, rig_, 0, [](const MapPoint& p) noexcept {
     return p.now.cameras == 0 ? p.in_images : std::uint8_t{0};
   });
-  return supports_camera(solve(T_left_world, true));
+  const Solved s = solve(T_left_world, true);
+  return s.inliers >= kCameraAlone && s.inliers > kRigidShare * static_cast<double>(owner_.size());
 }
 
 void PoseEstimator::collect_camera(const Map& map, int k) noexcept {

@@ -72,7 +72,7 @@ class PoseEstimator {
                                 Transform* T_camera_world) noexcept;
 
   /// Call after settle_points(). Returns true if the points that do not fit the pose agree on
-  /// another motion; wrong matches do not.
+  /// another motion as one rigid scene; fewer wrong matches do.
   [[nodiscard]] bool others_move(const Map& map, const Transform& T_left_world) noexcept;
 
   /// Sets whether a fit by refinement alone leaves out gross outliers (initially true) or weights
