@@ -138,15 +138,14 @@ std::string calibration_line(const CalibrationRecord& record, std::span<const st
                        {"distortion", lens.distortion},
                        {"T_camera_left", rows(rig.T_camera_left[k])}});
   }
-  // In m: depth at which health() evaluates the rig.
+  // In m: depth at which rating() evaluates the rig.
   constexpr double kDepth = 20;
   const bool known = calibration::depth_error_percent(rig, kDepth) > 0;
-  return format_line(
-      "calibration",
-      {{"stamp_ns", record.stamp.ns()},
-       {"cause", record.cause_name()},
-       {"rating", known ? json(to_string(calibration::health(rig, options))) : json()},
-       {"cameras", cameras}});
+  return format_line("calibration",
+                     {{"stamp_ns", record.stamp.ns()},
+                      {"cause", record.cause_name()},
+                      {"rating", known ? json(calibration::rating(rig, options)) : json()},
+                      {"cameras", cameras}});
 }
 
 std::string alignment_line(const PublishedEnuAlignment& p) {

@@ -83,9 +83,8 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
     // At 0 % the depth is so small that no point is visible in both cameras.
     depth[fmt::format("{:g}", z)] = percent > 0 ? Json(percent) : Json();
   }
-  return {
-      {"rating", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()},
-      {"depth_error_percent", depth}};
+  return {{"rating", known ? Json(calibration::rating(rig, options)) : Json()},
+          {"depth_error_percent", depth}};
 }
 
 /// Main cause of the depth error at 20 m: the noise of the images that the calibration was

@@ -143,11 +143,6 @@ bool depth_difference(const Camera& left, const Camera& right, const Transform& 
 
 }  // namespace
 
-std::string_view to_string(CalibrationRating rating) noexcept {
-  static constexpr std::array<std::string_view, 3> names = {"good", "fair", "poor"};
-  return names[static_cast<std::size_t>(rating)];
-}
-
 double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept {
   const auto c = static_cast<std::size_t>(k);
   const bool joint = !rig.covariance.empty();
@@ -190,11 +185,10 @@ double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept {
   return best;
 }
 
-CalibrationRating health(const RigCalibration& rig, const CalibrationOptions& options) noexcept {
+std::string_view rating(const RigCalibration& rig, const CalibrationOptions& options) noexcept {
   const double error = depth_error_percent(rig, kRatingDepth);
-  if (error <= options.good_depth_percent) return CalibrationRating::good;
-  return error <= options.usable_depth_percent ? CalibrationRating::can_be_improved
-                                               : CalibrationRating::recalibrate;
+  if (error <= options.good_depth_percent) return "good";
+  return error <= options.usable_depth_percent ? "fair" : "poor";
 }
 
 }  // namespace vergence::calibration

@@ -7,10 +7,6 @@
 
 namespace vergence::calibration {
 
-enum class CalibrationRating : std::uint8_t { good, can_be_improved, recalibrate };
-/// Returns `good`, `fair` or `poor`.
-[[nodiscard]] std::string_view to_string(CalibrationRating) noexcept;
-
 /// Depths at which errors are reported, in metres, and the one of the rating.
 inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};
 inline constexpr double kRatingDepth = kHealthDepths[3];
@@ -41,8 +37,8 @@ inline constexpr double kRatingDepth = kHealthDepths[3];
 /// Sigma of a depth measured with the rig's best pair of cameras, percent of the depth.
 [[nodiscard]] double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept;
 
-/// Rating of a rig by its depth error at 20 m.
-[[nodiscard]] CalibrationRating health(const RigCalibration& rig,
-                                       const CalibrationOptions& options) noexcept;
+/// Rating of a rig by its depth error at kRatingDepth: `good`, `fair` or `poor`.
+[[nodiscard]] std::string_view rating(const RigCalibration& rig,
+                                      const CalibrationOptions& options) noexcept;
 
 }  // namespace vergence::calibration

@@ -73,8 +73,7 @@ Vec2 observed_pixel(const LoggedObservation& s, std::size_t k) noexcept {
 
 std::array<double, 6> sigmas(const Mat6& covariance) noexcept {
   std::array<double, 6> sigma;
-  for (int i = 0; i < 6; ++i)
-    sigma[static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, covariance(i, i)));
+  Vec6::Map(sigma.data()) = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   return sigma;
 }
 

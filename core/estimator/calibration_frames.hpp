@@ -52,8 +52,6 @@ class CalibrationFrames {
   void require(std::size_t frames) noexcept;
   /// Makes the next solve wait until the log holds `frames` frames.
   void require_logged(std::size_t frames) noexcept { required_ = logged_ - log_.size() + frames; }
-  /// Makes the next solve wait for a full segment.
-  void require_full() noexcept { required_ = max_frames(); }
   /// Capacity of the log, and number of frames of a full segment.
   [[nodiscard]] std::size_t max_frames() const noexcept {
     return static_cast<std::size_t>(options_.max_frames);

@@ -10,6 +10,7 @@
 #include "core/types/calibration.hpp"
 #include "core/types/calibration_decision.hpp"
 #include "core/types/decision_margins.hpp"
+#include "core/types/estimator_event.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
@@ -48,51 +49,6 @@ struct EstimatorOptions {
   Duration frame_budget{};
   /// If false, the rig is not monitored and the supplied calibration is used throughout.
   bool online = true;
-};
-
-/// Event of the estimator, written as a line of events.jsonl. `why` points to a constant.
-struct EstimatorEvent {
-  /// Kind of an event. Each comment describes `value`, which is 0 for other kinds.
-  enum class Kind : std::uint8_t {
-    state,
-    /// Duration of the gap, in s.
-    map_reset,
-    /// Duration of the gap, in s.
-    time_gap,
-    relocalised,
-    /// Time by which the frame is older than the previous one, in s.
-    dropped,
-    /// Number of frames since the onset. Also recorded for a requested calibration.
-    rig_changed,
-    /// Offset between the cameras' exposures in frames if that explains the changes, else 0.
-    rig_not_rigid,
-    /// Lag in frames; 0 if unknown.
-    out_of_sync,
-    cameras_in_sync,
-    /// Standard deviation of depths, in percent.
-    calibration_verified,
-    /// Depth error of the calibration in use, in percent.
-    calibration_contradicted,
-    /// Measured focal length, in px.
-    focal_length_contradicted,
-    /// Number of frames in the solve.
-    calibration_accepted,
-    /// Number of frames in the solve.
-    calibration_rejected,
-    /// Share of map points that fit the accepted calibration, in percent.
-    calibration_applied,
-    /// None; `why` names what is missing.
-    calibration_pending,
-    /// None; the images fit an earlier calibration after tracking was lost.
-    calibration_resumed,
-  };
-  Kind kind = Kind::state;
-  Stamp stamp{};
-  State from = State::initialising;
-  State to = State::initialising;
-  const char* why = "";
-  double value = 0;
-  ChangeEvidence evidence;
 };
 
 /// Estimates the pose of each rig frame, and calibrates the rig online. This is the entry point of

@@ -162,7 +162,7 @@ bool OnlineCalibrator::start_last_solve() noexcept {
   return true;
 }
 
-Gate OnlineCalibrator::gate(bool must_be_better) const noexcept {
+Gate OnlineCalibrator::gate() const noexcept {
   return calibration::check_acceptance(
       {.solution = &solved_,
        .nominal = &nominal_,
@@ -171,7 +171,7 @@ Gate OnlineCalibrator::gate(bool must_be_better) const noexcept {
        .log = &frames_.log(),
        .pixel_sigma = options_.odometry.pixel_sigma,
        .may_have_changed = !(estimating() && search_.frames_before_change_dropped),
-       .must_be_better = must_be_better},
+       .must_be_better = !request_.from_rig},
       options_.calibration);
 }
 
@@ -221,7 +221,7 @@ std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::
                                                               bool last) noexcept {
   solving_ = false;
   if (outdated()) return std::nullopt;
-  gate_ = gate(false);
+  gate_ = gate();
   // Frames of two rigs or out of sync cannot measure a focal length.
   if (gate_ != Gate::rig_changed && gate_ != Gate::out_of_sync && solved_focal_.measured_px > 0) {
     focal_ = solved_focal_;
@@ -250,7 +250,6 @@ std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::
 }
 
 void OnlineCalibrator::evaluate_estimate(CalibrationDecision* d) noexcept {
-  gate_ = gate();
   d->cause = search_.cause;
   d->accepted = gate_ == Gate::open;
   d->reason = calibration::reason(gate_);
@@ -346,7 +345,7 @@ void OnlineCalibrator::plan_refinement() noexcept {
   } else if (frames_.solved_frames() >= frames_.max_frames()) {
     if (usable) refined_ = found.rig;
     frames_.begin_segment(found.newest + 1);
-    frames_.require_full();
+    frames_.require(frames_.max_frames());
   } else {
     // Sigmas fall with the root of the number of frames.
     frames_.require(2 * frames_.solved_frames());

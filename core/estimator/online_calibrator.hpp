@@ -115,8 +115,9 @@ class OnlineCalibrator {
   [[nodiscard]] bool outdated() const noexcept {
     return discarded_ || request_.from_rig == estimating();
   }
-  /// `must_be_better`: the solution must fit better than the calibration in use.
-  [[nodiscard]] calibration::Gate gate(bool must_be_better = true) const noexcept;
+  /// An estimate must fit better than the calibration in use; evaluate_refinement() compares the
+  /// two otherwise.
+  [[nodiscard]] calibration::Gate gate() const noexcept;
   /// Compares the solution with the calibration `current`.
   [[nodiscard]] calibration::Assessment assess(
       const RigCalibration& current, calibration::CalibrationOrigin source) const noexcept;

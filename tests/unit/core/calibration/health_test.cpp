@@ -43,7 +43,7 @@ TEST(Health, ratingFollowsTheErrorAtTwentyMetres) {
   const auto word = [&](double percent) {
     RigCalibration rig = narrow_rig();
     know(&rig, 1, 3, 0.01 * percent * 0.1);
-    return to_string(health(rig, options));
+    return rating(rig, options);
   };
   EXPECT_EQ(word(1.99), "good");
   EXPECT_EQ(word(2.01), "fair");
@@ -60,11 +60,11 @@ TEST(Health, rigIsRatedByItsBestPair) {
   know(&rig, 1, 3, 0.001);
   know(&rig, 2, 3, 0.004);
   EXPECT_NEAR(depth_error_percent(rig, 20.0), 1.0, 1e-9);
-  EXPECT_EQ(health(rig, {}), CalibrationRating::good);
+  EXPECT_EQ(rating(rig, {}), "good");
   // The depth error is 20 %.
   know(&rig, 1, 3, 0.02);
   EXPECT_NEAR(depth_error_percent(rig, 20.0), 8.0, 1e-9);
-  EXPECT_EQ(health(rig, {}), CalibrationRating::recalibrate);
+  EXPECT_EQ(rating(rig, {}), "poor");
 }
 
 }  // namespace
