@@ -40,16 +40,10 @@ bool both_show(const odometry::FrameOutcome& outcome, std::size_t k) noexcept {
 /// Number of points that camera k should show at this pose.
 int expected_stereo(const odometry::Odometry& odometry, std::size_t k,
                     const Transform& T_camera_world) noexcept {
-  const Camera& camera = odometry.front_end().lens(static_cast<int>(k)).raw();
-  int n = 0;
-  for (const MapPoint& p : odometry.map().points()) {
-    Vec2 at;
-    if (p.stage == odometry::PointStage::active && p.now.by(0) &&
-        camera.project(T_camera_world * p.p_world, &at, nullptr) == ProjectStatus::ok &&
-        camera.inside(at, 0.0))
-      ++n;
-  }
-  return n;
+  return static_cast<int>(std::ranges::count_if(odometry.map().points(), [&](const MapPoint& p) {
+    return p.stage == odometry::PointStage::active && p.now.by(0) &&
+           odometry.in_view(static_cast<int>(k), T_camera_world * p.p_world);
+  }));
 }
 
 }  // namespace

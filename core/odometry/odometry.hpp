@@ -143,6 +143,8 @@ class Odometry {
   [[nodiscard]] const Map& map() const noexcept { return map_; }
   [[nodiscard]] Map& map() noexcept { return map_; }
   [[nodiscard]] const FrontEnd& front_end() const noexcept { return front_end_; }
+  /// True if camera k should see this point of its own frame, in m.
+  [[nodiscard]] bool in_view(int k, const Vec3& p_camera) const noexcept;
   /// Per map point, bit k is set if camera k's observation in the last frame agrees with its pose.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return poses_.agrees(); }
 
@@ -150,8 +152,6 @@ class Odometry {
   [[nodiscard]] PoseFit fit(const Transform& start, bool sample) noexcept;
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
                               FrameOutcome* out) noexcept;
-  /// True if camera k should see a point of its own frame.
-  [[nodiscard]] bool in_view(int k, const Vec3& p_camera) const noexcept;
   /// Number of points that the left camera should see, without those of `revived`, which were not
   /// found before.
   [[nodiscard]] int points_in_view(const Transform& T_left_world,
