@@ -38,7 +38,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   // Try the prediction, then with a larger range, then the last pose as the image has turned since;
   // but an attempt that gave a better pose is continued from there.
   PoseFit best;
-  bool better = false;
+  bool better = false, as_predicted = false;
   for (const int attempt : {0, 1, 2}) {
     const int coarsest = attempt == 0 ? 2 : 3;
     Transform start = better ? best.T_left_world : predicted;
@@ -52,6 +52,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     clock.mark(Stage::pose);
     better = sample_agrees(fit, kChanceShare) && fit.inliers > best.inliers;
     if (better) best = fit;
+    as_predicted = attempt == 0 && sample_agrees(fit, kRigidShare);
     if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
@@ -64,12 +65,23 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     if (!fit.found) return fit;
     share = std::max(share, kMinSeenAgain);
   }
-  const Transform coarse = fit.T_left_world;
   if (link_ == Link::unlinked) recover_cameras(fit);
-  front_end_.follow_all(map_, coarse);
-  clock.mark(Stage::track);
-  fit = this->fit(coarse, false);
-  if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
+  const auto follow_all = [&](const Transform& start) noexcept {
+    front_end_.follow_all(map_, start);
+    clock.mark(Stage::track);
+    PoseFit all = this->fit(start, false);
+    if (!all.found || all.inliers < kRigidShare * all.given) all = this->fit(start, true);
+    return all;
+  };
+  fit = follow_all(fit.T_left_world);
+  // A pose that was not predicted may be rough: from there the finest level finds few points, and
+  // some at wrong places. Continue from the better pose while more points are found.
+  int given = 0;
+  for (int round = 0; !as_predicted && fit.found && fit.given > given && round < kReweightings;
+       ++round) {
+    given = fit.given;
+    fit = follow_all(fit.T_left_world);
+  }
   if (share > 0 && fit.inliers < share * points_in_view(fit.T_left_world, revived))
     fit.found = false;
   // If they stayed active, they would count as missing in the next attempt.
