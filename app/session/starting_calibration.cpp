@@ -72,10 +72,6 @@ void check_same_rig(const std::string& name, const CalibrationFile& file,
         name, found_m, expected_m));
 }
 
-double angle_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
 }  // namespace
 
 GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,

@@ -87,21 +87,19 @@ void DisparityJumpDetector::add_row(const StereoObservation& before, const Stere
 DisparityJump DisparityJumpDetector::fit() noexcept {
   DisparityJump jump;
   if (rows_.size() < kMinTracksOfFrame) return jump;
-  double s = 0, along = 0, scale = 0, variance = 0;
   const auto median_by = [&](auto value) noexcept {
     for (std::size_t i = 0; i < rows_.size(); ++i) scratch_[i] = value(rows_[i]);
     return median(scratch_.first(rows_.size()));
   };
-  s = median_by([](const Row& r) noexcept { return r.e; });
+  double s = median_by([](const Row& r) noexcept { return r.e; });
+  double along = 0, scale = 0, variance = 0;
   for (int k = 0; k < kReweightings; ++k) {
     scale = std::max(kMinScale, median_by([&](const Row& r) noexcept {
                                   return std::abs(r.e - s - along * r.along);
                                 }) / kMedianOfNormal);
     double w = 0, wa = 0, waa = 0, we = 0, wae = 0;
     for (const Row& r : rows_) {
-      const double u = (r.e - s - along * r.along) / (kTukey * scale);
-      if (std::abs(u) >= 1) continue;
-      const double weight = (1 - u * u) * (1 - u * u);
+      const double off = r.e - s - along * r.along, weight = tukey(off * off, kTukey * scale);
       w += weight;
       wa += weight * r.along;
       waa += weight * r.along * r.along;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 
 #include "core/calibration/health.hpp"
@@ -53,12 +52,10 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
   return median(std::span(distance).first(n));
 }
 
-constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
-
 /// At most the newest kHeldOutFrames frames whose number is above `after` and at most `last`, the
 /// newest one first.
 FixedVector<const LoggedFrame*, kHeldOutFrames> newest_frames(
-    const TrackLog& log, std::uint64_t after, std::uint64_t last = kNoLimit) noexcept {
+    const TrackLog& log, std::uint64_t after, std::uint64_t last = ~std::uint64_t{0}) noexcept {
   FixedVector<const LoggedFrame*, kHeldOutFrames> frames;
   for (std::size_t i = log.size(); i-- > 0 && !frames.full() && log.frame(i).number > after;)
     if (log.frame(i).number <= last) (void)frames.push(&log.frame(i));
@@ -96,10 +93,6 @@ double current_percent(const RigCalibration& current, int k, double depth,
   // A rotation by σ is a disparity of f σ, and so a relative depth error of z σ / b.
   return own > 0 ? std::hypot(own, 1e-3 * o.extrinsic_random_walk_mrad_per_sqrt_h * by_turn)
                  : kSuppliedYaw * by_turn;
-}
-
-double angle_between(const Vec3& a, const Vec3& b) noexcept {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 }  // namespace

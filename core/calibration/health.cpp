@@ -45,10 +45,7 @@ double rms_percent(const RigCalibration& rig, std::size_t k, double depth_m,
   int seen = 0;
   for (int row = 0; row < kDepthGrid; ++row) {
     for (int column = 0; column < kDepthGrid; ++column) {
-      CovisiblePoint p;
-      p.left = &left;
-      p.right = &right;
-      p.depth_m = depth_m;
+      CovisiblePoint p{.left = &left, .right = &right, .depth_m = depth_m};
       p.pixel = {(column + 0.5) / kDepthGrid * rig.intrinsics[0].width,
                  (row + 0.5) / kDepthGrid * rig.intrinsics[0].height};
       if (!left.unproject(p.pixel, &p.ray)) continue;

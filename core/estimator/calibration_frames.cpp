@@ -63,6 +63,7 @@ void CalibrationFrames::add(odometry::Odometry& odometry, const odometry::FrameO
 void CalibrationFrames::begin_segment(std::uint64_t number) noexcept {
   log_.drop_before(number);
   solved_frames_ = 0;
+  frames_still_ = 0;
   logged_ = log_.size();
   required_ = min_frames();
 }

@@ -26,7 +26,6 @@ class CalibrationFrames {
            const RigFrame& frame) noexcept;
   /// Returns true if no frame was logged for so long that the rig must be standing still.
   [[nodiscard]] bool standing() const noexcept { return frames_still_ > options_.min_frames; }
-  void restart_standing() noexcept { frames_still_ = 0; }
 
   /// Begins another segment with the logged frames from `number` on; drops older ones.
   void begin_segment(std::uint64_t number = 0) noexcept;

@@ -424,12 +424,11 @@ struct Estimator::Parts {
   /// Handles frames in which left and right hardly match: a verified calibration indicates a large
   /// knock, an unverified one was wrong from the start.
   void give_up_calibration(double frames) noexcept {
+    const bool knocked = calibrator.verified();
     const CalibrationCause cause =
-        calibrator.verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
-    if (cause == CalibrationCause::collapse)
-      record(Kind::rig_changed, message(cause), frames);
-    else
-      record(Kind::calibration_contradicted, message(cause));
+        knocked ? CalibrationCause::collapse : CalibrationCause::contradicted;
+    record(knocked ? Kind::rig_changed : Kind::calibration_contradicted, message(cause),
+           knocked ? frames : 0);
     start_estimation(cause, last_number);
     // The previous extrinsics are not a starting point: on repetitive structure, matches near them
     // are chance.

@@ -109,7 +109,6 @@ void OnlineCalibrator::start_estimation(std::optional<CalibrationCause> cause, s
   gate_ = Gate::open;
   discard_solve();
   frames_.begin_segment(onset);
-  frames_.restart_standing();
   monitor_.begin_unlinked(rig_);
 }
 

@@ -52,6 +52,12 @@ inline constexpr double kChi2OfPixel = 9.21;
   return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
 }
 
+/// Weight of a squared residual by Tukey's biweight; 0 beyond `limit`.
+[[nodiscard]] inline double tukey(double squared, double limit) noexcept {
+  const double u = 1.0 - squared / (limit * limit);
+  return u > 0 ? u * u : 0.0;
+}
+
 /// Upper median; reorders the values. Precondition: not empty.
 template <class T>
 [[nodiscard]] T median(std::span<T> values) noexcept {

@@ -13,11 +13,6 @@ namespace {
 // for Gaussian errors at kTukey.
 constexpr double kTukeySpread = 1.46;
 
-double tukey(double squared, double limit) noexcept {
-  const double u = 1.0 - squared / (limit * limit);
-  return u > 0 ? u * u : 0.0;
-}
-
 }  // namespace
 
 void MonitorResiduals::reset() noexcept {
