@@ -1,7 +1,6 @@
 #include "app/checkerboard/board_detector.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <memory>
 
@@ -28,7 +27,7 @@ constexpr double kFlatToSide = 0.2;
 struct Tag {
   std::size_t id = 0;
   // The corners are counter-clockwise on the calibration target.
-  std::array<cv::Point2f, 4> corners;
+  std::array<cv::Point2f, 4> corners{};
 };
 
 template <auto Destroy>
@@ -81,8 +80,7 @@ class TagDetector {
       apriltag_detection_t* d = nullptr;
       zarray_get(&found, i, &d);
       if (d->family != family || d->id < 0 || static_cast<std::size_t>(d->id) >= ids) continue;
-      Tag tag;
-      tag.id = static_cast<std::size_t>(d->id);
+      Tag tag{.id = static_cast<std::size_t>(d->id)};
       for (std::size_t k = 0; k < 4; ++k)
         tag.corners[k] = {static_cast<float>(d->p[k][0]), static_cast<float>(d->p[k][1])};
       tags.push_back(tag);

@@ -3,7 +3,6 @@
 #include <limits>
 #include <numeric>
 
-#include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 
 #include "app/config/calibration_checks.hpp"
@@ -182,9 +181,9 @@ class BoardCalibrator {
     }
     if (at.size() < (start != nullptr ? 2 : kMinViews))
       throw InputError(
-          fmt::format("camera {} sees the target in only {} consistent views; at least {} are "
-                      "needed, 15 good ones are enough",
-                      camera, at.size(), kMinViews));
+          "camera {} sees the target in only {} consistent views; at least {} are needed, 15 good "
+          "ones are enough",
+          camera, at.size(), kMinViews);
     Lens& lens = s->lenses[camera];
     std::vector<cv::Mat> rvecs, tvecs;
     std::vector<double> errors(at.size());
@@ -226,10 +225,9 @@ class BoardCalibrator {
     for (const double part : {0.3, 0.45, 0.65, 1.0, 1.5}) {
       if (start != nullptr && std::isfinite(best)) break;
       const double focal = part * size.width;
-      Lens next;
-      next.K = (cv::Mat_<double>(3, 3) << focal, 0, 0.5 * (size.width - 1), 0, focal,
-                0.5 * (size.height - 1), 0, 0, 1);
-      next.D = cv::Mat::zeros(4, 1, CV_64F);
+      Lens next{.K = (cv::Mat_<double>(3, 3) << focal, 0, 0.5 * (size.width - 1), 0, focal,
+                      0.5 * (size.height - 1), 0, 0, 1),
+                .D = cv::Mat::zeros(4, 1, CV_64F)};
       if (start != nullptr) next = start->clone();
       std::vector<cv::Mat> turns, places;
       try {
@@ -279,9 +277,9 @@ class BoardCalibrator {
     }
     if (at.size() < kMinViews)
       throw InputError(
-          fmt::format("cameras 0 and {} see the target together in only {} consistent views; at "
-                      "least {} are needed",
-                      camera, at.size(), kMinViews));
+          "cameras 0 and {} see the target together in only {} consistent views; at least {} are "
+          "needed",
+          camera, at.size(), kMinViews);
     const bool refine = radtan() && !hold_lenses && camera == 1;
     Lens &first = s->lenses[0], &second = s->lenses[camera];
     cv::Mat none[2], R, T, E, F, by_view;

@@ -6,8 +6,6 @@
 #include <map>
 #include <set>
 
-#include <fmt/format.h>
-
 #include "app/checkerboard/board_detector.hpp"
 #include "app/runtime/errors.hpp"
 
@@ -51,9 +49,9 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns,
     ::globfree(&found);
     if (status != 0)
       throw InputError(
-          fmt::format("{} \"{}\": no file matches; check the path, and put a pattern in quotes: {} "
-                      "\"left*.png\"",
-                      option, pattern.substr(0, 200), option));
+          "{} \"{}\": no file matches; check the path, and put a pattern in quotes: {} "
+          "\"left*.png\"",
+          option, pattern.substr(0, 200), option);
   }
   std::vector<fs::path> sorted(files.begin(), files.end());
   std::ranges::sort(sorted, [](const fs::path& a, const fs::path& b) {
@@ -95,9 +93,9 @@ std::vector<std::vector<fs::path>> group_views(std::vector<std::vector<fs::path>
     std::vector<std::size_t> counts;
     for (const auto& files : cameras) counts.push_back(files.size());
     throw InputError(
-        fmt::format("the cameras have {} images, and the numbers in their names do not show which "
-                    "belong together; give the images of a view the same number",
-                    fmt::join(counts, ", ")));
+        "the cameras have {} images, and the numbers in their names do not show which belong "
+        "together; give the images of a view the same number",
+        fmt::join(counts, ", "));
   }
   for (const fs::path& file : alone)
     remarks->push_back(fmt::format(
@@ -114,8 +112,7 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
   std::vector<std::uint8_t> grey;
   ImageSize own;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    BoardView view;
-    view.name = views[v][0].filename().string();
+    BoardView view{.name = views[v][0].filename().string()};
     std::vector<std::string> without;
     for (std::size_t k = 0; k < cameras; ++k) {
       const fs::path& file = views[v][k];
@@ -127,9 +124,9 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
       if (size.width == 0) size = own;
       if (own != size)
         throw InputError(
-            fmt::format("{}: has {} x {} pixels, the images before it {} x {}; use images of one "
-                        "size per camera",
-                        file.string(), own.width, own.height, size.width, size.height));
+            "{}: has {} x {} pixels, the images before it {} x {}; use images of one size per "
+            "camera",
+            file.string(), own.width, own.height, size.width, size.height);
       const ImageView pixels{grey.data(), size.width, size.height, size.width};
       view.corners[k] = find_board(pixels, board, BoardSearch::thorough, view.corners[0]);
       if (view.corners[k].empty())

@@ -27,11 +27,9 @@ BoardPattern parse_size(BoardKind kind, const char* option, const char* parts,
                         std::string_view text, int least, int most, const char* example) {
   const auto sides = parse_product(text);
   if (!sides || std::ranges::min(*sides) < least || std::ranges::max(*sides) > most)
-    throw InputError(
-        fmt::format("{} is \"{}\"; write the {}, columns x rows, {} to {} each, like {}", option,
-                    text.substr(0, 60), parts, least, most, example));
-  BoardPattern board;
-  board.kind = kind;
+    throw InputError("{} is \"{}\"; write the {}, columns x rows, {} to {} each, like {}", option,
+                     text.substr(0, 60), parts, least, most, example);
+  BoardPattern board{.kind = kind};
   board.columns = static_cast<int>((*sides)[0]), board.rows = static_cast<int>((*sides)[1]);
   return board;
 }
@@ -49,16 +47,14 @@ std::size_t parse_dictionary(const std::string& text) {
   if (name.starts_with(kPrefix)) name.erase(0, kPrefix.size());
   for (std::size_t i = 0; i < kMarkerDictionaries.size(); ++i)
     if (upper(kMarkerDictionaries[i]) == name) return i;
-  throw InputError(
-      fmt::format("--dictionary is \"{}\"; use {}", text.substr(0, 60),
-                  fmt::join(kMarkerDictionaries.begin(), kMarkerDictionaries.end(), ", ")));
+  throw InputError("--dictionary is \"{}\"; use {}", text.substr(0, 60),
+                   fmt::join(kMarkerDictionaries.begin(), kMarkerDictionaries.end(), ", "));
 }
 
 void check_side(double square) {
   if (!(square >= kSmallestSquare && square <= kLargest))
-    throw InputError(
-        fmt::format("--square is {}; it must be the side of a square in metres, {} to {}", square,
-                    kSmallestSquare, kLargest));
+    throw InputError("--square is {}; it must be the side of a square in metres, {} to {}", square,
+                     kSmallestSquare, kLargest);
 }
 
 }  // namespace
@@ -100,9 +96,9 @@ BoardPattern parse_checkerboard(const std::string& inner_corners, double square)
                                   inner_corners, kMin, kMax, "9x6");
   if (board.columns == board.rows)
     throw InputError(
-        fmt::format("--checkerboard {}: a square board looks the same after a rotation by 90°; use "
-                    "one with different numbers of columns and rows",
-                    inner_corners));
+        "--checkerboard {}: a square board looks the same after a rotation by 90°; use one with "
+        "different numbers of columns and rows",
+        inner_corners);
   check_side(square);
   board.square = square;
   return board;
@@ -114,9 +110,9 @@ BoardPattern parse_aprilgrid(const std::string& tags, double side, double spacin
   check_side(side);
   if (!(spacing >= kNarrowest && spacing <= kWidest))
     throw InputError(
-        fmt::format("--spacing is {}; it must be the gap between two tags divided by the tag size, "
-                    "{} to {} (0.3 on Kalibr's sheets)",
-                    spacing, kNarrowest, kWidest));
+        "--spacing is {}; it must be the gap between two tags divided by the tag size, {} to {} "
+        "(0.3 on Kalibr's sheets)",
+        spacing, kNarrowest, kWidest);
   board.square = side;
   board.spacing = spacing;
   return board;
@@ -128,9 +124,9 @@ BoardPattern parse_charuco(const std::string& squares, double square, double mar
       parse_size(BoardKind::charuco, "--charuco", "squares", squares, kMin, kMax, "11x8");
   check_side(square);
   if (!(marker >= kSmallestMarker * square && marker <= kLargestMarker * square))
-    throw InputError(fmt::format(
+    throw InputError(
         "--marker is {}; it must be the side of a marker in metres, {} to {} with this --square",
-        marker, kSmallestMarker * square, kLargestMarker * square));
+        marker, kSmallestMarker * square, kLargestMarker * square);
   // The pattern counts inner corners, not squares.
   --board.columns, --board.rows;
   board.square = square;

@@ -17,7 +17,6 @@
 #include "app/runtime/signals.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
-#include "drivers/acquisition/acquisition.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -222,9 +221,9 @@ BoardCalibration calibrate_with_k3(const std::vector<BoardView>& views,
     const Intrinsics& lens = with.rig.intrinsics[k];
     if (!(std::abs(lens.distortion[4]) > kSigmas * lens.distortion_sigma[4])) return without;
   }
-  progress->print(fmt::format(
+  progress->print(
       "vergence: k3 is also estimated: the residuals are {:.3f} px with it and {:.3f} px without",
-      with.rig.reprojection_px, without.rig.reprojection_px));
+      with.rig.reprojection_px, without.rig.reprojection_px);
   return with;
 }
 
@@ -263,9 +262,9 @@ class Collection {
   void report(const DeviceEvent& event) {
     const bool disconnected = event.kind == DeviceEvent::Kind::camera_disconnected;
     if (disconnected || event.kind == DeviceEvent::Kind::camera_reconnected)
-      progress_->print(fmt::format(
+      progress_->print(
           "vergence: camera {} {}", event.camera,
-          disconnected ? "is disconnected; check its cable. Waiting for it" : "is reconnected"));
+          disconnected ? "is disconnected; check its cable. Waiting for it" : "is reconnected");
   }
 
   void offer(const RigFrame& frame) {
@@ -295,7 +294,7 @@ class Collection {
         write_png(*request_.keep_views / fmt::format("{}_{:03}.png", names_[k], number),
                   frame.images[k]);
       } catch (const InputError& e) {
-        progress_->print(fmt::format("vergence: {}; the view is used nevertheless", e.what()));
+        progress_->print("vergence: {}; the view is used nevertheless", e.what());
       }
     }
   }
@@ -318,9 +317,9 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const std::vector
   // Squares of real boards have between 2 mm and half a metre.
   if (const double square = options.board.square; square < 0.002 || square > 0.5)
     progress->print(
-        fmt::format("vergence: --square is {:g} m, unusually {}; check that it is in metres, "
-                    "because the baseline scales with it",
-                    square, square < 0.002 ? "small" : "large"));
+        "vergence: --square is {:g} m, unusually {}; check that it is in metres, because the "
+        "baseline scales with it",
+        square, square < 0.002 ? "small" : "large");
   const BoardCalibration found =
       calibrate_with_k3(views, options, calibrate_boards(views, options), progress);
   const std::string why = found.error.empty() ? undetermined(found) : found.error;
@@ -344,11 +343,10 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const std::vector
     if (const std::string warning = baseline_warning(file.rig); !warning.empty())
       progress->print("vergence: " + warning);
   }
-  progress->print(fmt::format("{}: written{}", request.out.string(),
-                              file.rig.cameras == 1
-                                  ? "; it has one camera: copy its intrinsics into a configuration "
-                                    "or into a calibration.yaml of the rig"
-                                  : ""));
+  progress->print("{}: written{}", request.out.string(),
+                  file.rig.cameras == 1 ? "; it has one camera: copy its intrinsics into a "
+                                          "configuration or into a calibration.yaml of the rig"
+                                        : "");
   return ExitCode::done;
 }
 
@@ -363,12 +361,10 @@ ExitCode calibrate_images(const CalibrateRequest& request,
   const auto views = group_views(files, &remarks);
   BoardImages images =
       read_board_images(views, request.calibration.board, [&](std::size_t done, std::size_t found) {
-        ProgressState state;
-        state.state = "calibrate";
-        state.frame = done;
-        state.frames = views.size();
-        state.activity = fmt::format("{} with the target", found);
-        progress.update(state);
+        progress.update({.state = "calibrate",
+                         .frame = done,
+                         .frames = views.size(),
+                         .activity = fmt::format("{} with the target", found)});
       });
   progress.finish();
   for (const std::string& message : remarks) progress.print("vergence: " + message);
@@ -379,11 +375,11 @@ ExitCode calibrate_images(const CalibrateRequest& request,
                                    "visible, and --dictionary must match them"};
   // One message per view would hide the message that helps.
   if (images.views.empty())
-    throw InputError(fmt::format(
-        "no view shows the target with {}{}; {} ({})", request.calibration.board.describe(),
-        patterns.size() > 1 ? " in two cameras" : "",
-        kHowToCount.at(static_cast<std::size_t>(request.calibration.board.kind)),
-        images.remarks.empty() ? "there are no images" : images.remarks.front()));
+    throw InputError("no view shows the target with {}{}; {} ({})",
+                     request.calibration.board.describe(),
+                     patterns.size() > 1 ? " in two cameras" : "",
+                     kHowToCount.at(static_cast<std::size_t>(request.calibration.board.kind)),
+                     images.remarks.empty() ? "there are no images" : images.remarks.front());
   for (const std::string& message : images.remarks) progress.print("vergence: " + message);
   return conclude_calibration(request, images.sizes, {}, images.views, &progress);
 }
@@ -403,8 +399,7 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   DriveDevices devices(c, {}, false, std::nullopt);
   Progress progress = Progress::on_stderr(request.quiet);
   for (const std::string& message : devices.remarks()) progress.print("vergence: " + message);
-  CalibrationFile file;
-  file.rig_name = c.rig.name;
+  CalibrationFile file{.rig_name = c.rig.name};
   std::vector<ImageSize> sizes;
   for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
     const CameraSettings& camera = c.cameras[k];
@@ -429,13 +424,12 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   progress.finish();
   const auto stopped = signals.stop_code();
   for (const int camera : source.missing())
-    progress.print(
-        fmt::format("vergence: camera {} did not reconnect; check its cable and power", camera));
+    progress.print("vergence: camera {} did not reconnect; check its cable and power", camera);
   if (collection.views().size() < kMinViews) {
     progress.print(
-        fmt::format("vergence: no calibration: {} views of the target were taken, at least {} are "
-                    "needed; check that it is {}, complete and well lit in every image",
-                    collection.views().size(), kMinViews, board.describe()));
+        "vergence: no calibration: {} views of the target were taken, at least {} are needed; "
+        "check that it is {}, complete and well lit in every image",
+        collection.views().size(), kMinViews, board.describe());
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
                                                      : ExitCode::device_failed);
   }

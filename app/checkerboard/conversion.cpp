@@ -1,15 +1,13 @@
 #include "app/checkerboard/conversion.hpp"
 
-#include <algorithm>
 #include <limits>
-
-#include <fmt/format.h>
 
 #include "app/checkerboard/board_pattern.hpp"
 #include "app/config/calibration_checks.hpp"
 #include "app/recording/messages.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/transform_rows.hpp"
 
 namespace vergence::app {
 namespace {
@@ -49,9 +47,9 @@ void check_pair(const CalibrationFile& calibration, const char* format, Remarks*
                                   std::pair("size", l.width == r.width && l.height == r.height)})
     if (!same)
       throw InputError(
-          fmt::format("cameras.1.{0} differs from that of camera 0, but {1} has one {0} for both; "
-                      "choose another format",
-                      key, format));
+          "cameras.1.{0} differs from that of camera 0, but {1} has one {0} for both; choose "
+          "another format",
+          key, format);
   if (rig.cameras > 2)
     remarks->push_back(fmt::format("{} holds two cameras; {} of {} are left out", format,
                                    rig.cameras - 2, rig.cameras));
@@ -109,7 +107,7 @@ WrittenFiles format_calibration_as(CalibrationFormat format, const std::string& 
   const bool two = comma != std::string::npos;
   const std::string first = out.substr(0, comma), second = two ? out.substr(comma + 1) : "";
   if (two && (format == CalibrationFormat::vergence || format == CalibrationFormat::kalibr))
-    throw InputError(fmt::format("{}: {} is one file; name one file", out, describe(format)));
+    throw InputError("{}: {} is one file; name one file", out, describe(format));
   if (format == CalibrationFormat::vergence) return {{out, format_calibration(calibration)}};
   if (format == CalibrationFormat::kalibr) return {{out, format_kalibr(calibration, remarks)}};
   const bool ros = format == CalibrationFormat::ros;
@@ -152,16 +150,15 @@ std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks) 
     const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
     if (radtan && lens.distortion[4] != 0)
       throw InputError(
-          fmt::format("cameras.{}.distortion has k3 = {}; Kalibr's radtan has four coefficients, "
-                      "calibrate without --k3",
-                      k, lens.distortion[4]));
+          "cameras.{}.distortion has k3 = {}; Kalibr's radtan has four coefficients, calibrate "
+          "without --k3",
+          k, lens.distortion[4]);
     text += fmt::format("cam{}:\n", k);
     if (k > 0) {
-      const Transform T = rig.T_camera_left[k] * rig.T_camera_left[k - 1].inverse();
+      const auto rows = rows_of(rig.T_camera_left[k] * rig.T_camera_left[k - 1].inverse());
       text += "  T_cn_cnm1:\n";
-      for (int row = 0; row < 3; ++row)
-        text += "  - " + number_list(std::array{T.R(row, 0), T.R(row, 1), T.R(row, 2), T.t(row)}) +
-                "\n";
+      for (std::size_t row = 0; row < 3; ++row)
+        text += "  - " + number_list(std::span(rows).subspan(4 * row, 4)) + "\n";
       text += "  - [0.0, 0.0, 0.0, 1.0]\n";
     }
     std::vector<int> others;

@@ -2,8 +2,6 @@
 // words; users do not call it by name.
 #include <iostream>
 
-#include <fmt/format.h>
-
 #include "app/checkerboard/calibrate_session.hpp"
 #include "app/checkerboard/conversion.hpp"
 #include "app/command_line/calibrate_options.hpp"
@@ -51,8 +49,8 @@ ExitCode calibrate_target(const CalibrateOptions& a) {
   if (!a.right.empty()) patterns.push_back(a.right);
   for (const std::string& pattern : a.more_cameras) patterns.push_back({pattern});
   if (patterns.size() > kMaxCameras)
-    throw InputError(fmt::format("{} cameras are given, and a rig has at most {}; remove some",
-                                 kMaxCameras, patterns.size()));
+    throw InputError("{} cameras are given, and a rig has at most {}; remove some", patterns.size(),
+                     kMaxCameras);
   return calibrate_images(make_request(a), patterns);
 }
 

@@ -6,7 +6,6 @@
 #include <cstring>
 #include <iostream>
 
-#include <fmt/format.h>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
@@ -25,17 +24,17 @@ ExitCode run_checkerboard_tool(const ProgramArguments& arguments) {
   const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
   const auto tool = find_checkerboard_tool(folder);
   if (!tool)
-    throw InputError(fmt::format(
+    throw InputError(
         "calibrate: this needs {0}, which is not installed (looked beside the program in {1}, and "
         "in {2}); install the package {0}, or build it: scripts/setup",
-        kCheckerboardTool, folder.string(), (folder.parent_path() / "libexec/vergence").string()));
+        kCheckerboardTool, folder.string(), (folder.parent_path() / "libexec/vergence").string());
   std::vector<char*> argv;
   // execv() only reads its arguments.
   for (const char* word : arguments) argv.push_back(const_cast<char*>(word));
   argv.push_back(nullptr);
   std::cout.flush();
   ::execv(tool->c_str(), argv.data());
-  throw InputError(fmt::format("{}: cannot be started: {}", tool->string(), std::strerror(errno)));
+  throw InputError("{}: cannot be started: {}", tool->string(), std::strerror(errno));
 }
 
 namespace {

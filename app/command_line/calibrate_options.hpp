@@ -1,15 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include <CLI/App.hpp>
-
 #include "app/command_line/common_options.hpp"
 #include "app/command_line/program.hpp"
-#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 

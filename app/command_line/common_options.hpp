@@ -1,9 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include <CLI/App.hpp>
 

@@ -2,13 +2,9 @@
 
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <iostream>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/terminal_text.hpp"

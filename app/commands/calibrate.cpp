@@ -1,8 +1,6 @@
-#include <optional>
 
 #include "app/command_line/calibrate_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/datasets/stereo_sequence.hpp"
 #include "app/session/drive_calibration.hpp"
 
 namespace vergence::app {
@@ -10,10 +8,9 @@ namespace {
 
 ExitCode calibrate_sequence(const CalibrateOptions& a) {
   check_writable(a.out, a.force);
-  ReplayRequest r;
-  r.data = a.data;
-  r.format = sequence_format(a.format, a.data);
-  r.topics = {a.left_topic, a.right_topic, "", ""};
+  ReplayRequest r{.data = a.data,
+                  .format = sequence_format(a.format, a.data),
+                  .topics = {a.left_topic, a.right_topic, "", ""}};
   check_topics(r.format, r.topics);
   r.calibration = a.calibration;
   r.baseline = a.baseline;

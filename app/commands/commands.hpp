@@ -1,8 +1,5 @@
 #pragma once
-#include <CLI/App.hpp>
-
 #include "app/command_line/program.hpp"
-#include "app/runtime/errors.hpp"
 
 /// Commands of the program. Each function declares its options on `root`. If its command was given,
 /// the subcommand's callback runs it and sets *exit_code; the callback may throw InputError.

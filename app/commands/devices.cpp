@@ -1,12 +1,8 @@
-#include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <optional>
-#include <string>
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/config/configuration.hpp"
 #include "app/devices/inventory_report.hpp"
 
 namespace vergence::app {

@@ -1,12 +1,8 @@
 #include <algorithm>
 #include <iostream>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/config/configuration.hpp"
 #include "app/devices/inventory_report.hpp"
 #include "app/devices/rig_settings.hpp"
 

@@ -1,9 +1,3 @@
-#include <algorithm>
-#include <array>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
@@ -76,11 +70,11 @@ std::optional<QuaternionOrder> parse_order(std::string_view word) {
 }
 
 EvaluationOptions make_options(const EvaluateArguments& a) {
-  EvaluationOptions options;
-  options.association = a.associate == "nearest" ? Association::nearest : Association::interpolate;
-  options.max_gap = Duration::seconds(a.max_gap);
-  options.max_difference = Duration::seconds(a.max_difference);
-  options.axes = a.axes == "flu" ? BodyAxes::forward_left_up : BodyAxes::camera;
+  EvaluationOptions options{
+      .association = a.associate == "nearest" ? Association::nearest : Association::interpolate,
+      .max_gap = Duration::seconds(a.max_gap),
+      .max_difference = Duration::seconds(a.max_difference),
+      .axes = a.axes == "flu" ? BodyAxes::forward_left_up : BodyAxes::camera};
   if (a.lengths)
     options.segments = {{parse_lengths(*a.lengths), a.step.value_or(10), false}};
   else

@@ -1,29 +1,19 @@
 #include "app/commands/evaluation.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cassert>
 #include <cmath>
 #include <iostream>
 #include <iterator>
-#include <limits>
-#include <span>
 #include <system_error>
-#include <vector>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/session/ins_comparison.hpp"
-#include "app/session/ins_file.hpp"
-#include "core/comparison/comparison.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/comparison/mount.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/robust.hpp"
-#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
@@ -264,24 +254,17 @@ std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& o
 std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOptions& options,
                                Duration interval) {
   std::string holes = gap_remark(e, options, interval);
-  switch (e.status) {
-    case EvaluationStatus::no_match:
-      if (!holes.empty()) return holes;
-      return fmt::format(
-          "no pose of the estimate has a reference at its time ({}); check that both files use the "
-          "same clock and time unit (--time-unit)",
-          left_out(e, options));
-    case EvaluationStatus::too_few:
-      return fmt::format("only {} poses matched, an alignment needs three ({}){}{}", e.matched,
-                         left_out(e, options), holes.empty() ? "" : "; ", holes);
-    case EvaluationStatus::no_motion:
-      return "one of the two trajectories does not move, so they cannot be aligned; use a part "
-             "with motion";
-    case EvaluationStatus::ok:
-      break;
-  }
-  assert(false);
-  return {};
+  if (e.status == EvaluationStatus::no_motion)
+    return "one of the two trajectories does not move, so they cannot be aligned; use a part with "
+           "motion";
+  if (e.status == EvaluationStatus::too_few)
+    return fmt::format("only {} poses matched, an alignment needs three ({}){}{}", e.matched,
+                       left_out(e, options), holes.empty() ? "" : "; ", holes);
+  if (!holes.empty()) return holes;
+  return fmt::format(
+      "no pose of the estimate has a reference at its time ({}); check that both files use the "
+      "same clock and time unit (--time-unit)",
+      left_out(e, options));
 }
 
 InsMount load_ins_mount(const std::filesystem::path& estimate,
@@ -302,19 +285,14 @@ std::string ins_mount_text(const InsMount& mount) {
 }
 
 const char* mount_problem(MountStatus status) {
-  switch (status) {
-    case MountStatus::too_few:
-      return "fewer than 20 stamps in common; use a longer sequence, or check that both have the "
-             "same clock";
-    case MountStatus::no_motion:
-      return "nothing moved: INS extrinsics can only be estimated in motion";
-    case MountStatus::not_converged:
-      return "no fit: check that both trajectories are of the same run, that their clocks differ "
-             "by less than 0.3 s and their attitudes by less than 15°";
-    case MountStatus::ok:
-      break;
-  }
-  return "";
+  constexpr std::array kProblems{
+      "ok",
+      "fewer than 20 stamps in common; use a longer sequence, or check that both have the same "
+      "clock",
+      "nothing moved: INS extrinsics can only be estimated in motion",
+      "no fit: check that both trajectories are of the same run, that their clocks differ by less "
+      "than 0.3 s and their attitudes by less than 15°"};
+  return kProblems.at(static_cast<std::size_t>(status));
 }
 
 std::vector<MountReference> ins_moments(std::span<const InsRecord> readings) {
@@ -342,9 +320,7 @@ std::vector<MountReference> ins_moments(std::span<const InsRecord> readings) {
 }
 
 FoundMount find_ins_mount(const Trajectory& estimate, std::span<const MountReference> moments) {
-  FoundMount found;
-  found.of_ins = true;
-  found.nominal = mount_of(Vec3::Zero(), Vec3::Zero()).R;
+  FoundMount found{.nominal = mount_of(Vec3::Zero(), Vec3::Zero()).R, .of_ins = true};
   found.status = estimate_ins_extrinsics(estimate, moments, found.nominal, {}, &found.mount);
   return found;
 }
@@ -359,8 +335,7 @@ FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference) {
   double least = 1e9;
   for (const Mat3& nominal :
        {Mat3(Mat3::Identity()), R_flu_camera, Mat3(R_flu_camera.transpose())}) {
-    FoundMount found;
-    found.nominal = nominal;
+    FoundMount found{.nominal = nominal};
     found.status = estimate_ins_extrinsics(estimate, readings, nominal, {}, &found.mount);
     if (found.status != MountStatus::ok) {
       if (best.status != MountStatus::ok) best.status = found.status;
@@ -377,7 +352,7 @@ FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference) {
 
 Json mount_json(const FoundMount& found) {
   Json out;
-  out["status"] = found.status == MountStatus::ok ? "ok" : mount_problem(found.status);
+  out["status"] = mount_problem(found.status);
   if (found.status != MountStatus::ok) return out;
   const Mount& m = found.mount;
   constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
@@ -512,14 +487,14 @@ class Evaluation {
     const std::string help = "put the sequence's times.txt next to it";
     if (is_ins_) throw InputError(a_.estimate.string() + ": has no times; " + help);
     if (e.rows != r.rows)
-      throw InputError(fmt::format(
+      throw InputError(
           "{}: has {} poses and {} has {}: {}, so poses are matched row by row and both files need "
           "the same number of rows; {}",
           a_.estimate.string(), e.rows, path_.string(), r.rows,
           e.timed   ? "the reference has no times"
           : r.timed ? "the estimate has no times"
                     : "neither has times",
-          help));
+          help);
     warn(std::string(e.timed == r.timed ? "neither file has times"
                                         : "one of the files has no times") +
          ": poses are matched row by row");
@@ -584,10 +559,8 @@ class Evaluation {
     return fmt::format(
         "positions agree, but rotations differ by {:.0f}° (median); check the order of the "
         "quaternions (--quaternion {}, for the reference --quaternion ,{}), that rotations are "
-        "from "
-        "body to world, and the axes of both bodies (--estimate-ins-extrinsics estimates a "
-        "constant "
-        "rotation)",
+        "from body to world, and the axes of both bodies (--estimate-ins-extrinsics estimates a "
+        "constant rotation)",
         e.rotation_se3.median * kDegreesPerRadian, other(estimate_), other(reference_));
   }
   void print(const TrajectoryEvaluation& evaluation) const {

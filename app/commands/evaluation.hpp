@@ -1,8 +1,4 @@
 #pragma once
-#include <array>
-#include <filesystem>
-#include <optional>
-
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/comparison/trajectory_metrics.hpp"

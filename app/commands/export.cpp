@@ -1,13 +1,7 @@
-#include <array>
-#include <optional>
-#include <string>
-#include <utility>
 
-#include <fmt/format.h>
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/session_export.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/progress.hpp"
@@ -47,21 +41,18 @@ ExitCode run_export(const ExportArguments& a) {
   (void)check_session_folder(request.out);
   Progress progress = Progress::on_stderr(a.quiet);
   const ExportResult result = export_session(session, std::move(request), [&](std::size_t done) {
-    ProgressState state;
-    state.state = "export";
-    state.frame = done;
-    state.frames = session.frames().size();
-    state.activity = "PNG images";
-    progress.update(state);
+    progress.update({.state = "export",
+                     .frame = done,
+                     .frames = session.frames().size(),
+                     .activity = "PNG images"});
   });
   progress.finish();
   for (const std::string& message : result.remarks) progress.print("vergence: " + message);
   if (result.left_out > 0)
-    progress.print(
-        fmt::format("vergence: {} frames without both images were left out", result.left_out));
+    progress.print("vergence: {} frames without both images were left out", result.left_out);
   if (!a.quiet)
-    progress.print(fmt::format("{}: {} frames; next: vergence replay {} --format {} --out DIR",
-                               a.out, result.frames, a.out, a.format));
+    progress.print("{}: {} frames; next: vergence replay {} --format {} --out DIR", a.out,
+                   result.frames, a.out, a.format);
   return ExitCode::done;
 }
 

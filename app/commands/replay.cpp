@@ -1,11 +1,6 @@
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <string>
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/datasets/stereo_sequence.hpp"
 #include "app/publish/publish.hpp"
 #include "app/session/replay_session.hpp"
 
@@ -63,10 +58,10 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   add_option(*command, "DATA", a->request.data, "Data-set directory, or a .mcap, .db3 or .bag file",
              "DIR|FILE")
       ->required();
-  add_option(*command, "--format", a->format,
-             "Format of DATA: auto, folder, kitti, kitti-raw, euroc, st-lucia, mcap, db3, "
-             "rosbag, session",
-             "NAME", "Input")
+  add_option(
+      *command, "--format", a->format,
+      "Format of DATA: auto, folder, kitti, kitti-raw, euroc, st-lucia, mcap, db3, rosbag, session",
+      "NAME", "Input")
       ->capture_default_str();
   add_option(*command, "--out", a->request.session.out,
              "Session directory; must not exist, or be empty", "DIR", "Output")

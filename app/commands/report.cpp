@@ -1,5 +1,4 @@
 #include <iostream>
-#include <string>
 
 #include "app/commands/commands.hpp"
 #include "app/report/report.hpp"

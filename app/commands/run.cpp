@@ -1,6 +1,3 @@
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"

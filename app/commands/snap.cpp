@@ -1,4 +1,3 @@
-#include <string>
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
@@ -40,8 +39,8 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
       ->allow_extra_args(false);
   command->footer(
       "Example: vergence snap app/config/gige.yaml --out first\n"
-      "Exit codes: 0 success; 1 an image is unusable (black, overexposed, identical); "
-      "2 bad arguments;\n3 a camera is missing or sent nothing.");
+      "Exit codes: 0 success; 1 an image is unusable (black, overexposed, identical); 2 bad "
+      "arguments;\n3 a camera is missing or sent nothing.");
   command->callback([a, exit_code] { *exit_code = capture_images(complete(a.get())); });
 }
 

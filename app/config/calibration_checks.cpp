@@ -77,27 +77,26 @@ Finding check_intrinsics(const Intrinsics& k, const std::string& camera) {
   const double side = std::max(k.width, k.height);
   for (const double f : {k.fx, k.fy})
     if (f < kShortestFocal * side || f > kLongestFocal * side)
-      return finding(
-          intrinsics,
-          "has the focal length {} px; an image of {} x {} needs a positive one of {:g} to "
-          "{:g} px (the order is fx, fy, cx, cy)",
-          f, k.width, k.height, kShortestFocal * side, kLongestFocal * side);
+      return finding(intrinsics,
+                     "has the focal length {} px; an image of {} x {} needs a positive one of {:g} "
+                     "to {:g} px (the order is fx, fy, cx, cy)",
+                     f, k.width, k.height, kShortestFocal * side, kLongestFocal * side);
   if (std::max(k.fx, k.fy) > kLargestAspect * std::min(k.fx, k.fy))
     return finding(intrinsics,
                    "has focal lengths as different as {} and {} (the order is fx, fy, cx, cy)",
                    k.fx, k.fy);
   if (k.cx < 0 || k.cy < 0 || k.cx > k.width - 1 || k.cy > k.height - 1)
     return finding(intrinsics,
-                   "has its principal point ({}, {}) outside the image of "
-                   "{} x {} (the order is fx, fy, cx, cy)",
+                   "has its principal point ({}, {}) outside the image of {} x {} (the order is "
+                   "fx, fy, cx, cy)",
                    k.cx, k.cy, k.width, k.height);
   if (!all_finite(k.distortion))
     return finding(camera + "distortion", "holds a number that is not finite");
   const double shift = corner_distortion(k);
   if (!(shift <= kLargestDistortion))
     return finding(camera + "distortion",
-                   "would move a corner of the image by {:.3g} of its distance from the centre; "
-                   "up to {} is expected (radtan: k1, k2, p1, p2[, k3]; equidistant: k1 to k4)",
+                   "would move a corner of the image by {:.3g} of its distance from the centre; up "
+                   "to {} is expected (radtan: k1, k2, p1, p2[, k3]; equidistant: k1 to k4)",
                    shift, kLargestDistortion);
   if (auto bad = check_sigmas(k.sigma, camera + "intrinsics_sigma")) return bad;
   return check_sigmas(k.distortion_sigma, camera + "distortion_sigma");
@@ -126,8 +125,8 @@ Finding check_transform(Transform* T, const std::string& field) {
   const double length = T->t.norm();
   if (length < kShortestBaseline || length > kLongestBaseline)
     return finding(field,
-                   "puts the camera {:g} m from the left one; {} to {} m are "
-                   "expected (the translation is in metres)",
+                   "puts the camera {:g} m from the left one; {} to {} m are expected (the "
+                   "translation is in metres)",
                    length, kShortestBaseline, kLongestBaseline);
   return std::nullopt;
 }
@@ -140,17 +139,17 @@ Finding check_baseline(const RigCalibration& rig) {
   if (auto bad = check_sigmas(std::array{rig.baseline_sigma}, "rig.baseline_sigma")) return bad;
   const double tolerance = kBaselineTolerance * t.norm() + 4.0 * rig.baseline_sigma;
   if (rig.baseline > 0 && std::abs(rig.baseline - t.norm()) > tolerance)
-    return finding("rig.baseline",
-                   "is {:g} m, but cameras.1.T_camera_left has a "
-                   "translation of {:g} m; correct one of them",
-                   rig.baseline, t.norm());
+    return finding(
+        "rig.baseline",
+        "is {:g} m, but cameras.1.T_camera_left has a translation of {:g} m; correct one of them",
+        rig.baseline, t.norm());
   // Where camera 1 is, in the axes of camera 0: t has those of camera 1, which may be mounted
   // upside down.
   const Vec3 centre = -(rig.T_camera_left[1].R.transpose() * t);
   if (centre.x() < -0.5 * centre.norm())
     return finding("cameras.1.T_camera_left",
-                   "puts camera 1 {:g} m to the left of camera 0: left and right are "
-                   "swapped, or the transform is given as its inverse (X_camera = R "
+                   "puts camera 1 {:g} m to the left of camera 0: left and right are swapped, or "
+                   "the transform is given as its inverse (X_camera = R "
                    "X_left + t, so a parallel camera on the right has t1 < 0)",
                    -centre.x());
   return std::nullopt;

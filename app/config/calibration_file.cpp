@@ -1,6 +1,5 @@
 #include "app/config/calibration_file.hpp"
 
-#include <array>
 #include <limits>
 
 #include <yaml-cpp/yaml.h>
@@ -9,6 +8,7 @@
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/transform_rows.hpp"
 
 namespace vergence::app {
 namespace {
@@ -103,8 +103,8 @@ void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationF
   for (std::size_t i = 0; i < n; ++i) {
     if (!(*next > 0))
       file.fail(group["upper"],
-                "covariance.upper has {:g} as the variance of {}; it "
-                "must be positive (upper triangle, row by row)",
+                "covariance.upper has {:g} as the variance of {}; it must be positive (upper "
+                "triangle, row by row)",
                 *next, rows[i].name);
     for (std::size_t j = i; j < n; ++j)
       calibration->rig.covariance.set(rows[i].row, rows[j].row, *next++);
@@ -221,8 +221,8 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
   for (const char* inverse : {"T_left_camera", "T_left_right"})
     if (node.IsMap() && node[inverse])
       file.fail(node[inverse],
-                "cameras.{}.{} is the inverse of T_camera_left; invert it to [R^T, "
-                "-R^T t], so that X_camera = R X_left + t",
+                "cameras.{}.{} is the inverse of T_camera_left; invert it to [R^T, -R^T t], so "
+                "that X_camera = R X_left + t",
                 k, inverse);
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
@@ -233,9 +233,7 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
   if (!camera.has("T_camera_left"))
     file.fail(node, camera.field("T_camera_left") +
                         " is missing; add it, or use --from-scratch to estimate it");
-  const auto T = camera.numbers("T_camera_left", 12, 12);
-  rig.T_camera_left[k].R << T[0], T[1], T[2], T[4], T[5], T[6], T[8], T[9], T[10];
-  rig.T_camera_left[k].t << T[3], T[7], T[11];
+  rig.T_camera_left[k] = transform_of(camera.numbers("T_camera_left", 12, 12));
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_total", &rig.sigma_total[k]);
   std::array<double, kTriangle> upper{};
@@ -352,12 +350,8 @@ std::string format_camera(const CalibrationFile& calibration, std::size_t k) {
 }
 
 std::string format_extrinsics(const RigCalibration& rig, std::size_t k) {
-  const Transform& T = rig.T_camera_left[k];
-  std::vector<double> numbers;
-  for (int row = 0; row < 3; ++row)
-    numbers.insert(numbers.end(), {T.R(row, 0), T.R(row, 1), T.R(row, 2), T.t(row)});
-  std::string text =
-      "    T_camera_left: " + list(numbers) + "  # X_camera = R X_left + t, rows of [R t], m\n";
+  std::string text = "    T_camera_left: " + list(rows_of(rig.T_camera_left[k])) +
+                     "  # X_camera = R X_left + t, rows of [R t], m\n";
   if (any(rig.sigma_noise[k]))
     text += "    sigma_noise: " + list(rig.sigma_noise[k]) + "  # rad, m\n";
   if (any(rig.sigma_total[k])) text += "    sigma_total: " + list(rig.sigma_total[k]) + "\n";

@@ -7,8 +7,6 @@
 #include <cstdlib>
 #include <system_error>
 
-#include <fmt/format.h>
-
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 

@@ -1,17 +1,14 @@
-#include "app/config/configuration.hpp"
 
 #include <yaml-cpp/yaml.h>
 
-#include <charconv>
-#include <map>
 #include <set>
 #include <sstream>
-#include <utility>
 
 #include "app/config/schema.hpp"
 #include "app/config/yaml_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/text_input.hpp"
 
 namespace vergence::app {
 
@@ -143,17 +140,15 @@ std::string suggestion(const std::string& name) {
 template <class Number>
 Number parse_number(const Entry& entry, const Key& key, const char* kind) {
   Number value{};
-  const char* end = entry.value.data() + entry.value.size();
-  const auto [stop, error] = std::from_chars(entry.value.data(), end, value);
-  const bool parsed = error == std::errc() && stop == end;
+  const bool parsed = parse_whole(entry.value, &value);
   // Written so that a NaN is refused.
   if (parsed && static_cast<double>(value) >= key.least && static_cast<double>(value) <= key.most)
     return value;
   const std::string range = range_text(key), text(entry.value.substr(0, 60));
-  throw InputError(fmt::format("{}: {} is {}; it must be {}{}{}", entry.origin, key.name,
-                               parsed ? text : fmt::format("\"{}\", not {}", text, kind),
-                               range.starts_with("from ") ? range + " on" : "in " + range,
-                               key.unit.empty() ? "" : " ", key.unit));
+  throw InputError("{}: {} is {}; it must be {}{}{}", entry.origin, key.name,
+                   parsed ? text : fmt::format("\"{}\", not {}", text, kind),
+                   range.starts_with("from ") ? range + " on" : "in " + range,
+                   key.unit.empty() ? "" : " ", key.unit);
 }
 
 /// Maps YAML 1.1 booleans to the keywords on and off.
@@ -188,13 +183,13 @@ void apply(const Entry& entry, Configuration* configuration) {
   const bool unset = value.empty() && to_text(key->get(Configuration{})).empty();
   if (!key->words.empty() && !unset && std::ranges::find(key->words, value) == key->words.end()) {
     const std::string why = new_name(Renamed::Kind::value, key->name + " " + value);
-    throw InputError(fmt::format("{}: {} is \"{}\"; it must be one of {}{}", entry.origin,
-                                 key->name, value.substr(0, 60), range_text(*key),
-                                 why.empty() ? did_you_mean(value, key->words) : why));
+    throw InputError("{}: {} is \"{}\"; it must be one of {}{}", entry.origin, key->name,
+                     value.substr(0, 60), range_text(*key),
+                     why.empty() ? did_you_mean(value, key->words) : why);
   }
   if (key->words.empty() && static_cast<double>(value.size()) > key->most)
-    throw InputError(fmt::format("{}: {} is longer than the limit of {} bytes; shorten it",
-                                 entry.origin, key->name, key->most));
+    throw InputError("{}: {} is longer than the limit of {} bytes; shorten it", entry.origin,
+                     key->name, key->most);
   try {
     key->set(*configuration, value);
   } catch (const InputError& e) {
@@ -354,19 +349,18 @@ void set_camera_options(const std::string& text, CameraSettings* camera) {
     const std::string name = word.substr(0, equals),
                       value = word.substr(std::min(equals + 1, word.size()));
     if (name.empty() || value.empty())
-      throw InputError(fmt::format(
+      throw InputError(
           "\"{}\" is not an option; write NAME=VALUE, as in packet_size=9000, or a group "
           "{{packet_size: 9000}}",
-          word.substr(0, kShown)));
+          word.substr(0, kShown));
     if (set_option(name, value, &camera->options)) continue;
     if (const OptionRow* row = find_option(camera->options, name))
-      throw InputError(fmt::format("{} is \"{}\"; it takes {}", name.substr(0, kShown),
-                                   value.substr(0, kShown), row->values));
+      throw InputError("{} is \"{}\"; it takes {}", name.substr(0, kShown), value.substr(0, kShown),
+                       row->values);
     std::vector<std::string> names;
     for (const OptionRow& row : option_rows(camera->options)) names.push_back(row.name);
-    throw InputError(fmt::format("there is no option \"{}\"; {} cameras have {}{}",
-                                 name.substr(0, kShown), camera->driver, fmt::join(names, ", "),
-                                 did_you_mean(name, names)));
+    throw InputError("there is no option \"{}\"; {} cameras have {}{}", name.substr(0, kShown),
+                     camera->driver, fmt::join(names, ", "), did_you_mean(name, names));
   }
 }
 

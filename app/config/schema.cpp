@@ -5,13 +5,10 @@
 #include <cstddef>
 #include <iterator>
 #include <limits>
-#include <sstream>
 #include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
-
-#include "app/runtime/realtime.hpp"
 
 namespace vergence::app {
 
@@ -378,8 +375,8 @@ Group comparison() {
 Group odometry() {
   using O = OdometryOptions;
   Rows rows("odometry",
-            "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one "
-            "at a time.",
+            "Motion estimation. The defaults suit road vehicles and hand-held rigs; change one at "
+            "a time.",
             &Configuration::odometry);
   rows.integer("features", &O::features, 50, 1000, "points", "Points tracked in each image.")
       .choice("init_features", &O::init_features, {"corners", "surf"},
@@ -550,9 +547,7 @@ Group mock() {
 }
 
 Group faults() {
-  Group group;
-  group.name = "faults";
-  group.list = "faults.";
+  Group group{.name = "faults", .list = "faults."};
   group.meaning =
       "Faults of the simulated rig, a list; docs/simulated_rig.md has the kinds and their "
       "parameters.";
@@ -603,6 +598,14 @@ std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
   return {};
 }
 
+/// The items of a list have the same keys: item 0 stands for all, as N.
+std::string documented_name(const Group& group, const Key& key) {
+  if (group.list.empty()) return key.name;
+  const std::string first = group.list + "0";
+  return key.name.starts_with(first) ? group.list + "N" + key.name.substr(first.size())
+                                     : std::string();
+}
+
 }  // namespace
 
 std::string find_contradiction(const Configuration& c) {
@@ -644,18 +647,6 @@ std::string range_text(const Key& key) {
   return fmt::format("{} … {}", static_cast<std::int64_t>(key.least),
                      static_cast<std::int64_t>(key.most));
 }
-
-namespace {
-
-/// The items of a list have the same keys: item 0 stands for all, as N.
-std::string documented_name(const Group& group, const Key& key) {
-  if (group.list.empty()) return key.name;
-  const std::string first = group.list + "0";
-  return key.name.starts_with(first) ? group.list + "N" + key.name.substr(first.size())
-                                     : std::string();
-}
-
-}  // namespace
 
 std::string configuration_tables() {
   std::string page;

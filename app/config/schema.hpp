@@ -31,8 +31,8 @@ struct Key {
 /// Group of keys (the name before the first dot), or the keys without a group (empty name).
 struct Group {
   std::string name;
-  std::string meaning;
-  std::vector<Key> keys;
+  std::string meaning{};
+  std::vector<Key> keys{};
   /// Prefix such as `cameras.` if keys continue with an item's number, which the documentation
   /// shows as N for item 0. Empty if it is no list.
   std::string list{};

@@ -2,47 +2,18 @@
 
 #include <array>
 #include <cctype>
-#include <cerrno>
-#include <charconv>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <sstream>
-#include <system_error>
 
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/text_input.hpp"
 
 namespace vergence::app {
 namespace {
-
-std::string contents(const std::filesystem::path& path) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path, ignored);
-  // Reading a pipe would block indefinitely.
-  const char* why = !std::filesystem::exists(status)        ? "no such file; check the path"
-                    : std::filesystem::is_directory(status) ? "is a directory; name a YAML file"
-                    : !std::filesystem::is_regular_file(status)
-                        ? "is a pipe or a device; name a YAML file"
-                        : nullptr;
-  if (why != nullptr) throw InputError(path.string() + ": " + why);
-  std::string text(kLargestYaml + 1, '\0');
-  errno = 0;
-  std::ifstream in(path, std::ios::binary);
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  // A file that is not open is not at its end.
-  if (!in && !in.eof())
-    throw InputError(path.string() + ": cannot be read; check its permissions and its disk: " +
-                     std::strerror(errno));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kLargestYaml)
-    throw InputError(fmt::format("{}: is larger than {} bytes; check that it is the right file",
-                                 path.string(), kLargestYaml));
-  return text;
-}
 
 /// A scalar as it may stand in a message.
 std::string shown(const std::string& scalar) {
@@ -87,16 +58,8 @@ void check_documents(const std::string& text, const std::string& name) {
   const DocumentCounter documents(text);
   if (documents.count < 2) return;
   if (documents.start[0].pos == documents.start[1].pos)
-    throw InputError(
-        fmt::format("{}:{}: is not YAML: a value is expected", name, documents.start[0].line + 1));
+    throw InputError("{}:{}: is not YAML: a value is expected", name, documents.start[0].line + 1);
   throw InputError(name + ": holds several YAML documents; remove the lines `---` between them");
-}
-
-template <class Number>
-bool parse_whole(const std::string& text, Number* value) {
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, *value);
-  return error == std::errc() && stop == end;
 }
 
 /// ` is "VALUE"`, as a part of a message.
@@ -146,7 +109,7 @@ std::string explain(const YAML::Exception& error, const std::string& text) {
 }  // namespace
 
 YamlFile YamlFile::read(const std::filesystem::path& path) {
-  return parse(contents(path), path.string());
+  return parse(read_bytes(path, kLargestYaml), path.string());
 }
 
 YamlFile YamlFile::parse(std::string_view text, std::string name) {

@@ -342,11 +342,8 @@ StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bo
            "has one topic selected for left and right images; choose two with --left-topic and "
            "--right-topic: {}",
            chosen[0]);
-  StereoSequence sequence;
-  sequence.root = path;
-  sequence.times = path;
-  sequence.remarks = std::move(bag.remarks);
-  sequence.ins = std::move(ins);
+  StereoSequence sequence{
+      .root = path, .times = path, .remarks = std::move(bag.remarks), .ins = std::move(ins)};
   for (const std::string& name : chosen) {
     const ImageTopic& topic = bag.images[name];
     const std::size_t omitted = topic.unreadable + topic.other_size + topic.backwards;

@@ -1,21 +1,19 @@
 #include "app/datasets/foreign_calibration.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
-#include <map>
 #include <sstream>
 #include <tuple>
 
 #include <yaml-cpp/yaml.h>
 
 #include "app/config/calibration_checks.hpp"
-#include "app/config/yaml_file.hpp"
 #include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/transform_rows.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -220,8 +218,7 @@ class Walk {
     }
     std::vector<std::string> tokens = split_key(key);
     if (tokens.empty()) return;
-    Fact fact;
-    fact.file = &file_;
+    Fact fact{.file = &file_};
     fact.node.reset(node);
     fact.key = path;
     Side side;
@@ -475,9 +472,7 @@ Transform to_transform(const Fact& fact) {
   if (v.size() != 12 && v.size() != 16) fail(fact, " is not a matrix of 4 x 4 numbers");
   if (v.size() == 16 && (v[12] != 0 || v[13] != 0 || v[14] != 0 || v[15] != 1))
     fail(fact, " does not end with the row 0 0 0 1");
-  Transform T;
-  T.R << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
-  T.t << v[3], v[7], v[11];
+  Transform T = transform_of(v);
   // find_implausible() refuses other matrices.
   if (accept_rotation(T.R)) T.R = normalised(T.R);
   return T;

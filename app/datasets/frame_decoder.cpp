@@ -101,9 +101,7 @@ void FrameDecoder::work() {
 DecodedPair FrameDecoder::decode(std::size_t index) {
   const auto start = Clock::now();
   const StereoPair& listed = sequence_.pairs[index];
-  DecodedPair pair;
-  pair.frame = index;
-  pair.stamp = listed.stamp;
+  DecodedPair pair{.frame = index, .stamp = listed.stamp};
   const bool late = newest_ && listed.stamp <= *newest_;
   if (late || !listed.in_order) {
     set_issue(

@@ -50,8 +50,6 @@ class FrameDecoder {
   FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count,
                FramePool& pool);
   ~FrameDecoder();
-  FrameDecoder(const FrameDecoder&) = delete;
-  FrameDecoder& operator=(const FrameDecoder&) = delete;
 
   /// Waits for the next frame. Returns false, with *pair unchanged, at the end of the sequence or
   /// if stopped.

@@ -1,8 +1,6 @@
-#include "app/datasets/image_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 

@@ -272,8 +272,7 @@ std::optional<fs::path> list_in(const fs::path& folder, const char* name_of_euro
 
 /// Searches next to the image directories, in them, and in between.
 Lists find_lists(const fs::path& root, const Cameras& cameras) {
-  Lists lists;
-  lists.shared = list_in(root);
+  Lists lists{.shared = list_in(root)};
   for (std::size_t k = 0; k < 2; ++k) {
     const fs::path folder = root / cameras[k].below;
     lists.own[k] = list_in(folder, "data.csv");
@@ -532,9 +531,7 @@ bool holds_stereo_images(const fs::path& root) { return find_cameras(root).has_v
 
 // NOLINTNEXTLINE(misc-no-recursion): a folder deeper each time
 StereoSequence open_folder(const fs::path& folder, bool given, const CalibrationUse& use) {
-  StereoSequence sequence;
-  sequence.root = folder;
-  sequence.side_by_side = present(folder / "both");
+  StereoSequence sequence{.root = folder, .side_by_side = present(folder / "both")};
   Cameras cameras;
   if (sequence.side_by_side)
     for (Camera& camera : cameras) camera.below = "both";
@@ -566,8 +563,7 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
 }
 
 StereoSequence open_euroc(const fs::path& folder, bool given, const CalibrationUse& use) {
-  StereoSequence sequence;
-  sequence.root = fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
+  StereoSequence sequence{.root = fs::is_directory(folder / "mav0") ? folder / "mav0" : folder};
   for (const char* camera : {"cam0", "cam1"})
     require_folder(sequence.root / camera, "data.csv, sensor.yaml and data/ of that camera");
   Cameras cameras = cameras_in(sequence.root, {"cam0/data", "cam1/data"});
@@ -579,8 +575,7 @@ StereoSequence open_euroc(const fs::path& folder, bool given, const CalibrationU
 }
 
 StereoSequence open_kitti(const fs::path& folder, bool given) {
-  StereoSequence sequence;
-  sequence.root = folder;
+  StereoSequence sequence{.root = folder};
   const bool colour = !present(folder / "image_0") && present(folder / "image_2");
   if (colour)
     sequence.assumptions.emplace_back(
@@ -611,8 +606,7 @@ StereoSequence open_kitti_raw(const fs::path& folder, bool given,
            "kitti_raw.left and kitti_raw.right are both camera {}; choose two different cameras",
            numbers[0]);
   const KittiRawFolders folders = find_kitti_raw(folder);
-  StereoSequence sequence;
-  sequence.root = folders.drive;
+  StereoSequence sequence{.root = folders.drive};
   std::array<std::string, 2> below;
   Lists lists;
   for (std::size_t k = 0; k < 2; ++k) {

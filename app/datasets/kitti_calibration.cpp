@@ -139,8 +139,7 @@ RigCalibration read_kitti_projections(const std::filesystem::path& file,
                                       const std::array<int, 2>& cameras,
                                       const std::optional<ImageSize>& size) {
   const Text text(file, ", or pass a calibration with --calibration");
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   std::array<Vec3, 2> t;
   for (std::size_t k = 0; k < 2; ++k) {
     const std::string raw = key("P_rect", cameras[k]), own = key("S_rect", cameras[k]);

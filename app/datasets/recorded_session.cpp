@@ -1,10 +1,6 @@
 #include "app/datasets/recorded_session.hpp"
 
-#include <algorithm>
-#include <map>
-
 #include "app/datasets/detail/names.hpp"
-#include "app/datasets/detail/ros_messages.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/version.hpp"

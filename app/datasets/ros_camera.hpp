@@ -3,7 +3,6 @@
 #include <string>
 
 #include "app/datasets/image_file.hpp"
-#include "core/math/types.hpp"
 #include "core/types/calibration.hpp"
 
 /// Interpretation of sensor_msgs/CameraInfo from a file or a message.

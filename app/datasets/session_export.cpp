@@ -1,6 +1,5 @@
 #include "app/datasets/session_export.hpp"
 
-#include <array>
 #include <cmath>
 #include <system_error>
 
@@ -9,6 +8,7 @@
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/transform_rows.hpp"
 
 namespace vergence::app {
 namespace {
@@ -21,26 +21,18 @@ void make_folder(const fs::path& folder) {
   if (error) throw InputError(folder.string() + ": cannot be created (" + error.message() + ")");
 }
 
-std::string rows(const Transform& T) {
-  std::string out;
-  for (int r = 0; r < 3; ++r)
-    out += fmt::format("{}{} {} {} {}", r == 0 ? "" : " ", T.R(r, 0), T.R(r, 1), T.R(r, 2), T.t(r));
-  return out;
-}
-
 std::string sensor_yaml(const RigCalibration& rig, std::size_t k) {
   const Intrinsics& lens = rig.intrinsics[k];
   const auto& d = lens.distortion;
   const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
-  std::string matrix = rows(rig.T_camera_left[k].inverse());
-  std::ranges::replace(matrix, ' ', ',');
   return fmt::format(
       "sensor_type: camera\ncomment: {} camera; the body is the left camera\nT_BS:\n  cols: 4\n"
       "  rows: 4\n  data: [{},0,0,0,1]\nresolution: [{}, {}]\ncamera_model: pinhole\n"
       "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}, {}, {}, "
       "{}{}]\n",
-      k == 0 ? "left" : "right", matrix, lens.width, lens.height, lens.fx, lens.fy, lens.cx,
-      lens.cy, radtan ? "radial-tangential" : "equidistant", d[0], d[1], d[2], d[3],
+      k == 0 ? "left" : "right", fmt::join(rows_of(rig.T_camera_left[k].inverse()), ","),
+      lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy,
+      radtan ? "radial-tangential" : "equidistant", d[0], d[1], d[2], d[3],
       radtan && d[4] != 0 ? fmt::format(", {}", d[4]) : "");
 }
 
@@ -141,7 +133,7 @@ class Writer {
     for (const StampedPose& pose : truth_) {
       const Eigen::Quaterniond q = quaternion(pose.T_world_body.R);
       const Vec3& t = pose.T_world_body.t;
-      kitti += rows(pose.T_world_body) + "\n";
+      kitti += fmt::format("{}\n", fmt::join(rows_of(pose.T_world_body), " "));
       euroc += fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", pose.stamp.ns(),
                            t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
     }
@@ -173,8 +165,7 @@ bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
 
 ExportResult export_session(const RecordedSession& session, ExportRequest request,
                             const std::function<void(std::size_t)>& progress) {
-  ExportResult result;
-  result.remarks = session.remarks();
+  ExportResult result{.remarks = session.remarks()};
   const auto& frames = session.frames();
   const auto first = std::ranges::find_if(frames, [](const RecordedFrame& f) {
     return f.images[0].offset != 0 && f.images[1].offset != 0;
@@ -187,10 +178,10 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
     const RecordedImage& image = first->images[k];
     const Intrinsics& lens = request.calibration.rig.intrinsics[k];
     if (image.width != lens.width || image.height != lens.height)
-      throw InputError(fmt::format(
+      throw InputError(
           "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; use the "
           "calibration that belongs to these images",
-          k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
+          k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height);
   }
   if (first->given.cameras > 2)
     result.remarks.push_back(fmt::format(

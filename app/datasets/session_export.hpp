@@ -1,7 +1,4 @@
 #pragma once
-#include <functional>
-
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/trajectory_files.hpp"
 

@@ -8,7 +8,6 @@
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/times_file.hpp"
 #include "core/comparison/geodesy.hpp"
-#include "core/math/so3.hpp"
 
 namespace vergence::app::detail {
 namespace {
@@ -32,8 +31,7 @@ constexpr std::string_view kImageLog = "_MultiCamera0.log";
 /// Calibration published with the data set, in m: X_right = R X_left + t. Its cameras have no
 /// distortion.
 RigCalibration published_calibration() {
-  RigCalibration rig;
-  rig.cameras = 2;
+  RigCalibration rig{.cameras = 2};
   Intrinsics &left = rig.intrinsics[0], &right = rig.intrinsics[1];
   left.width = right.width = 1024, left.height = right.height = 768;
   left.fx = 1246.561673900704, left.fy = 1247.092336797580, left.cx = 532.287936343425,
@@ -240,8 +238,7 @@ void decide_angles(const std::vector<Moving>& fast, Conventions* c) {
 }
 
 Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* remarks) {
-  Conventions c;
-  c.enu_of_velocity = to_matrix(kAxes[0]);
+  Conventions c{.enu_of_velocity = to_matrix(kAxes[0])};
   const std::vector<Moving> moving = motions(lines);
   std::vector<Moving> fast;
   for (const Moving& m : moving)
@@ -269,10 +266,7 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
 }
 
 InsSample to_sample(const Line& line, const Conventions& c, std::uint64_t number) {
-  InsSample s;
-  s.number = number;
-  s.stamp = line.stamp;
-  s.fix = FixStatus::fix_3d;
+  InsSample s{.number = number, .stamp = line.stamp, .fix = FixStatus::fix_3d};
   s.attitude_valid = s.velocity_valid = true;
   s.position = line.place;
   const Vec3 v = c.enu_of_velocity * line.velocity;
@@ -293,9 +287,7 @@ StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
   const std::filesystem::path& log = *found;
   const std::string images = log.stem().string();
   require_folder(folder / images, "the images that its log names");
-  StereoSequence sequence;
-  sequence.root = folder;
-  sequence.bayer = true;
+  StereoSequence sequence{.root = folder, .bayer = true};
   const std::string text = read_text(log);
   Lines lines(text);
   for (std::string_view line; lines.next(&line);)
@@ -323,8 +315,7 @@ RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
   const Conventions conventions = decide(lines, &ins.remarks);
   ins.readings.reserve(lines.size());
   for (const Line& line : lines) {
-    InsRecord reading;
-    reading.sample = to_sample(line, conventions, ins.readings.size());
+    InsRecord reading{.sample = to_sample(line, conventions, ins.readings.size())};
     // The log has no other quality data.
     reading.quality.filter_valid = true;
     ins.readings.push_back(reading);

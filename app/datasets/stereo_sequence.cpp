@@ -1,4 +1,3 @@
-#include "app/datasets/stereo_sequence.hpp"
 
 #include <new>
 #include <system_error>
@@ -335,8 +334,8 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
   if (const auto at = std::ranges::find(words, word); at != words.end())
     return static_cast<SequenceFormat>(at - words.begin());
   if (word != "auto")
-    throw InputError(fmt::format("--format \"{}\": unknown format; use auto, {}{}", word,
-                                 fmt::join(words, ", "), did_you_mean(word, words)));
+    throw InputError("--format \"{}\": unknown format; use auto, {}{}", word,
+                     fmt::join(words, ", "), did_you_mean(word, words));
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored)) {
     if (const auto bag = bag_format(folder)) return *bag;

@@ -57,12 +57,12 @@ struct StereoPair {
 /// calibration  Two cameras, from the data set's files unless one was supplied.
 struct StereoSequence {
   std::filesystem::path root;
-  std::vector<StereoPair> pairs;
-  RigCalibration calibration;
+  std::vector<StereoPair> pairs{};
+  RigCalibration calibration{};
   /// Name of the file, for calibrations.csv.
-  std::string calibration_source;
+  std::string calibration_source{};
   /// File of the stamps, for messages.
-  std::filesystem::path times;
+  std::filesystem::path times{};
   /// Number of frames not in `pairs`: without stamp or partner, or out of order.
   std::size_t left_out = 0;
   /// Messages about skipped or doubtful data.

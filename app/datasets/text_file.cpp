@@ -1,18 +1,12 @@
 #include "app/datasets/text_file.hpp"
 
-#include <cerrno>
-#include <charconv>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <iterator>
 #include <limits>
-#include <system_error>
 
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/times_file.hpp"
-#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 namespace {
@@ -39,12 +33,6 @@ constexpr int kMaxExponent = 100;
 // Longer text is not a number.
 constexpr std::size_t kMaxText = 64;
 
-template <class Integer>
-bool parse_whole(std::string_view text, Integer* value) noexcept {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc{} && end == text.data() + text.size() && !text.empty();
-}
-
 /// Returns a comment without its marker; nullopt if the line is none.
 std::size_t comment_mark(std::string_view line) noexcept {
   if (line.starts_with('#') || line.starts_with('%')) return 1;
@@ -65,42 +53,11 @@ bool begins_row(std::string_view field) {
 
 }  // namespace
 
-void refuse(const std::filesystem::path& file, std::size_t line, std::string_view what) {
-  std::string message = file.string();
-  if (line > 0) message += ":" + std::to_string(line);
-  message += ": ";
-  message += what;
-  throw InputError(message);
-}
-
 std::string read_text(const std::filesystem::path& file, std::size_t limit) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(file, ignored);
-  if (std::filesystem::is_directory(status)) refuse(file, 0, "is a directory; name a file");
-  // Reading a pipe would block indefinitely.
-  if (std::filesystem::is_other(status))
-    refuse(file, 0, "is a pipe or a device; name a regular file");
-  std::ifstream in(file, std::ios::binary);
-  if (!in) {
-    const int e = errno;
-    refuse(file, 0,
-           std::string("cannot be opened (") + std::strerror(e) +
-               "); check the path and its permissions");
-  }
-  std::string text;
-  std::array<char, 1U << 16U> block;
-  // Reserving avoids the doubling of a growing string.
-  if (const auto size = std::filesystem::file_size(file, ignored); !ignored && size <= limit)
-    text.reserve(size);
-  while (in.read(block.data(), block.size()) || in.gcount() > 0) {
-    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
-    if (text.size() > limit)
-      refuse(file, 0,
-             "is longer than " + std::to_string(limit) + " bytes; check that it is the right file");
-  }
-  if (in.bad()) refuse(file, 0, "could not be read to its end; check the disk");
+  std::string text = read_bytes(file, limit);
   const bool min_first = text.starts_with("\xFF\xFE");
-  return min_first || text.starts_with("\xFE\xFF") ? narrowed(text, min_first) : text;
+  if (min_first || text.starts_with("\xFE\xFF")) return narrowed(text, min_first);
+  return text;
 }
 
 Lines::Lines(std::string_view text, Comments comments) noexcept : rest_(text), comments_(comments) {
@@ -152,8 +109,7 @@ std::size_t split(std::string_view line, char separator,
 bool parse_number(std::string_view field, double* value) noexcept {
   if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
   double v = 0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), v);
-  if (error != std::errc{} || end != field.data() + field.size() || !std::isfinite(v)) return false;
+  if (!parse_whole(field, &v) || !std::isfinite(v)) return false;
   *value = v;
   return true;
 }
@@ -181,7 +137,7 @@ std::optional<std::int64_t> parse_decimal(std::string_view text, int decimals) n
   const bool up = whole >= 0 && kept < digits.size() && digits[kept] >= '5';
   digits.resize(kept, '0');
   std::int64_t value = 0;
-  if (kept > 0 && !parse_whole(std::string_view(digits), &value)) return std::nullopt;
+  if (kept > 0 && !parse_whole(digits, &value)) return std::nullopt;
   if (up && value < std::numeric_limits<std::int64_t>::max()) ++value;
   return negative ? -value : value;
 }

@@ -1,31 +1,15 @@
 #pragma once
-#include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <span>
-#include <string>
-#include <string_view>
-#include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include "app/runtime/text_input.hpp"
 
 /// External text: lines, tables and numbers, with errors as file:line, and numbers as text.
 namespace vergence::app {
 
-/// Throws InputError "FILE:LINE: WHAT"; without the line if `line` is 0.
-[[noreturn]] void refuse(const std::filesystem::path& file, std::size_t line,
-                         std::string_view what);
-/// Same with a formatted message.
-template <class First, class... Rest>
-[[noreturn]] void refuse(const std::filesystem::path& file, std::size_t line,
-                         fmt::format_string<First, Rest...> what, First&& first, Rest&&... rest) {
-  refuse(file, line, fmt::format(what, std::forward<First>(first), std::forward<Rest>(rest)...));
-}
-
-/// Reads all bytes of a file; UTF-16, detected by its byte order mark, is converted to ASCII.
-/// Throws InputError if it is missing, a directory, unreadable or longer than `limit` bytes.
+/// read_bytes() of a text; UTF-16, detected by its byte order mark, is converted to ASCII.
 [[nodiscard]] std::string read_text(const std::filesystem::path& file,
                                     std::size_t limit = std::size_t{1} << 30U);
 

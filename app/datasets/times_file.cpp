@@ -236,8 +236,7 @@ std::optional<Stamp> parse_iso_time(std::string_view text) noexcept {
 
 TimeForm find_time_form(std::span<const std::string_view> times, std::optional<TimeUnit> given,
                         TimeUnit relative) {
-  TimeForm form;
-  form.unit = given.value_or(relative);
+  TimeForm form{.unit = given.value_or(relative)};
   if (times.empty()) return form;
   if (parse_iso_time(times.front())) {
     form.iso = form.absolute = true;

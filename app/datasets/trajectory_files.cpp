@@ -6,6 +6,7 @@
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/runtime/transform_rows.hpp"
 #include "core/math/robust.hpp"
 
 namespace vergence::app {
@@ -103,8 +104,7 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
   if (!stamp || nanoseconds) stamp = seconds ? seconds : stamp;
   if (!stamp || !std::ranges::all_of(pose, [](const auto& column) { return column.has_value(); }))
     return std::nullopt;
-  Columns c;
-  c.time = TimeColumns{.time = *stamp};
+  Columns c{.time = TimeColumns{.time = *stamp}};
   if (seconds == stamp) c.time->nanoseconds = nanoseconds;
   std::ranges::transform(pose, c.pose.begin(), [](const auto& column) { return *column; });
   // This is their order in `pose`.
@@ -126,20 +126,13 @@ double off_rotation(const Mat3& R) {
   return R.determinant() > 0 ? (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() : 1.0;
 }
 
-template <std::size_t N>
-Mat3 to_rotation(const std::array<double, N>& v) {
-  Mat3 R;
-  R << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
-  return R;
-}
-
 bool is_matrix(const std::vector<std::string_view>& fields, std::size_t first, Layout layout) {
   std::array<double, 16> v{};
   v[15] = 1;
   // The tolerance only detects a matrix; inaccurate rows are refused one by one.
   constexpr double kRoughly = 0.1;
   return finite_numbers(fields, first, std::span(v).first(static_cast<std::size_t>(layout))) &&
-         off_rotation(to_rotation(v)) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
+         off_rotation(transform_of(v).R) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
          v[15] == 1;
 }
 
@@ -280,7 +273,6 @@ class Reader {
   }
 
   void find_order() {
-    out_.order_reported = columns_.order || options_.quaternion || columns_.layout != Layout::pose;
     out_.order = columns_.order.value_or(QuaternionOrder::xyzw);
     if (!columns_.order && columns_.layout == Layout::pose) {
       // EuRoC and VINS write w first, with commas and whole nanoseconds.
@@ -370,15 +362,15 @@ class Reader {
       *T = {q.normalized().toRotationMatrix(), {v[0], v[1], v[2]}};
       return true;
     }
-    const Mat3 written = to_rotation(v);
-    const double off = off_rotation(written);
+    *T = transform_of(v);
+    const double off = off_rotation(T->R);
     if (!(off <= kNearRotation))
       refuse(file_, line,
              "the matrix is not a rotation: it is a reflection, or its rows deviate from "
              "orthonormal by more than {:g}; check the order of the columns",
              kNearRotation);
     roughest_ = std::max(roughest_, off);
-    *T = {normalised(written), {v[3], v[7], v[11]}};
+    T->R = normalised(T->R);
     return true;
   }
 
@@ -524,17 +516,6 @@ TrajectoryFile read_trajectory_file(const fs::path& path, const TrajectoryOption
            "has no trajectory.tum, no poses.txt (KITTI) and no "
            "mav0/state_groundtruth_estimate0/data.csv with cam0/sensor.yaml (EuRoC)");
   return read_file(*truth, options);
-}
-
-Trajectory in_other_order(Trajectory poses, QuaternionOrder read) {
-  for (StampedPose& pose : poses) {
-    const Eigen::Quaterniond q(pose.T_world_body.R);
-    const Eigen::Quaterniond other = read == QuaternionOrder::xyzw
-                                         ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w())
-                                         : Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
-    pose.T_world_body.R = other.normalized().toRotationMatrix();
-  }
-  return poses;
 }
 
 }  // namespace vergence::app

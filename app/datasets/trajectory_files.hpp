@@ -41,8 +41,6 @@ struct TrajectoryFile {
   bool numbered = false;
   /// False if the file has no times; rows are then 0.1 s apart, from 0.
   bool timed = true;
-  /// Headings, a matrix or the user define how rotations are written.
-  bool order_reported = false;
   // Order that was read.
   QuaternionOrder order = QuaternionOrder::xyzw;
 };
@@ -62,8 +60,5 @@ struct TrajectoryFile {
 /// (sequences/NN with poses/NN.txt above). EuRoC: data.csv in the directory with mav0, or in mav0.
 /// Empty without ground truth.
 [[nodiscard]] std::optional<std::filesystem::path> find_truth(const std::filesystem::path& folder);
-
-/// Rotations as if their quaternions had been written in the other order than they were read in.
-[[nodiscard]] Trajectory in_other_order(Trajectory poses, QuaternionOrder read);
 
 }  // namespace vergence::app

@@ -1,10 +1,6 @@
 #include "app/devices/camera_drivers.hpp"
 
 #include <algorithm>
-#include <map>
-#include <utility>
-
-#include <fmt/format.h>
 
 #include "app/devices/rig_settings.hpp"
 #include "app/devices/serial_devices.hpp"
@@ -68,19 +64,19 @@ void check_half(const Configuration& c, std::size_t k) {
       c.cameras, [&](const CameraSettings& s) { return are_one_camera(s, camera); });
   const bool left = camera.half == ImageHalf::left;
   if (other == c.cameras.end())
-    throw InputError(fmt::format(
+    throw InputError(
         "{}.image_half is {}, but no other entry is the {} half of the same frame; add one with "
         "the same driver and serial, and image_half: {}",
-        camera_key(k), left ? "left" : "right", left ? "right" : "left", left ? "right" : "left"));
+        camera_key(k), left ? "left" : "right", left ? "right" : "left", left ? "right" : "left");
   const auto j = static_cast<std::size_t>(other - c.cameras.begin());
   const CameraConfiguration a = camera_configuration(c, k), b = camera_configuration(c, j);
   if (a.exposure != b.exposure || a.gain_db != b.gain_db || a.pixel_format != b.pixel_format ||
       a.offset_x != b.offset_x || a.offset_y != b.offset_y ||
       options_text(a.options) != options_text(b.options))
     throw InputError(
-        fmt::format("{} and {} are halves of one camera's frame, but their settings differ; set "
-                    "exposure_us, gain_db, pixel_format, offset and options equally",
-                    camera_key(k), camera_key(j)));
+        "{} and {} are halves of one camera's frame, but their settings differ; set exposure_us, "
+        "gain_db, pixel_format, offset and options equally",
+        camera_key(k), camera_key(j));
 }
 
 /// The drivers in use and the cameras already opened.
@@ -97,15 +93,14 @@ class Openings {
     }
     for (const auto& [name, serial] : reserved_)
       if (std::ranges::count(reserved_, std::pair(name, serial)) > 1)
-        throw InputError(fmt::format(
+        throw InputError(
             "two entries of cameras have the serial \"{}\"; set the serial of the second camera",
-            serial));
+            serial);
   }
 
   OpenedCamera open(std::size_t k) {
     const CameraSettings& camera = configuration_.cameras[k];
-    OpenedCamera opened;
-    opened.device = camera.half == ImageHalf::whole ? open_device(k) : open_half(k);
+    OpenedCamera opened{.device = camera.half == ImageHalf::whole ? open_device(k) : open_half(k)};
     CameraConfiguration requested = camera_configuration(configuration_, k);
     requested.sharing = sharing_[camera.driver];
     const DeviceStatus status = opened.device->configure(requested, &opened.actual);

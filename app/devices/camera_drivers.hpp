@@ -1,10 +1,7 @@
 #pragma once
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "app/config/configuration.hpp"
-#include "drivers/camera.hpp"
 
 namespace vergence::app {
 
@@ -26,7 +23,7 @@ struct CameraDriverRow {
 /// Open and configured camera.
 struct OpenedCamera {
   std::unique_ptr<CameraDevice> device;
-  CameraConfiguration actual;
+  CameraConfiguration actual{};
 };
 
 /// Opens and configures the cameras of a configuration in order. An empty serial takes the next

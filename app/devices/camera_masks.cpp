@@ -1,10 +1,7 @@
 #include "app/devices/camera_masks.hpp"
 
 #include <algorithm>
-#include <span>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/image_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -34,7 +31,7 @@ ImageFileStatus read_pixels(Bytes b, ImageSize requested, ImageSize* size,
 std::vector<std::uint8_t> read_mask(const std::string& key, const std::filesystem::path& file,
                                     ImageSize requested) {
   const auto fail = [&](const std::string& what) {
-    throw InputError(fmt::format("{}: {} {}", key, file.string(), what));
+    throw InputError("{}: {} {}", key, file.string(), what);
   };
   std::vector<std::uint8_t> bytes;
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(requested.width) *
@@ -62,8 +59,8 @@ CameraMasks::CameraMasks(const Configuration& c, const RigCalibration& rig) {
     if (c.cameras[k].mask.empty()) continue;
     const std::string key = fmt::format("cameras.{}.mask", k);
     if (static_cast<int>(k) >= rig.cameras)
-      throw InputError(fmt::format("{}: the rig has {} cameras, numbered from 0; remove this mask",
-                                   key, rig.cameras));
+      throw InputError("{}: the rig has {} cameras, numbered from 0; remove this mask", key,
+                       rig.cameras);
     const Intrinsics& lens = rig.intrinsics[k];
     pixels_[k] =
         read_mask(key, find_beside(c.folder, c.cameras[k].mask), {lens.width, lens.height});

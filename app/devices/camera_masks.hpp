@@ -1,7 +1,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "app/config/configuration.hpp"
 #include "core/types/calibration.hpp"

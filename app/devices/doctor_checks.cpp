@@ -6,11 +6,8 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
 #include <iterator>
-#include <optional>
 #include <set>
-#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -190,8 +187,8 @@ class Checks {
       else if (n.driver == "gige" && std::ranges::count(n.serial, '.') == 3)
         add("cameras", FindingState::advice,
             who + ": no camera at " + n.serial +
-                " answers a broadcast; this is normal behind a router, else check cable, power "
-                "and address",
+                " answers a broadcast; this is normal behind a router, else check cable, power and "
+                "address",
             {"ping -c 3 " + n.serial});
       else
         add("cameras", FindingState::problem,
@@ -218,8 +215,8 @@ class Checks {
     if (!of_group || p_.machine.in_group(group))
       return add(check, FindingState::problem,
                  fmt::format("{}group {} has no access (mode 0660); install the udev rules, or "
-                             "stop a serial console that uses the port (sudo systemctl mask "
-                             "--now serial-getty@NAME)",
+                             "stop a serial console that uses the port (sudo systemctl mask --now "
+                             "serial-getty@NAME)",
                              message, group),
                  kInstallRules);
     add(check, FindingState::problem,

@@ -1,9 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include "app/config/configuration.hpp"
 #include "app/devices/inventory.hpp"
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
@@ -28,9 +26,9 @@ void check_real_drive(const Configuration& c) {
                        ".driver is mock, but another camera is real; simulated and real cameras "
                        "cannot be mixed");
     if (c.sync.mode != SyncMode::master_strobe && s.trigger != c.cameras[0].trigger)
-      throw InputError(fmt::format(
+      throw InputError(
           "{}.trigger is {}, but that of camera 0 is {}; set the same trigger for all cameras",
-          camera_key(k), to_string(s.trigger), to_string(c.cameras[0].trigger)));
+          camera_key(k), to_string(s.trigger), to_string(c.cameras[0].trigger));
   }
   for (const auto& [key, driver] :
        {std::pair{"trigger.driver", c.trigger.driver}, std::pair{"ins.driver", c.ins.driver}})
@@ -40,9 +38,9 @@ void check_real_drive(const Configuration& c) {
                        "mixed");
   if (c.trigger.driver == "board" && c.cameras[0].trigger != CameraTrigger::hardware)
     throw InputError(
-        fmt::format("trigger.driver is board, but cameras.N.trigger is {}; set cameras.N.trigger "
-                    "to hardware, or trigger.driver to none",
-                    to_string(c.cameras[0].trigger)));
+        "trigger.driver is board, but cameras.N.trigger is {}; set cameras.N.trigger to hardware, "
+        "or trigger.driver to none",
+        to_string(c.cameras[0].trigger));
 }
 
 }  // namespace
@@ -95,7 +93,7 @@ void DriveDevices::open_real(const Configuration& c) {
   for (const OpenedCamera& camera : opened_) timings.push_back(camera.device->timing());
   fit_to_devices(c, timings, trigger_ != nullptr, &sync_);
   if (c.cameras[0].trigger == CameraTrigger::software) {
-    software_ = std::make_unique<SoftwareTrigger>(cameras_);
+    software_ = make_software_trigger(cameras_);
     if (software_->configure(pulses, nullptr) != DeviceStatus::ok)
       throw InputError("trigger.rate is not possible");
     trigger_ = software_.get();
@@ -103,18 +101,9 @@ void DriveDevices::open_real(const Configuration& c) {
   start_ = monotonic_now();
 }
 
-Acquisition::Options DriveDevices::acquisition_options() const {
-  Acquisition::Options o;
-  o.sync = sync_;
-  o.wait_when_full = fast_;
-  return o;
-}
-
 std::span<const mock::Fault> DriveDevices::faults() const noexcept {
   if (mock_ == nullptr) return {};
   return mock_->truth().faults();
 }
-
-HostStamp DriveDevices::start() const noexcept { return mock_ ? mock_->start() : start_; }
 
 }  // namespace vergence::app

@@ -1,17 +1,10 @@
 #pragma once
-#include <memory>
-#include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
-#include "app/config/configuration.hpp"
 #include "app/devices/camera_drivers.hpp"
 #include "app/devices/mock_drive.hpp"
 #include "app/devices/serial_devices.hpp"
 #include "drivers/acquisition/acquisition.hpp"
-#include "drivers/sync/rig_synchronizer.hpp"
-#include "drivers/trigger_board/device.hpp"
 
 namespace vergence::app {
 
@@ -33,7 +26,10 @@ class DriveDevices {
   [[nodiscard]] TriggerDevice* trigger() const noexcept { return trigger_; }
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
   /// Options of an acquisition of these devices; the others have defaults.
-  [[nodiscard]] Acquisition::Options acquisition_options() const;
+  [[nodiscard]] Acquisition::Options acquisition_options() const {
+    return {.sync = sync_, .wait_when_full = fast_};
+  }
+
   /// Driver of a trigger board on a serial link; null if there is none.
   [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_.get(); }
   /// Messages about limitations.
@@ -44,7 +40,7 @@ class DriveDevices {
   /// Faults scheduled in the mock.
   [[nodiscard]] std::span<const mock::Fault> faults() const noexcept;
   /// Start of the run; in real time the simulated rig sets it when started.
-  [[nodiscard]] HostStamp start() const noexcept;
+  [[nodiscard]] HostStamp start() const noexcept { return mock_ ? mock_->start() : start_; }
   /// Number of rig frames of the whole run; 0 if unknown.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   /// Image memory of simulated cameras; unknown for real ones.

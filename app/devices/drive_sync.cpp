@@ -4,97 +4,121 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
-#include <cmath>
+#include <condition_variable>
 #include <exception>
-#include <string>
-#include <utility>
-
-#include <fmt/format.h>
+#include <mutex>
+#include <thread>
 
 #include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
+#include "core/memory/ring.hpp"
 
 namespace vergence::app {
 
 using std::chrono::steady_clock;
 
-DeviceStatus SoftwareTrigger::configure(const TriggerConfiguration& requested,
-                                        TriggerConfiguration* actual) noexcept {
-  if (!(requested.rate_hz > 0)) return DeviceStatus::bad_configuration;
-  if (requested.rate_hz > 1000) return DeviceStatus::unsupported;
-  rate_ = requested.rate_hz;
-  if (actual != nullptr) *actual = requested;
-  return DeviceStatus::ok;
-}
-
-DeviceStatus SoftwareTrigger::start(Notifier* ready) noexcept {
-  if (!(rate_ > 0)) return DeviceStatus::bad_configuration;
-  if (thread_.joinable()) return DeviceStatus::ok;
-  const std::lock_guard lock(mutex_);
-  try {
-    thread_ = std::thread([this] { pace(); });
-  } catch (const std::exception&) {
-    return DeviceStatus::failed;
-  }
-  stop_ = false;
-  ready_ = ready;
-  ++starts_;
-  return DeviceStatus::ok;
-}
-
-DeviceStatus SoftwareTrigger::wait(Duration limit, Pulse* pulse) noexcept {
-  std::unique_lock lock(mutex_);
-  (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
-                          [this] { return !ring_.empty() || stop_; });
-  if (ring_.pop(pulse)) return DeviceStatus::ok;
-  return stop_ ? DeviceStatus::stopped : DeviceStatus::timeout;
-}
-
-void SoftwareTrigger::stop() noexcept {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-    ready_ = nullptr;
-  }
-  changed_.notify_all();
-  if (thread_.joinable()) thread_.join();
-}
-
-void SoftwareTrigger::pace() {
-  (void)pthread_setname_np(pthread_self(), "vergence-pace");
-  const auto period = std::chrono::nanoseconds(Duration::seconds(1 / rate_).ns());
-  auto due = steady_clock::now() + period;
-  for (std::uint64_t number = 0;; ++number) {
-    {
-      std::unique_lock lock(mutex_);
-      if (changed_.wait_until(lock, due, [this] { return stop_; })) return;
-    }
-    Pulse pulse;
-    pulse.number = number;
-    pulse.arrival = HostStamp(steady_clock::now().time_since_epoch().count());
-    pulse.edge = DeviceStamp(pulse.arrival.ns());
-    for (CameraDevice* camera : cameras_) (void)camera->trigger_once();
-    if (ring_.push(pulse))
-      ++pulses_;
-    else
-      ++overruns_;
-    {
-      const std::lock_guard lock(mutex_);
-      changed_.notify_all();
-      if (ready_ != nullptr) ready_->notify();
-    }
-    due += period;
-    const auto now = steady_clock::now();
-    // After a slow answer of a camera the schedule restarts, which avoids a burst.
-    if (now > due) due = now + period;
-  }
-}
-
 namespace {
 
+class SoftwareTrigger final : public TriggerDevice {
+ public:
+  explicit SoftwareTrigger(std::vector<CameraDevice*> cameras) : cameras_(std::move(cameras)) {}
+  ~SoftwareTrigger() override { stop(); }
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(const TriggerConfiguration& requested,
+                         TriggerConfiguration* actual) noexcept override {
+    if (!(requested.rate_hz > 0)) return DeviceStatus::bad_configuration;
+    if (requested.rate_hz > 1000) return DeviceStatus::unsupported;
+    rate_ = requested.rate_hz;
+    if (actual != nullptr) *actual = requested;
+    return DeviceStatus::ok;
+  }
+
+  DeviceStatus start(Notifier* ready) noexcept override {
+    if (!(rate_ > 0)) return DeviceStatus::bad_configuration;
+    if (thread_.joinable()) return DeviceStatus::ok;
+    const std::lock_guard lock(mutex_);
+    try {
+      thread_ = std::thread([this] { pace(); });
+    } catch (const std::exception&) {
+      return DeviceStatus::failed;
+    }
+    stop_ = false;
+    ready_ = ready;
+    ++starts_;
+    return DeviceStatus::ok;
+  }
+
+  DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override {
+    std::unique_lock lock(mutex_);
+    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+                            [this] { return !ring_.empty() || stop_; });
+    if (ring_.pop(pulse)) return DeviceStatus::ok;
+    return stop_ ? DeviceStatus::stopped : DeviceStatus::timeout;
+  }
+
+  void stop() noexcept override {
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+      ready_ = nullptr;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  TriggerStatistics statistics() const noexcept override {
+    return {.pulses = pulses_.load(), .overruns = overruns_.load(), .starts = starts_.load()};
+  }
+
+ private:
+  void pace() {
+    (void)pthread_setname_np(pthread_self(), "vergence-pace");
+    const auto period = std::chrono::nanoseconds(Duration::seconds(1 / rate_).ns());
+    auto due = steady_clock::now() + period;
+    for (std::uint64_t number = 0;; ++number) {
+      {
+        std::unique_lock lock(mutex_);
+        if (changed_.wait_until(lock, due, [this] { return stop_; })) return;
+      }
+      Pulse pulse{.number = number,
+                  .arrival = HostStamp(steady_clock::now().time_since_epoch().count())};
+      pulse.edge = DeviceStamp(pulse.arrival.ns());
+      for (CameraDevice* camera : cameras_) (void)camera->trigger_once();
+      if (ring_.push(pulse))
+        ++pulses_;
+      else
+        ++overruns_;
+      {
+        const std::lock_guard lock(mutex_);
+        changed_.notify_all();
+        if (ready_ != nullptr) ready_->notify();
+      }
+      due += period;
+      const auto now = steady_clock::now();
+      // After a slow answer of a camera the schedule restarts, which avoids a burst.
+      if (now > due) due = now + period;
+    }
+  }
+
+  DeviceInfo info_{"software", "", "commands over the cameras' own links", ""};
+  std::vector<CameraDevice*> cameras_;
+  double rate_ = 0;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  // Guarded by mutex_. True unless the thread runs.
+  bool stop_ = true;
+  // Guarded by mutex_.
+  Notifier* ready_ = nullptr;
+  Ring<Pulse, 64> ring_;
+  std::atomic<std::uint64_t> pulses_{0}, overruns_{0}, starts_{0};
+  std::thread thread_;
+};
+
 [[noreturn]] void refuse(const Configuration& c, const std::string& why) {
-  throw InputError(fmt::format("sync.mode is {}: {}", to_string(c.sync.mode), why));
+  throw InputError("sync.mode is {}: {}", to_string(c.sync.mode), why);
 }
 
 bool is_mock(const CameraSettings& camera) {
@@ -182,7 +206,7 @@ void check_exposures(const Configuration& c, int cameras) {
     const CameraSettings& s = c.cameras[static_cast<std::size_t>(k)];
     const double busy_us = s.trigger_delay_us + s.exposure_us;
     if (busy_us > shortest_us)
-      throw InputError(fmt::format(
+      throw InputError(
           "cameras.{}.exposure_us is {}{}, longer than the {:.0f} µs between two pulses "
           "(trigger.rate {}{}), so the camera would miss pulses; lower exposure_us or trigger.rate",
           k, s.exposure_us,
@@ -190,7 +214,7 @@ void check_exposures(const Configuration& c, int cameras) {
               ? fmt::format(" after {} µs of trigger_delay_us", s.trigger_delay_us)
               : "",
           shortest_us, c.trigger.rate,
-          c.trigger.dither_us > 0 ? fmt::format(", dither_us {}", c.trigger.dither_us) : ""));
+          c.trigger.dither_us > 0 ? fmt::format(", dither_us {}", c.trigger.dither_us) : "");
   }
 }
 
@@ -209,21 +233,24 @@ bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find('7') != std::
 
 }  // namespace
 
+std::unique_ptr<TriggerDevice> make_software_trigger(std::vector<CameraDevice*> cameras) {
+  return std::make_unique<SoftwareTrigger>(std::move(cameras));
+}
+
 SyncOptions sync_options(const Configuration& c, int cameras) {
   check_mode(c, cameras);
   check_exposures(c, cameras);
-  SyncOptions o;
-  o.cameras = cameras;
-  o.interval = Duration::seconds(1 / c.trigger.rate);
-  o.hold = Duration::seconds(c.sync.timeout_ms * 1e-3);
-  o.tolerance = Duration::seconds(c.sync.tolerance_ms * 1e-3);
-  o.mode = c.sync.mode;
+  SyncOptions o{.cameras = cameras,
+                .interval = Duration::seconds(1 / c.trigger.rate),
+                .hold = Duration::seconds(c.sync.timeout_ms * 1e-3),
+                .mode = c.sync.mode,
+                .tolerance = Duration::seconds(c.sync.tolerance_ms * 1e-3)};
   for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
     o.camera[k].delay = microseconds(c.cameras[k].trigger_delay_us);
     o.camera[k].jitter = max_jitter(c.cameras[k]);
   }
   if (const char* message = o.validate())
-    throw InputError(fmt::format("sync.mode {}: {}", to_string(c.sync.mode), message));
+    throw InputError("sync.mode {}: {}", to_string(c.sync.mode), message);
   return o;
 }
 
@@ -247,37 +274,37 @@ void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
   const double nearest = kBase / std::max(1.0, std::round(kBase / c.trigger.rate));
   if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
   throw InputError(
-      fmt::format("trigger.rate is {}, but {} generates pulses of {:g} Hz / n; set trigger.rate "
-                  "and ins.sync_out_hz to {:.6g}",
-                  c.trigger.rate, ins_title(ins), kBase, nearest));
+      "trigger.rate is {}, but {} generates pulses of {:g} Hz / n; set trigger.rate and "
+      "ins.sync_out_hz to {:.6g}",
+      c.trigger.rate, ins_title(ins), kBase, nearest);
 }
 
 TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) {
   const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(cameras)) - 1U);
-  TriggerConfiguration t;
-  t.rate_hz = c.trigger.rate;
-  t.width = microseconds(c.trigger.width_us);
-  t.vary = microseconds(c.trigger.dither_us);
-  t.lines = c.trigger.lines == 0 ? all : static_cast<std::uint8_t>(c.trigger.lines);
-  t.active_low = static_cast<std::uint8_t>(c.trigger.active_low);
-  t.feedback = static_cast<std::uint8_t>(c.trigger.feedback);
-  t.feedback_active_low = static_cast<std::uint8_t>(c.trigger.feedback_active_low);
+  TriggerConfiguration t{
+      .rate_hz = c.trigger.rate,
+      .width = microseconds(c.trigger.width_us),
+      .vary = microseconds(c.trigger.dither_us),
+      .lines = c.trigger.lines == 0 ? all : static_cast<std::uint8_t>(c.trigger.lines),
+      .active_low = static_cast<std::uint8_t>(c.trigger.active_low),
+      .feedback = static_cast<std::uint8_t>(c.trigger.feedback),
+      .feedback_active_low = static_cast<std::uint8_t>(c.trigger.feedback_active_low)};
   if ((t.lines & all) != all)
     throw InputError(
-        fmt::format("trigger.lines is {}, a bit mask without the line of a camera; set it to 0 for "
-                    "one line for each of the {}",
-                    c.trigger.lines, cameras));
+        "trigger.lines is {}, a bit mask without the line of a camera; set it to 0 for one line "
+        "for each of the {}",
+        c.trigger.lines, cameras);
   const double period_us = 1e6 / c.trigger.rate;
   if (c.trigger.dither_us * 2 > period_us)
     throw InputError(
-        fmt::format("trigger.dither_us is {}, more than half of the {:.0f} µs between two pulses; "
-                    "a twentieth is sufficient",
-                    c.trigger.dither_us, period_us));
+        "trigger.dither_us is {}, more than half of the {:.0f} µs between two pulses; a twentieth "
+        "is sufficient",
+        c.trigger.dither_us, period_us);
   if (c.trigger.width_us + c.trigger.dither_us >= period_us)
     throw InputError(
-        fmt::format("trigger.width_us is {}, so a pulse would last until the next one, {:.0f} µs "
-                    "later; lower it",
-                    c.trigger.width_us, period_us - c.trigger.dither_us));
+        "trigger.width_us is {}, so a pulse would last until the next one, {:.0f} µs later; lower "
+        "it",
+        c.trigger.width_us, period_us - c.trigger.dither_us);
   return t;
 }
 

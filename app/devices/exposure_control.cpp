@@ -1,9 +1,7 @@
 #include "app/devices/exposure_control.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <utility>
 
 namespace vergence::app {
 namespace {
@@ -43,10 +41,6 @@ ExposureControl::ExposureControl(std::vector<CameraDevice*> cameras, int width, 
         set_all(*requested);
         under_way_.store(false, std::memory_order_release);
       });
-}
-
-ExposureCounters ExposureControl::counters() const noexcept {
-  return {changes_, refused_, unequal_, again_, unsupported_, controller_.setting()};
 }
 
 void ExposureControl::on_frame(std::size_t k, const Frame& frame) noexcept {

@@ -1,14 +1,10 @@
 #pragma once
 #include <array>
-#include <atomic>
-#include <cstdint>
 #include <vector>
 
 #include "app/runtime/queue_thread.hpp"
 #include "core/types/calibration.hpp"
 #include "drivers/acquisition/acquisition.hpp"
-#include "drivers/camera.hpp"
-#include "drivers/exposure/brightness.hpp"
 #include "drivers/exposure/exposure_controller.hpp"
 
 namespace vergence::app {
@@ -49,7 +45,9 @@ class ExposureControl final : public FrameObserver {
   /// Carries out a pending request and ends the thread. Called by the owner after the last frame;
   /// may be called twice.
   void settle() noexcept { thread_.stop(); }
-  [[nodiscard]] ExposureCounters counters() const noexcept;
+  [[nodiscard]] ExposureCounters counters() const noexcept {
+    return {changes_, refused_, unequal_, again_, unsupported_, controller_.setting()};
+  }
 
  private:
   [[nodiscard]] bool is_without(std::size_t k, const Frame& frame) noexcept;

@@ -83,16 +83,16 @@ std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
       continue;
     }
     if (f.saturated > kSome)
-      add(false, fmt::format("{} is partly overexposed: {:.0f} % of it is white, where "
-                             "nothing can be tracked; a shorter exposure_us may help",
+      add(false, fmt::format("{} is partly overexposed: {:.0f} % of it is white, where nothing can "
+                             "be tracked; a shorter exposure_us may help",
                              who, 100 * f.saturated));
     if (f.mean < kDim)
-      add(false, fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up "
-                             "to what motion allows, then gain_db",
+      add(false, fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up to "
+                             "what motion allows, then gain_db",
                              who, f.mean));
     if (k != sharpest_at && f.sharpness < kBlurred * sharpest)
-      add(false, fmt::format("{} is much less sharp than {} ({:.0f} against "
-                             "{:.0f}); check focus, dirt and near obstacles",
+      add(false, fmt::format("{} is much less sharp than {} ({:.0f} against {:.0f}); check focus, "
+                             "dirt and near obstacles",
                              who, names[sharpest_at], f.sharpness, sharpest));
   }
   return remarks;

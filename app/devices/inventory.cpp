@@ -13,19 +13,15 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <cstring>
 #include <exception>
 #include <fstream>
 #include <future>
 #include <sstream>
-#include <string_view>
 #include <system_error>
 #include <thread>
-#include <utility>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/text_file.hpp"
@@ -38,12 +34,8 @@ namespace {
 
 template <class Integer>
 std::optional<Integer> whole_number(const std::optional<std::string>& text, int base) {
-  if (!text || text->empty()) return std::nullopt;
   Integer value{};
-  const char* end = text->data() + text->size();
-  const auto [stop, error] = std::from_chars(text->data(), end, value, base);
-  if (error != std::errc() || stop != end) return std::nullopt;
-  return value;
+  return text && parse_whole(*text, &value, base) ? std::optional(value) : std::nullopt;
 }
 
 /// Empty: there is none. Not thread-safe, as getgrgid().
@@ -97,11 +89,9 @@ std::optional<DiskRoom> disk_room(const fs::path& folder) {
     if (!at.has_relative_path()) return std::nullopt;
     at = at.parent_path();
   }
-  DiskRoom room;
-  room.bytes = static_cast<std::uint64_t>(s.f_bavail) * s.f_frsize;
-  room.read_only = (s.f_flag & ST_RDONLY) != 0;
-  room.may_write = !closed && ::access(at.c_str(), W_OK | X_OK) == 0;
-  return room;
+  return DiskRoom{.bytes = static_cast<std::uint64_t>(s.f_bavail) * s.f_frsize,
+                  .read_only = (s.f_flag & ST_RDONLY) != 0,
+                  .may_write = !closed && ::access(at.c_str(), W_OK | X_OK) == 0};
 }
 
 std::optional<bool> kernel_clock_synchronised() {
@@ -109,6 +99,50 @@ std::optional<bool> kernel_clock_synchronised() {
   const int state = ::adjtimex(&t);
   if (state < 0) return std::nullopt;
   return state != TIME_ERROR && (t.status & STA_UNSYNC) == 0;
+}
+
+constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
+
+/// Vendors of boards that bring USB with them, or a converter that hardly anything else has.
+/// The entries are, in order, Arduino, the dog hunter fork of Arduino, Teensy (a shared vendor
+/// identifier), Raspberry Pi (Pico), STMicroelectronics (virtual COM port, ST-Link), Adafruit,
+/// Espressif, SparkFun and QinHeng (the CH340 of cheap trigger boards).
+constexpr std::array<std::uint16_t, 9> kBoardVendors{0x2341, 0x2A03, 0x16C0, 0x2E8A, 0x0483,
+                                                     0x239A, 0x303A, 0x1B4F, 0x1A86};
+
+struct Search {
+  std::vector<DeviceInfo> found;
+  std::string explanation;
+};
+
+/// On a thread of the driver's own, which may outlive the one that waits.
+std::future<Search> begin_search(const CameraDriverRow& row) {
+  std::packaged_task<Search()> task([make = row.make]() -> Search {
+    try {
+      const auto driver = make();
+      std::vector<DeviceInfo> found = driver->enumerate();
+      return {std::move(found), driver->last_error()};
+    } catch (const std::exception& e) {
+      return {{}, std::string("the search failed: ") + e.what()};
+    }
+  });
+  std::future<Search> search = task.get_future();
+  std::thread(std::move(task)).detach();
+  return search;
+}
+
+std::vector<FoundPort> list_ports(const Machine& machine) {
+  constexpr const char* kLinks = "/dev/serial/by-id/";
+  std::vector<FoundPort> ports;
+  for (SerialPortInfo& info : list_serial_ports()) {
+    FoundPort p{.kind = serial_kind(info.usb_vendor, info.usb_product)};
+    for (const std::string& name : machine.names(kLinks))
+      if (machine.target(kLinks + name) == info.port) p.by_id = kLinks + name;
+    p.info = std::move(info);
+    if (p.kind == SerialKind::ins) p.configuration = "ins: {driver: xsens, port: " + p.name() + "}";
+    ports.push_back(std::move(p));
+  }
+  return ports;
 }
 
 }  // namespace
@@ -123,10 +157,6 @@ Machine Machine::here() {
   m.room_at = disk_room;
   m.clock_synchronised = kernel_clock_synchronised();
   return m;
-}
-
-fs::path Machine::at(const std::string& path) const {
-  return root / fs::path(path).relative_path();
 }
 
 std::optional<std::string> Machine::text(const std::string& path) const {
@@ -208,57 +238,6 @@ bool Machine::in_group(const std::string& group) const {
   return std::ranges::find(groups, group) != groups.end();
 }
 
-namespace {
-
-constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
-
-/// Vendors of boards that bring USB with them, or a converter that hardly anything else has.
-/// The entries are, in order, Arduino, the dog hunter fork of Arduino, Teensy (a shared vendor
-/// identifier), Raspberry Pi (Pico), STMicroelectronics (virtual COM port, ST-Link), Adafruit,
-/// Espressif, SparkFun and QinHeng (the CH340 of cheap trigger boards).
-constexpr std::array<std::uint16_t, 9> kBoardVendors{0x2341, 0x2A03, 0x16C0, 0x2E8A, 0x0483,
-                                                     0x239A, 0x303A, 0x1B4F, 0x1A86};
-
-struct Search {
-  std::vector<DeviceInfo> found;
-  std::string explanation;
-};
-
-/// On a thread of the driver's own, which may outlive the one that waits.
-std::future<Search> begin_search(const CameraDriverRow& row) {
-  std::packaged_task<Search()> task([make = row.make]() -> Search {
-    try {
-      const auto driver = make();
-      std::vector<DeviceInfo> found = driver->enumerate();
-      return {std::move(found), driver->last_error()};
-    } catch (const std::exception& e) {
-      return {{}, std::string("the search failed: ") + e.what()};
-    }
-  });
-  std::future<Search> search = task.get_future();
-  std::thread(std::move(task)).detach();
-  return search;
-}
-
-std::vector<FoundPort> list_ports(const Machine& machine) {
-  constexpr const char* kLinks = "/dev/serial/by-id/";
-  std::vector<FoundPort> ports;
-  for (SerialPortInfo& info : list_serial_ports()) {
-    FoundPort p;
-    p.kind = serial_kind(info.usb_vendor, info.usb_product);
-    for (const std::string& name : machine.names(kLinks))
-      if (machine.target(kLinks + name) == info.port) p.by_id = kLinks + name;
-    p.info = std::move(info);
-    if (p.kind == SerialKind::ins) p.configuration = "ins: {driver: xsens, port: " + p.name() + "}";
-    ports.push_back(std::move(p));
-  }
-  return ports;
-}
-
-}  // namespace
-
-std::string UsbDevice::node() const { return fmt::format("/dev/bus/usb/{:03}/{:03}", bus, number); }
-
 std::vector<UsbDevice> list_usb_devices(const Machine& m) {
   const std::string devices = "/sys/bus/usb/devices/";
   const auto small_number = [&m](const std::string& path) {
@@ -274,11 +253,10 @@ std::vector<UsbDevice> list_usb_devices(const Machine& m) {
                product = m.number(folder + "/idProduct", 16);
     if (!vendor || !product || *vendor < 0 || *vendor > 0xFFFF || *product < 0 || *product > 0xFFFF)
       continue;
-    UsbDevice d;
-    d.port = name;
-    d.vendor = static_cast<std::uint16_t>(*vendor);
-    d.product = static_cast<std::uint16_t>(*product);
-    d.serial = m.line(folder + "/serial").value_or("");
+    UsbDevice d{.port = name,
+                .vendor = static_cast<std::uint16_t>(*vendor),
+                .product = static_cast<std::uint16_t>(*product),
+                .serial = m.line(folder + "/serial").value_or("")};
     const std::string maker = m.line(folder + "/manufacturer").value_or(""),
                       title = m.line(folder + "/product").value_or("");
     d.title = title.starts_with(maker) ? title : title.empty() ? maker : maker + " " + title;

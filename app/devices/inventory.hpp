@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "core/types/time.hpp"
-#include "drivers/device.hpp"
 #include "drivers/iidc/firewire_nodes.hpp"
 #include "drivers/serial/serial_port.hpp"
 
@@ -77,7 +78,9 @@ struct Machine {
   [[nodiscard]] bool in_group(const std::string& group) const;
 
  private:
-  [[nodiscard]] std::filesystem::path at(const std::string& path) const;
+  [[nodiscard]] std::filesystem::path at(const std::string& path) const {
+    return root / std::filesystem::path(path).relative_path();
+  }
 };
 
 /// USB vendor id of the IIDC cameras.
@@ -89,14 +92,16 @@ struct UsbDevice {
   std::string port;
   std::uint16_t vendor = 0, product = 0;
   /// The title is manufacturer and product; either may be empty.
-  std::string serial, title;
+  std::string serial, title{};
   /// 0 if unknown.
   int bus = 0, number = 0;
   /// Nodes of its interfaces: video0, …
-  std::vector<std::string> video;
+  std::vector<std::string> video{};
 
   /// Path such as /dev/bus/usb/001/004.
-  [[nodiscard]] std::string node() const;
+  [[nodiscard]] std::string node() const {
+    return fmt::format("/dev/bus/usb/{:03}/{:03}", bus, number);
+  }
 };
 
 /// All devices except root hubs, ordered by port.
@@ -124,12 +129,12 @@ enum class SerialKind : std::uint8_t {
 [[nodiscard]] bool is_ftdi(std::uint16_t vendor, std::uint16_t product) noexcept;
 
 struct FoundPort {
-  SerialPortInfo info;
+  SerialPortInfo info{};
   /// Link that is stable when ports are renumbered; empty if there is none.
-  std::string by_id;
+  std::string by_id{};
   SerialKind kind = SerialKind::unknown;
   /// Line for the configuration; empty if unknown.
-  std::string configuration;
+  std::string configuration{};
 
   /// Name for a configuration.
   [[nodiscard]] const std::string& name() const noexcept {

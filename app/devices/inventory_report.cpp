@@ -1,7 +1,6 @@
 #include "app/devices/inventory_report.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 
 #include <fmt/format.h>

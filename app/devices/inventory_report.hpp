@@ -1,9 +1,5 @@
 #pragma once
-#include <string>
-#include <vector>
-
 #include "app/devices/doctor_checks.hpp"
-#include "app/devices/inventory.hpp"
 
 /// Output of `vergence devices` and `vergence doctor`; docs/deployment.md has the keys of the JSON.
 namespace vergence::app {

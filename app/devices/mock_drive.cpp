@@ -1,10 +1,6 @@
 #include "app/devices/mock_drive.hpp"
 
 #include <algorithm>
-#include <stdexcept>
-#include <utility>
-
-#include <fmt/format.h>
 
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
@@ -18,8 +14,8 @@ namespace {
 void require_choice(const char* key, const std::string& value,
                     const std::vector<std::string>& words) {
   if (std::ranges::find(words, value) == words.end())
-    throw InputError(fmt::format("{} is \"{}\"; with mock cameras set it to {}", key, value,
-                                 fmt::join(words, ", ")));
+    throw InputError("{} is \"{}\"; with mock cameras set it to {}", key, value,
+                     fmt::join(words, ", "));
 }
 
 std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<std::string>& more) {
@@ -57,30 +53,27 @@ std::unique_ptr<mock::MockRig> make_mock_drive(const Configuration& c,
                                                bool real_time, std::optional<double> duration_s) {
   const RigCalibration rig = mounted_rig(c);
   const std::vector<mock::Fault> faults = all_faults(c, more_faults);
-  mock::WorldOptions world;
-  world.seed = static_cast<std::uint64_t>(c.mock.seed);
-  world.texture_detail = c.mock.texture_detail;
-  world.hill_deg = c.mock.hill_deg;
-  mock::DriveOptions way;
-  way.kind = c.mock.drive;
-  way.seed = world.seed;
-  way.speed = c.mock.speed;
-  way.suspension = c.mock.suspension;
-  way.vibration = c.mock.vibration;
-  way.stop_s = c.mock.stop_s;
+  mock::WorldOptions world{.seed = static_cast<std::uint64_t>(c.mock.seed),
+                           .texture_detail = c.mock.texture_detail,
+                           .hill_deg = c.mock.hill_deg};
+  mock::DriveOptions way{.kind = c.mock.drive,
+                         .seed = world.seed,
+                         .speed = c.mock.speed,
+                         .suspension = c.mock.suspension,
+                         .vibration = c.mock.vibration,
+                         .stop_s = c.mock.stop_s};
   // The INS sits where the configuration says: p_ins = T_ins_left p_left.
   const Transform T_body_left = mock::default_T_body_left();
   const Transform T_body_ins = T_body_left * comparison_options(c).T_ins_left.inverse();
   auto truth = std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(world),
                                                       way, rig, T_body_left, T_body_ins, faults);
-  mock::MockRigOptions o;
-  o.real_time = real_time;
-  o.seed = world.seed;
-  o.pattern = c.mock.pattern;
-  o.noise = c.mock.noise != 0;
-  o.blur_samples = c.mock.blur_samples;
-  o.ideal_ins = c.mock.ins == MockSettings::Ins::ideal;
-  o.clock_drift_ppm = c.mock.clock_drift_ppm;
+  mock::MockRigOptions o{.real_time = real_time,
+                         .seed = world.seed,
+                         .pattern = c.mock.pattern,
+                         .noise = c.mock.noise != 0,
+                         .blur_samples = c.mock.blur_samples,
+                         .ideal_ins = c.mock.ins == MockSettings::Ins::ideal,
+                         .clock_drift_ppm = c.mock.clock_drift_ppm};
   // Only a board is asked for pauses, which the reports announce.
   o.reports_read = c.sync.mode == SyncMode::board;
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)

@@ -1,8 +1,5 @@
 #pragma once
 #include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "app/config/configuration.hpp"
 #include "core/types/stamped_pose.hpp"

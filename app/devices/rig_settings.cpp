@@ -1,17 +1,14 @@
 #include "app/devices/rig_settings.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cctype>
 #include <numbers>
-
-#include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/transform_rows.hpp"
 #include "core/math/random.hpp"
 
 namespace vergence::app {
@@ -21,10 +18,7 @@ namespace {
 constexpr double kFocalOfWidth = 0.72;
 
 Intrinsics read_intrinsics(const Configuration& c, const CameraSettings& camera) {
-  Intrinsics lens;
-  lens.width = camera.width;
-  lens.height = camera.height;
-  lens.kind = camera.model;
+  Intrinsics lens{.kind = camera.model, .width = camera.width, .height = camera.height};
   if (camera.intrinsics[0] > 0) {
     lens.fx = camera.intrinsics[0];
     lens.fy = camera.intrinsics[1];
@@ -42,15 +36,9 @@ Intrinsics read_intrinsics(const Configuration& c, const CameraSettings& camera)
 
 Transform camera_transform(const Configuration& c, std::size_t k) {
   const auto& rows = c.cameras[k].T_camera_left;
-  Transform T;
-  if (std::ranges::all_of(rows, [](double v) { return v == 0; })) {
-    T.t = {-static_cast<double>(k) * c.rig.baseline_m, 0, 0};
-    return T;
-  }
-  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> m(rows.data());
-  T.R = m.leftCols<3>();
-  T.t = m.col(3);
-  return T;
+  if (std::ranges::all_of(rows, [](double v) { return v == 0; }))
+    return {Mat3::Identity(), {-static_cast<double>(k) * c.rig.baseline_m, 0, 0}};
+  return transform_of(rows);
 }
 
 void add_intrinsics_error(const IntrinsicsErrorSettings& e, RigCalibration* rig) {
@@ -85,9 +73,9 @@ int camera_count(const Configuration& c) {
     if (c.cameras[k].driver.empty()) continue;
     if (static_cast<int>(k) != n)
       throw InputError(
-          fmt::format("cameras.{} has a driver, but cameras.{} before it has none; set its driver, "
-                      "or remove it",
-                      k, k - 1));
+          "cameras.{} has a driver, but cameras.{} before it has none; set its driver, or remove "
+          "it",
+          k, k - 1);
     ++n;
   }
   return n;
@@ -96,21 +84,20 @@ int camera_count(const Configuration& c) {
 void check_cameras(const Configuration& c) {
   const int n = camera_count(c);
   if (n < 2)
-    throw InputError(fmt::format(
+    throw InputError(
         "cameras: {0} configured, and two are needed for scale; add them, for example cameras: "
         "[{{driver: {1}}}, {{driver: {1}}}]",
-        n == 0 ? "no camera is" : "one camera is", n == 0 ? "mock" : c.cameras[0].driver));
+        n == 0 ? "no camera is" : "one camera is", n == 0 ? "mock" : c.cameras[0].driver);
   for (std::size_t k = 1; k < static_cast<std::size_t>(n); ++k)
     if (c.cameras[k].width != c.cameras[0].width || c.cameras[k].height != c.cameras[0].height)
-      throw InputError(fmt::format(
+      throw InputError(
           "cameras.{}.size is {} x {}, but that of camera 0 is {} x {}; set the same size for all "
           "cameras",
-          k, c.cameras[k].width, c.cameras[k].height, c.cameras[0].width, c.cameras[0].height));
+          k, c.cameras[k].width, c.cameras[k].height, c.cameras[0].width, c.cameras[0].height);
 }
 
 RigCalibration mounted_rig(const Configuration& c) {
-  RigCalibration rig;
-  rig.cameras = camera_count(c);
+  RigCalibration rig{.cameras = camera_count(c)};
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
     rig.intrinsics[k] = read_intrinsics(c, c.cameras[k]);
     if (k > 0) rig.T_camera_left[k] = camera_transform(c, k);
@@ -151,19 +138,18 @@ ComparisonOptions comparison_options(const Configuration& c) {
 bool exposes_by_itself(const Configuration& c) { return c.exposure.mode != 0; }
 
 exposure::ExposureOptions exposure_options(const Configuration& c) {
-  exposure::ExposureOptions o;
-  o.target = c.exposure.target;
-  o.may_saturate = 0.01 * c.exposure.saturated_percent;
-  o.least = microseconds(c.exposure.min_us);
-  o.most = microseconds(c.exposure.max_us);
-  o.max_gain_db = c.exposure.max_gain_db;
-  o.settle_frames = c.exposure.settle_frames;
+  exposure::ExposureOptions o{.target = c.exposure.target,
+                              .may_saturate = 0.01 * c.exposure.saturated_percent,
+                              .least = microseconds(c.exposure.min_us),
+                              .most = microseconds(c.exposure.max_us),
+                              .max_gain_db = c.exposure.max_gain_db,
+                              .settle_frames = c.exposure.settle_frames};
   if (o.most < o.least) throw InputError("exposure.max_us is below exposure.min_us; raise it");
   if (c.exposure.max_us * 1e-6 * c.trigger.rate > 1)
     throw InputError(
-        fmt::format("exposure.max_us is {}, longer than the {:.0f} µs between two pulses "
-                    "(trigger.rate {}); lower it",
-                    c.exposure.max_us, 1e6 / c.trigger.rate, c.trigger.rate));
+        "exposure.max_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {}); "
+        "lower it",
+        c.exposure.max_us, 1e6 / c.trigger.rate, c.trigger.rate);
   return o;
 }
 

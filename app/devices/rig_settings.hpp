@@ -4,7 +4,6 @@
 #include "app/config/configuration.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/types/calibration.hpp"
-#include "drivers/camera.hpp"
 #include "drivers/exposure/exposure_controller.hpp"
 
 /// Rig described by a configuration. Functions throw InputError with the key.

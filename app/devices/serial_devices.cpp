@@ -1,7 +1,5 @@
 #include "app/devices/serial_devices.hpp"
 
-#include <fmt/format.h>
-
 #include "app/runtime/errors.hpp"
 #include "drivers/gnss/gnss.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
@@ -58,12 +56,10 @@ std::unique_ptr<InsDriver> make_ins_driver(const InsSettings& s) {
   const Duration processing = Duration::seconds(s.processing_ms * 1e-3);
   if (s.driver == "nmea") return gnss::make_driver({gnss::Protocol::nmea, baud, processing});
   if (s.driver == "ubx") return gnss::make_driver({gnss::Protocol::ubx, baud, processing});
-  xsens::Options o;
-  o.baud = baud;
-  o.sync_out_hz = s.sync_out_hz;
-  o.sync_out_width_ms = s.sync_out_width_ms;
-  o.processing = processing;
-  return xsens::make_driver(o);
+  return xsens::make_driver({.baud = baud,
+                             .sync_out_hz = s.sync_out_hz,
+                             .sync_out_width_ms = s.sync_out_width_ms,
+                             .processing = processing});
 }
 
 }  // namespace
@@ -93,11 +89,9 @@ std::string board_title(const DeviceInfo& info) {
 std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings& settings,
                                                           const TriggerConfiguration& pulses,
                                                           std::vector<std::string>* remarks) {
-  trigger_board::Options options;
-  options.baud = static_cast<std::uint32_t>(settings.baud);
-  options.pps = settings.pps;
-  options.ins = settings.ins;
-  trigger_board::Driver driver(options);
+  trigger_board::Driver driver({.baud = static_cast<std::uint32_t>(settings.baud),
+                                .pps = settings.pps,
+                                .ins = settings.ins});
   DeviceStatus status = DeviceStatus::ok;
   auto board = driver.open_board(settings.port, &status);
   require_opened(board != nullptr, "trigger: the trigger board", settings.port, status,

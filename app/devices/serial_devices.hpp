@@ -1,14 +1,9 @@
 #pragma once
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "app/config/configuration.hpp"
-#include "drivers/device.hpp"
 #include "drivers/ins.hpp"
-#include "drivers/serial/serial_link.hpp"
 #include "drivers/trigger_board/device.hpp"
-#include "drivers/xsens/options.hpp"
 
 namespace vergence::app {
 

@@ -4,15 +4,9 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <iostream>
-#include <memory>
-#include <optional>
-#include <string>
 #include <thread>
-#include <vector>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/image_writer.hpp"
@@ -206,13 +200,8 @@ class Snap {
                    {"trigger", trigger_},
                    {"notes", remarks_},
                    {"sets", sets_}};
-    const auto file = request_.out / "snap.json";
-    std::ofstream out(file, std::ios::binary);
-    out << all.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-    out.close();
-    if (!out)
-      throw InputError(file.string() +
-                       ": cannot be written; check the free space and the permissions");
+    replace_durably(request_.out / "snap.json",
+                    all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   }
   [[nodiscard]] ExitCode verdict() const {
     if (complete()) return unusable_ ? ExitCode::not_usable : ExitCode::done;

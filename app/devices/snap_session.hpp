@@ -1,6 +1,4 @@
 #pragma once
-#include <filesystem>
-
 #include "app/config/configuration.hpp"
 #include "app/runtime/errors.hpp"
 

@@ -6,7 +6,6 @@
 #include <cstring>
 #include <vector>
 
-#include "core/types/image.hpp"
 #include "core/types/rig_frame.hpp"
 
 namespace vergence::app {

@@ -8,9 +8,6 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
-#include <utility>
-
-#include <fmt/format.h>
 
 namespace vergence::app {
 namespace {
@@ -73,8 +70,8 @@ HttpDecision decide_action(HttpRoute route, const HttpRequest& r,
 
 FileDescriptor listen_at(const HostPort& address) {
   const auto refused = [&](const char* why, const char* what_to_do) {
-    return InputError(fmt::format("publish.http: the live page cannot be served at {} ({}); {}",
-                                  address.text(), why, what_to_do));
+    return InputError("publish.http: the live page cannot be served at {} ({}); {}", address.text(),
+                      why, what_to_do);
   };
   const auto found = resolve(address, SOCK_STREAM, [&](const char* reason) {
     return refused(reason, "use an address of this machine");
@@ -111,18 +108,14 @@ bool send(MHD_Connection* c, unsigned status, const char* type, std::string_view
 }  // namespace
 
 HttpDecision decide(const HttpRequest& r, const HttpPolicy& policy) noexcept {
-  struct Action {
-    std::string_view path;
-    HttpRoute route;
-  };
-  constexpr std::array kActions{Action{"/recalibrate", HttpRoute::recalibrate},
-                                Action{"/mark", HttpRoute::mark},
-                                Action{"/stop-recording", HttpRoute::stop_recording}};
+  constexpr std::array kActions{std::pair{"/recalibrate", HttpRoute::recalibrate},
+                                std::pair{"/mark", HttpRoute::mark},
+                                std::pair{"/stop-recording", HttpRoute::stop_recording}};
   if (!policy.token_to_read && !names_this_machine(r.host, policy))
     return {HttpRoute::refuse, 421, "this page is for this machine; open it by its address"};
   if (r.method == "POST") {
-    for (const Action& action : kActions)
-      if (r.path == action.path) return decide_action(action.route, r, policy);
+    for (const auto& [path, action] : kActions)
+      if (r.path == path) return decide_action(action, r, policy);
     return {HttpRoute::refuse, 404, "there is no such action"};
   }
   if (r.method != "GET") return {HttpRoute::refuse, 405, "only GET and POST are supported"};
@@ -139,9 +132,7 @@ struct HttpServer::Callbacks {
                             const char* /*version*/, const char* /*body*/, std::size_t* /*size*/,
                             void** /*state*/) noexcept {
     static_cast<HttpServer*>(server)->asking_.remove(c);
-    HttpRequest r;
-    r.method = method;
-    r.path = url;
+    HttpRequest r{.method = method, .path = url};
     const auto header = [c](const char* name) { return find_value(c, MHD_HEADER_KIND, name); };
     const auto query = [c](const char* name) { return find_value(c, MHD_GET_ARGUMENT_KIND, name); };
     r.host = header("Host");

@@ -1,12 +1,7 @@
 #pragma once
 #include <chrono>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <list>
-#include <memory>
-#include <string>
-#include <string_view>
 
 #include "app/publish/line_socket.hpp"
 

@@ -5,18 +5,14 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <span>
 
-#include <fmt/format.h>
-
-#include "app/runtime/errors.hpp"
+#include "app/runtime/text_input.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -51,20 +47,20 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
   struct stat status {};
   if (::lstat(address.sun_path, &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw InputError(fmt::format("{}: {} exists and is not a socket; choose another path", key,
-                                 address.sun_path));
+    throw InputError("{}: {} exists and is not a socket; choose another path", key,
+                     address.sun_path);
   const FileDescriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
       errno == EAGAIN)
-    throw InputError(fmt::format("{}: another program publishes at {}; choose another path", key,
-                                 address.sun_path));
+    throw InputError("{}: another program publishes at {}; choose another path", key,
+                     address.sun_path);
   // Only ECONNREFUSED proves that no program listens. A datagram socket or one of another user may
   // be in use.
   if (errno == ECONNREFUSED)
     (void)::unlink(address.sun_path);
   else if (errno != ENOENT)
-    throw InputError(fmt::format("{}: {} is a socket of another program ({}); choose another path",
-                                 key, address.sun_path, std::strerror(errno)));
+    throw InputError("{}: {} is a socket of another program ({}); choose another path", key,
+                     address.sun_path, std::strerror(errno));
 }
 
 /// A stream socket, so that up to kReaders readers can connect and disconnect without own
@@ -83,9 +79,9 @@ class UnixLineSocket final : public LineSocket {
         ::chmod(address.sun_path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 ||
         ::listen(listener_.get(), kPending) != 0)
       throw InputError(
-          fmt::format("{}: the socket {} cannot be created ({}); check that its directory exists "
-                      "and is writable",
-                      key, path, std::strerror(errno)));
+          "{}: the socket {} cannot be created ({}); check that its directory exists and is "
+          "writable",
+          key, path, std::strerror(errno));
     bound_ = true;
   }
   ~UnixLineSocket() override {
@@ -277,15 +273,14 @@ class UdpLineSocket final : public LineSocket {
  public:
   UdpLineSocket(const HostPort& address, std::string_view key) {
     const auto found = resolve(address, SOCK_DGRAM, [&](const char* reason) {
-      return InputError(
-          fmt::format("{}: the host {} is unknown ({}); write its IP address, e.g. 127.0.0.1:{}",
-                      key, address.host, reason, address.port));
+      return InputError("{}: the host {} is unknown ({}); write its IP address, e.g. 127.0.0.1:{}",
+                        key, address.host, reason, address.port);
     });
     socket_ =
         FileDescriptor(::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     if (!socket_ || ::connect(socket_.get(), found->ai_addr, found->ai_addrlen) != 0)
-      throw InputError(fmt::format("{}: {} cannot be reached ({}); check the network", key,
-                                   address.text(), std::strerror(errno)));
+      throw InputError("{}: {} cannot be reached ({}); check the network", key, address.text(),
+                       std::strerror(errno));
   }
 
   void greet(std::string lines) noexcept override {
@@ -346,13 +341,11 @@ HostPort parse_host_port(std::string_view text, std::string_view key) {
   const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
   if (bracketed) host = host.substr(1, host.size() - 2);
   std::uint16_t port = 0;
-  const char* end = digits.data() + digits.size();
-  const auto [read, error] = std::from_chars(digits.data(), end, port);
   if (host.empty() || bracketed != (host.find(':') != std::string_view::npos) ||
-      error != std::errc() || read != end || port == 0)
-    throw InputError(fmt::format(
+      !parse_whole(digits, &port) || port == 0)
+    throw InputError(
         "{}: \"{}\" is not an address; write HOST:PORT, e.g. 127.0.0.1:8080 or [::1]:8080", key,
-        text.substr(0, 120)));
+        text.substr(0, 120));
   return {std::string(host), port};
 }
 
@@ -365,15 +358,13 @@ LineAddress parse_line_address(std::string_view text, std::string_view key) {
     return out;
   }
   if (!text.starts_with(kUnix))
-    throw InputError(
-        fmt::format("{}: \"{}\" is not an address; write unix:///PATH or udp://HOST:PORT", key,
-                    text.substr(0, 120)));
+    throw InputError("{}: \"{}\" is not an address; write unix:///PATH or udp://HOST:PORT", key,
+                     text.substr(0, 120));
   out.path = text.substr(kUnix.size());
   if (!out.path.starts_with('/') || out.path.find('\0') != std::string::npos ||
       out.path.size() >= sizeof(sockaddr_un::sun_path))
-    throw InputError(
-        fmt::format("{}: the path of the socket must begin with / and have at most {} bytes", key,
-                    sizeof(sockaddr_un::sun_path) - 1));
+    throw InputError("{}: the path of the socket must begin with / and have at most {} bytes", key,
+                     sizeof(sockaddr_un::sun_path) - 1);
   return out;
 }
 

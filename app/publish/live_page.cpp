@@ -2,21 +2,11 @@
 
 #include <pthread.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <atomic>
-#include <charconv>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <thread>
-#include <utility>
-#include <variant>
-#include <vector>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/image_writer.hpp"
@@ -25,6 +15,7 @@
 // CMake generates this header from app/publish/page/.
 #include "app/publish/page_parts.hpp"
 #include "app/report/page_css.hpp"
+#include "app/runtime/text_input.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/memory/ring.hpp"
 #include "drivers/clock.hpp"
@@ -209,9 +200,7 @@ class LivePage final : public SessionObserver {
     ++updates_;
     const bool known = request.epoch == epoch_;
     std::uint64_t version = 0;
-    if (known)
-      (void)std::from_chars(request.after.data(), request.after.data() + request.after.size(),
-                            version);
+    if (known) (void)parse_whole(request.after, &version);
     nlohmann::json out = state_.since(version, monotonic_now());
     out["epoch"] = epoch_;
     if (images_.ready()) {
@@ -240,10 +229,7 @@ class LivePage final : public SessionObserver {
     const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
     for (const LivePoint& p : points_) {
       nlohmann::json point{tenths(p.left[0]), tenths(p.left[1])};
-      if (p.both) {
-        point.push_back(tenths(p.right[0]));
-        point.push_back(tenths(p.right[1]));
-      }
+      if (p.both) point.insert(point.end(), {tenths(p.right[0]), tenths(p.right[1])});
       points.push_back(std::move(point));
     }
     return out;

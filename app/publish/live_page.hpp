@@ -1,8 +1,4 @@
 #pragma once
-#include <memory>
-#include <string>
-#include <string_view>
-
 #include "app/publish/http_server.hpp"
 #include "app/session/session_observer.hpp"
 #include "core/types/image.hpp"

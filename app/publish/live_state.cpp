@@ -1,11 +1,7 @@
 #include "app/publish/live_state.hpp"
 
-#include <algorithm>
-#include <cmath>
-
-#include <nlohmann/json.hpp>
-
 #include "app/report/assessment.hpp"
+#include "app/runtime/transform_rows.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
@@ -46,12 +42,10 @@ constexpr double kSilenceSeconds = 1, kMaxIntervals = 3;
 // In frames.
 constexpr double kSmoothing = 8;
 
+/// The rows of east and north.
 json enu_alignment_json(const PublishedEnuAlignment& alignment) {
-  const Transform& T = alignment.alignment.T_enu_world;
-  json rows = json::array();
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 4; ++j) rows.push_back(j < 3 ? T.R(i, j) : T.t(i));
-  return rows;
+  const auto rows = rows_of(alignment.alignment.T_enu_world);
+  return std::vector(rows.begin(), rows.begin() + 8);
 }
 
 // In m. With longer steps a map no longer shows the path.

@@ -1,20 +1,11 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <deque>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/publish/pose_stream.hpp"
-#include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
-#include "core/types/pose_sample.hpp"
-#include "core/types/rig_frame.hpp"
 
 namespace vergence::app {
 

@@ -1,14 +1,12 @@
 #include "app/publish/pose_stream.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/transform_rows.hpp"
 #include "core/calibration/health.hpp"
 
 namespace vergence::app {
@@ -64,13 +62,6 @@ std::string format_line(const char* type, const json& fields) {
   json line{{"version", kPoseStreamVersion}, {"type", type}};
   line.update(fields);
   return line.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
-}
-
-json rows(const Transform& T) {
-  json out = json::array();
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 4; ++j) out.push_back(j < 3 ? T.R(i, j) : T.t(i));
-  return out;
 }
 
 json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
@@ -136,7 +127,7 @@ std::string calibration_line(const CalibrationRecord& record, std::span<const st
                        {"model", radtan ? "pinhole-radtan" : "pinhole-equidistant"},
                        {"intrinsics", {lens.fx, lens.fy, lens.cx, lens.cy}},
                        {"distortion", lens.distortion},
-                       {"T_camera_left", rows(rig.T_camera_left[k])}});
+                       {"T_camera_left", rows_of(rig.T_camera_left[k])}});
   }
   // In m: depth at which rating() evaluates the rig.
   constexpr double kDepth = 20;
@@ -154,7 +145,7 @@ std::string alignment_line(const PublishedEnuAlignment& p) {
                                     {{"latitude_deg", p.origin.latitude_deg},
                                      {"longitude_deg", p.origin.longitude_deg},
                                      {"height_m", p.origin.height_m}}},
-                                   {"T_enu_world", rows(p.alignment.T_enu_world)},
+                                   {"T_enu_world", rows_of(p.alignment.T_enu_world)},
                                    {"position_sigma_m", numbers(p.alignment.position_sigma)},
                                    {"rotation_sigma_rad", numbers(p.alignment.rotation_sigma)}});
 }

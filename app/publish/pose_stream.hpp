@@ -1,13 +1,8 @@
 #pragma once
-#include <cstdint>
-#include <optional>
 #include <span>
-#include <string>
-#include <string_view>
 
 #include "app/session/records.hpp"
 #include "core/calibration/options.hpp"
-#include "core/comparison/comparison.hpp"
 #include "core/comparison/enu_alignment.hpp"
 #include "drivers/ins.hpp"
 

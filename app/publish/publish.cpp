@@ -2,17 +2,9 @@
 
 #include <sys/random.h>
 
-#include <algorithm>
-#include <array>
-#include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
-
-#include <fmt/format.h>
-
-#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 namespace {
@@ -34,9 +26,9 @@ std::string read_token(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line(kMaxToken + 2, '\0');
   if (!in)
-    throw InputError(fmt::format(
+    throw InputError(
         "publish.token_file: {} cannot be read; create it with one line of letters and digits",
-        file.string()));
+        file.string());
   in.getline(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(std::strlen(line.c_str()));
   const bool plain = std::ranges::all_of(line, [](char c) {
@@ -45,9 +37,9 @@ std::string read_token(const std::filesystem::path& file) {
   });
   if (line.size() < kMinToken || line.size() > kMaxToken || !plain)
     throw InputError(
-        fmt::format("publish.token_file: the first line of {} is not a token; write {} to {} "
-                    "letters, digits, - and _",
-                    file.string(), kMinToken, kMaxToken));
+        "publish.token_file: the first line of {} is not a token; write {} to {} letters, digits, "
+        "- and _",
+        file.string(), kMinToken, kMaxToken);
   return line;
 }
 
@@ -59,8 +51,8 @@ Publishing::Publishing(bool page, Configuration* configuration, SessionOptions* 
   if (!settings.pose_stream.empty()) {
     const LineAddress address = parse_line_address(settings.pose_stream, "publish.pose_stream");
     try {
-      lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.pose_stream"),
-                                               &requests_, configuration->calibration);
+      lines_ = make_line_publisher(open_line_socket(address, "publish.pose_stream"), &requests_,
+                                   configuration->calibration);
     } catch (const InputError& e) {
       fmt::print(stderr, "vergence: {}; the run continues without the pose stream\n", e.what());
     }

@@ -1,7 +1,4 @@
 #pragma once
-#include <memory>
-
-#include "app/config/configuration.hpp"
 #include "app/publish/line_publisher.hpp"
 #include "app/publish/live_page.hpp"
 #include "app/session/session_runner.hpp"
@@ -23,8 +20,7 @@ class Publishing {
   void open_page(const Configuration& configuration);
 
   SessionRequests requests_;
-  std::unique_ptr<LinePublisher> lines_;
-  std::unique_ptr<SessionObserver> page_;
+  std::unique_ptr<SessionObserver> lines_, page_;
 };
 
 }  // namespace vergence::app

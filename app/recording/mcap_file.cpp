@@ -4,12 +4,8 @@
 #include <libdeflate.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cassert>
 #include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <string_view>
 
 namespace vergence::app {
 

@@ -1,11 +1,7 @@
 #pragma once
 #include <sys/uio.h>
 
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>

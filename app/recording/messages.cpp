@@ -2,7 +2,6 @@
 
 #include <libdeflate.h>
 
-#include <algorithm>
 #include <set>
 
 #include <fmt/format.h>
@@ -213,9 +212,8 @@ void write_nav_sat_fix(CdrWriter* out, Stamp stamp, std::string_view frame,
 }
 
 void write_nav_sat_fix(CdrWriter* out, const InsSample& s) noexcept {
-  FixMessage fix;
-  fix.fix = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d;
-  fix.position = s.position;
+  FixMessage fix{.fix = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d,
+                 .position = s.position};
   fix.covariance[0] = fix.covariance[4] = s.position_sigma * s.position_sigma;
   fix.covariance[8] = s.height_sigma * s.height_sigma;
   if (s.position_sigma > 0) fix.known = FixMessage::Known::diagonal;
@@ -258,8 +256,7 @@ void write_odometry(CdrWriter* out, Stamp stamp, std::string_view frame, std::st
 }
 
 void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept {
-  OdometryMessage odometry;
-  odometry.pose_covariance = full_matrix(sample.covariance);
+  OdometryMessage odometry{.pose_covariance = full_matrix(sample.covariance)};
   if (sample.status != PoseStatus::lost)
     odometry.pose = sample.T_world_left;
   else

@@ -1,17 +1,9 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "app/recording/cdr_writer.hpp"
-#include "core/math/se3.hpp"
-#include "core/types/calibration.hpp"
-#include "core/types/image.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
 #include "drivers/ins.hpp"

@@ -1,19 +1,12 @@
 #include "app/recording/recording.hpp"
 
-#include <pthread.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <cassert>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <system_error>
-#include <utility>
-
-#include <fmt/format.h>
 
 #include "app/runtime/errors.hpp"
 #include "app/runtime/file_descriptor.hpp"
@@ -115,10 +108,6 @@ void RecordRing::commit(std::size_t size) noexcept {
 std::span<const std::uint8_t> RecordRing::waiting() const noexcept {
   const Count head = head_.load(std::memory_order_relaxed);
   return {place(head), static_cast<std::size_t>(tail_.load(std::memory_order_acquire) - head)};
-}
-
-void RecordRing::release(std::size_t size) noexcept {
-  head_.store(head_.load(std::memory_order_relaxed) + size, std::memory_order_release);
 }
 
 Recording::Recording(const std::filesystem::path& folder, const Options& options)

@@ -1,25 +1,13 @@
 #pragma once
-#include <array>
-#include <atomic>
 #include <climits>
 #include <condition_variable>
-#include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <mutex>
-#include <span>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include "app/recording/mcap_file.hpp"
 #include "app/recording/messages.hpp"
 #include "app/runtime/queue_thread.hpp"
-#include "core/memory/arena.hpp"
-#include "core/memory/ring.hpp"
-#include "core/types/time.hpp"
-#include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
 
@@ -48,7 +36,9 @@ class RecordRing {
   /// All committed and unreleased records, oldest first.
   [[nodiscard]] std::span<const std::uint8_t> waiting() const noexcept;
   /// Releases the first `size` bytes of waiting().
-  void release(std::size_t size) noexcept;
+  void release(std::size_t size) noexcept {
+    head_.store(head_.load(std::memory_order_relaxed) + size, std::memory_order_release);
+  }
 
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
   [[nodiscard]] std::size_t fill() const noexcept {

@@ -2,7 +2,6 @@
 
 #include <array>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/errors.hpp"
@@ -46,10 +45,9 @@ SessionDescription parse_session_description(std::string_view json, const std::s
     const auto j = nlohmann::json::parse(json);
     if (const int version = j.at("version"); version != SessionDescription::kVersion)
       throw InputError(
-          fmt::format("{}: is a recording of version {}; this program reads version {}; replay it "
-                      "with the program that made it ({})",
-                      name, version, SessionDescription::kVersion,
-                      j.value("program", "of an unknown version")));
+          "{}: is a recording of version {}; this program reads version {}; replay it with the "
+          "program that made it ({})",
+          name, version, SessionDescription::kVersion, j.value("program", "of an unknown version"));
     SessionDescription d;
     for_each_member(d, [&](const char* key, auto& value) { j.at(key).get_to(value); });
     d.trust = to_enum<CalibrationTrust>(kTrust, j.at("trust"), name);

@@ -5,7 +5,6 @@
 #include <cctype>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include <fmt/format.h>
 
@@ -300,8 +299,8 @@ class Assessor {
         sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", metric("measured_px"), sigma)
                   : fmt::format("{:.0f} px or even further off", metric("measured_px"));
     const std::string reason = fmt::format(
-        "the configured focal length, {:.0f} px, is {} by the images, which give {}; distances "
-        "are wrong by the same ratio",
+        "the configured focal length, {:.0f} px, is {} by the images, which give {}; distances are "
+        "wrong by the same ratio",
         metric("configured_px"), contradicted ? "contradicted" : "not supported", measured);
     constexpr const char* kFix =
         "Set the focal length in pixels of these images (cameras.N.intrinsics or --focal); "

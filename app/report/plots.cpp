@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 
 #include <fmt/format.h>
 #include <Eigen/Geometry>
@@ -320,8 +319,8 @@ std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
   constexpr double kSmallest = 1;
   const double width = std::max(bounds.sizes().x(), kSmallest),
                depth = std::max(bounds.sizes().y(), kSmallest);
-  MapScale scale;
-  scale.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
+  MapScale scale{
+      .per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth)};
   scale.height = std::clamp(depth * scale.per_metre + kMargin + kFoot, kMin, kMax);
   scale.x_middle = bounds.center().x(), scale.y_middle = bounds.center().y();
   Svg svg(kPlotWidth, scale.height, "Trajectory seen from above");

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -307,8 +306,8 @@ std::string calibration_sections(const Session& s, const Analysis& a) {
     body +=
         "Each plot shows one component of T_camera_left over time. The line is the value in use, "
         "the band ± 2 σ (sigma_total). Hollow red marks are rejected calibrations; hollow grey "
-        "marks "
-        "are online estimates that left the calibration unchanged; calibrations.csv has them all.";
+        "marks are online estimates that left the calibration unchanged; calibrations.csv has them "
+        "all.";
   body += "</p>";
   return section("wide long", "Calibration", body) + plots;
 }
@@ -318,8 +317,7 @@ std::string footer(const Session& s) {
                     hash = text_at(s.summary, "configuration_hash");
   return fmt::format(
       "<p class=\"soft\" style=\"margin-top:12px\"><code>vergence report SESSION</code> "
-      "regenerates "
-      "this page from the session's files.{}{}</p>\n",
+      "regenerates this page from the session's files.{}{}</p>\n",
       version.empty() ? "" : " Recorded with version " + escape(version, 60) + ".",
       hash.empty() ? "" : " Configuration " + escape(hash, 60) + ".");
 }
@@ -366,11 +364,6 @@ std::string page_html(const Session& session, const Analysis& analysis,
   return out;
 }
 
-}  // namespace
-}  // namespace report
-
-namespace {
-
 /// The first of them, and how many more there are: a line of a terminal has no room for all.
 std::string first_message(const std::vector<std::string>& messages, const char* none) {
   if (messages.empty()) return none;
@@ -379,24 +372,25 @@ std::string first_message(const std::vector<std::string>& messages, const char* 
 }
 
 }  // namespace
+}  // namespace report
 
 ReportOutcome write_report(const std::filesystem::path& session_folder) {
   const report::Session session = report::read_session(session_folder);
   const report::Analysis analysis = report::analyse(session);
-  ReportOutcome outcome;
-  outcome.page = session_folder / "report.html";
-  outcome.assessment = report::assess(session, analysis);
-  outcome.missing = session.missing;
+  ReportOutcome outcome{.page = session_folder / "report.html",
+                        .assessment = report::assess(session, analysis),
+                        .missing = session.missing};
   replace_durably(outcome.page, report::page_html(session, analysis, outcome.assessment));
   return outcome;
 }
 
 std::array<std::string, 3> closing_lines(const ReportOutcome& outcome) {
   const report::Assessment& a = outcome.assessment;
-  const std::string why = a.usable ? fmt::format("{}: {}", report::spaced(a.grade),
-                                                 first_message(a.reasons, a.message.c_str()))
-                                   : "do not use these poses: " + a.main_reason;
-  return {"result: " + why, "to do: " + first_message(a.advice, "nothing"),
+  const std::string why = a.usable
+                              ? fmt::format("{}: {}", report::spaced(a.grade),
+                                            report::first_message(a.reasons, a.message.c_str()))
+                              : "do not use these poses: " + a.main_reason;
+  return {"result: " + why, "to do: " + report::first_message(a.advice, "nothing"),
           "report: " + outcome.page.string()};
 }
 

@@ -157,11 +157,12 @@ std::optional<Frame> parse_frame(const Columns& columns) {
   const auto state = word_to_enum(columns.text("state"), State::lost);
   const auto status = word_to_enum(columns.text("status"), PoseStatus::lost);
   if (!stamp || !state || !status) return std::nullopt;
-  Frame f;
-  f.stamp = Stamp(*stamp);
-  f.state = *state;
-  f.status = *status;
-  f.reason = word_to_enum(columns.text("reason"), Reason::pairing_ambiguous).value_or(Reason::none);
+  Frame f{
+      .stamp = Stamp(*stamp),
+      .state = *state,
+      .status = *status,
+      .reason =
+          word_to_enum(columns.text("reason"), Reason::pairing_ambiguous).value_or(Reason::none)};
   std::array<double, 7> world{};
   f.posed = numbers(columns, "", kWorld, &world) && f.status != PoseStatus::lost &&
             set_pose(world, &f.T_world_left);
@@ -251,8 +252,7 @@ Session read_session(const fs::path& folder) {
     throw InputError(folder.string() +
                      ": is not a session directory (no poses.csv, summary.json or events.jsonl); "
                      "pass the directory of --out");
-  Session s;
-  s.name = fs::weakly_canonical(folder, error).filename().string();
+  Session s{.name = fs::weakly_canonical(folder, error).filename().string()};
   read_part(folder / "summary.json",
             "the session was not closed (killed, or power lost); its metrics are unknown", &s, [&] {
               s.summary = nlohmann::json::parse(read_text(folder / "summary.json"), nullptr, false);

@@ -1,15 +1,11 @@
 #include "app/ros2/bridge.hpp"
 
-#include <algorithm>
-#include <utility>
-
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/transform_rows.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/math/so3.hpp"
 
 namespace vergence::app::ros2 {
 namespace {
@@ -41,15 +37,7 @@ Vec3 vector(const json& j) {
   return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
 }
 
-Transform transform(const json& rows) {
-  Transform T;
-  for (int i = 0; i < 3; ++i) {
-    const auto row = static_cast<std::size_t>(4 * i);
-    for (int k = 0; k < 3; ++k) T.R(i, k) = rows.at(row + static_cast<std::size_t>(k));
-    T.t(i) = rows.at(row + 3);
-  }
-  return T;
-}
+Transform transform(const json& rows) { return transform_of(rows.get<std::array<double, 12>>()); }
 
 /// Covariance from the 21 numbers of the upper triangle; unknown if null.
 Matrix6 covariance(const json& upper) {
@@ -204,9 +192,9 @@ std::optional<Bridge::Response> Bridge::add(std::string_view text) {
     const json line = json::parse(text);
     if (const json& version = line.at("version"); version != kVersion)
       throw InputError(
-          fmt::format("pose stream: vergence sends version {}, vergence-ros2 reads version {}; "
-                      "install both packages in the same version",
-                      version.dump(), kVersion));
+          "pose stream: vergence sends version {}, vergence-ros2 reads version {}; install both "
+          "packages in the same version",
+          version.dump(), kVersion);
     const std::string& type = line.at("type").get_ref<const std::string&>();
     if (type == "pose") on_pose(line);
     if (type == "calibration" && text != calibration_text_) {
@@ -246,9 +234,8 @@ void Bridge::on_pose(const json& line) {
   const Matrix6 in_world = widening * J * covariance(line.at("covariance")) * J.transpose();
   const Matrix6 turn = blocks(R, Mat3::Zero(), R);
 
-  OdometryMessage odometry;
-  odometry.pose = now.T_odom_child;
-  odometry.pose_covariance = items(turn * in_world * turn.transpose());
+  OdometryMessage odometry{.pose = now.T_odom_child,
+                           .pose_covariance = items(turn * in_world * turn.transpose())};
   measure_twist(line, now, widening, &odometry);
   publish(odometry_topic_, [&](CdrWriter* out) {
     write_odometry(out, now.stamp, options_.odom_frame, child_frame_, odometry);
@@ -301,10 +288,9 @@ void Bridge::publish_in_enu(Stamp stamp, const Transform& T_world_left, const Ma
   publish(pose_enu_topic_, [&](CdrWriter* out) {
     write_pose_with_covariance(out, stamp, options_.enu_frame, T_enu_child, items(P));
   });
-  FixMessage fix;
-  fix.fix = true;
-  fix.position = alignment_->plane.to_geodetic(T_enu_child.t);
-  fix.known = FixMessage::Known::all;
+  FixMessage fix{.fix = true,
+                 .position = alignment_->plane.to_geodetic(T_enu_child.t),
+                 .known = FixMessage::Known::all};
   for (int i = 0; i < 9; ++i) fix.covariance[static_cast<std::size_t>(i)] = P(i / 3, i % 3);
   publish(fix_topic_, [&](CdrWriter* out) { write_nav_sat_fix(out, stamp, child_frame_, fix); });
 }
@@ -350,10 +336,6 @@ void Bridge::on_calibration(const json& line) {
   }
 }
 
-std::string Bridge::camera_topic(std::size_t camera, const char* name) const {
-  return fmt::format("{}/{}/{}", options_.name_space, names_[camera], name);
-}
-
 void Bridge::publish_camera_info(std::size_t camera, Stamp stamp) {
   publish(camera_topic(camera, "camera_info"), [&](CdrWriter* out) {
     write_camera_info(out, stamp, optical_frame(names_[camera]), rig_, static_cast<int>(camera),
@@ -390,13 +372,12 @@ void Bridge::end_image(std::string_view pixels) {
 
 void Bridge::on_alignment(const json& line) {
   const json& o = line.at("origin");
-  Alignment a;
-  a.T_enu_world = transform(line.at("T_enu_world"));
-  a.plane = LocalTangentPlane(Geodetic{o.at("latitude_deg").get<double>(),
-                                       o.at("longitude_deg").get<double>(),
-                                       o.at("height_m").get<double>()});
-  a.position_variance = vector(line.at("position_sigma_m")).cwiseAbs2();
-  a.rotation_variance = vector(line.at("rotation_sigma_rad")).cwiseAbs2();
+  Alignment a{.T_enu_world = transform(line.at("T_enu_world")),
+              .plane = LocalTangentPlane(Geodetic{o.at("latitude_deg").get<double>(),
+                                                  o.at("longitude_deg").get<double>(),
+                                                  o.at("height_m").get<double>()}),
+              .position_variance = vector(line.at("position_sigma_m")).cwiseAbs2(),
+              .rotation_variance = vector(line.at("rotation_sigma_rad")).cwiseAbs2()};
   alignment_ = a;
 }
 

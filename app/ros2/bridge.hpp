@@ -1,17 +1,11 @@
 #pragma once
-#include <cstdint>
 #include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/recording/messages.hpp"
 #include "core/comparison/geodesy.hpp"
-#include "core/math/se3.hpp"
-#include "core/types/calibration.hpp"
 
 namespace vergence::app::ros2 {
 
@@ -95,7 +89,10 @@ class Bridge {
   void on_alignment(const nlohmann::json& line);
   void on_status(const nlohmann::json& line);
   void publish_camera_info(std::size_t camera, Stamp stamp);
-  [[nodiscard]] std::string camera_topic(std::size_t camera, const char* name) const;
+  [[nodiscard]] std::string camera_topic(std::size_t camera, const char* name) const {
+    return fmt::format("{}/{}/{}", options_.name_space, names_[camera], name);
+  }
+
   void measure_twist(const nlohmann::json& line, const PosedChild& now, double widening,
                      OdometryMessage* odometry) const;
   void publish_in_enu(Stamp stamp, const Transform& T_world_left, const Covariance& covariance);

@@ -2,18 +2,13 @@
 
 #include <sys/eventfd.h>
 
-#include <algorithm>
-#include <array>
 #include <cstdlib>
-#include <cstring>
 #include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
-#include <vector>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fmt/format.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -165,9 +160,9 @@ struct DdsNode::Parts : dds::DataReaderListener {
   Entity* required(Entity* entity, std::string_view what) const {
     if (entity == nullptr)
       throw InputError(
-          fmt::format("ROS_DOMAIN_ID: domain {} cannot be joined (no {}); check the network, the "
-                      "ports from {} on and the Fast DDS profile",
-                      domain, what, 7400 + 250 * domain));
+          "ROS_DOMAIN_ID: domain {} cannot be joined (no {}); check the network, the ports from {} "
+          "on and the Fast DDS profile",
+          domain, what, 7400 + 250 * domain);
     return entity;
   }
 

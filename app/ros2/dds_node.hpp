@@ -1,9 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <memory>
-#include <span>
-#include <string>
-#include <string_view>
 
 #include "app/ros2/bridge.hpp"
 

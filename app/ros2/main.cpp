@@ -4,25 +4,18 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
-#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
 #include <deque>
 #include <exception>
-#include <memory>
 #include <numbers>
-#include <string>
 
-#include <fmt/format.h>
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
-#include "app/ros2/bridge.hpp"
 #include "app/ros2/dds_node.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/runtime/file_descriptor.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/runtime/version.hpp"
@@ -82,16 +75,15 @@ void declare(CLI::App* app, Options* o) {
 void finish(Options* o) {
   // The pose stream does not accept a lower rate.
   if (o->image_rate_hz > 0 && o->image_rate_hz < 0.01)
-    throw InputError(
-        fmt::format("--image-rate-hz {:g}: must be 0 or 0.01 to 200", o->image_rate_hz));
+    throw InputError("--image-rate-hz {:g}: must be 0 or 0.01 to 200", o->image_rate_hz);
   std::string& space = o->bridge.name_space;
   if (!space.starts_with('/')) space.insert(0, "/");
   while (space.ends_with('/')) space.pop_back();
   for (const char c : space)
     if (!(c == '/' || c == '_' || (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') ||
           (c >= 'A' && c <= 'Z')))
-      throw InputError(fmt::format(
-          "--namespace: \"{}\" is not a ROS name; use letters, digits, _ and /", space));
+      throw InputError("--namespace: \"{}\" is not a ROS name; use letters, digits, _ and /",
+                       space);
   o->bridge.images = o->image_rate_hz > 0;
   o->bridge.camera_child = o->child == "camera";
   const auto& x = o->camera_xyz_m;
@@ -115,10 +107,10 @@ class PoseStreamClient {
     constexpr std::string_view kUnix = "unix://";
     if (address.starts_with(kUnix)) path_ = address.substr(kUnix.size());
     if (!path_.starts_with('/') || path_.size() >= sizeof(sockaddr_un::sun_path))
-      throw InputError(fmt::format(
+      throw InputError(
           "--socket: \"{}\" is not unix:///PATH of at most {} bytes; give the address of "
           "publish.pose_stream",
-          address.substr(0, 120), sizeof(sockaddr_un::sun_path) - 1));
+          address.substr(0, 120), sizeof(sockaddr_un::sun_path) - 1);
   }
 
   /// Returns 0 if connected, else errno.
@@ -243,10 +235,10 @@ class Program {
       fmt::print(stderr, "vergence-ros2: connected to {}\n", client_.path());
       waiting_reported_ = false;
     } else if (!waiting_reported_) {
-      fmt::print(stderr,
-                 "vergence-ros2: {}: {}; waiting for vergence with "
-                 "publish.pose_stream: unix://{}\n",
-                 client_.path(), std::strerror(error), client_.path());
+      fmt::print(
+          stderr,
+          "vergence-ros2: {}: {}; waiting for vergence with publish.pose_stream: unix://{}\n",
+          client_.path(), std::strerror(error), client_.path());
       waiting_reported_ = true;
     }
   }

@@ -73,10 +73,6 @@ void BackgroundThread::start(TaskRef task) noexcept {
   asked_.notify_one();
 }
 
-bool BackgroundThread::busy() noexcept {
-  return done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed);
-}
-
 void BackgroundThread::wait() noexcept {
   if (busy()) await_change(done_, asked_.load(std::memory_order_relaxed) - 1);
 }

@@ -27,7 +27,10 @@ class BackgroundThread final : public BackgroundRunner {
   ~BackgroundThread() override;
 
   void start(TaskRef task) noexcept override;
-  [[nodiscard]] bool busy() noexcept override;
+  [[nodiscard]] bool busy() noexcept override {
+    return done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed);
+  }
+
   void wait() noexcept override;
 
  private:

@@ -7,8 +7,6 @@
 #include <cstdlib>
 #include <iostream>
 
-#include <fmt/format.h>
-
 #include "app/runtime/terminal_text.hpp"
 #include "drivers/clock.hpp"
 
@@ -134,11 +132,6 @@ void Progress::redraw(const std::string& whole) {
   if (columns_ > used) text.append(std::min(columns_, room) - used, ' ');
   out_ << text << std::flush;
   columns_ = used;
-}
-
-/// Escape sequence that erases the line.
-std::string Progress::wiped() const {
-  return columns_ > 0 ? '\r' + std::string(columns_, ' ') + '\r' : "";
 }
 
 }  // namespace vergence::app

@@ -6,6 +6,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
 
 #include "core/types/time.hpp"
 
@@ -57,6 +60,11 @@ class Progress {
   void update(const ProgressState& state);
   /// Prints a message on its own line, also with `quiet`.
   void print(std::string_view message);
+  /// Same with a formatted message.
+  template <class First, class... Rest>
+  void print(fmt::format_string<First, Rest...> message, First&& first, Rest&&... rest) {
+    print(fmt::format(message, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
   /// Draws the last state and ends the line. Later updates start a new one.
   void finish();
 
@@ -64,7 +72,11 @@ class Progress {
   [[nodiscard]] std::string line(HostStamp now) const;
   void draw(HostStamp now);
   void redraw(const std::string& whole);
-  [[nodiscard]] std::string wiped() const;
+  /// Escape sequence that erases the line.
+  [[nodiscard]] std::string wiped() const {
+    return columns_ > 0 ? '\r' + std::string(columns_, ' ') + '\r' : "";
+  }
+
   void put_line(std::string_view line);
 
   std::ostream& out_;

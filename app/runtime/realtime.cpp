@@ -49,8 +49,6 @@ bool memory_limited() noexcept {
   return (data[0].effective & (1U << CAP_IPC_LOCK)) == 0;
 }
 
-std::string reason(int error) { return std::strerror(error); }
-
 /// Takes a number from the front of the text; false: there is none, or no such processor.
 bool parse_number(std::string_view* text, int* number) noexcept {
   const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), *number);
@@ -107,7 +105,7 @@ std::vector<std::string> RealtimeThreads::lock_memory() {
     return {
         fmt::format("realtime.lock_memory is refused ({}); the run continues without it; allow it "
                     "with `ulimit -l unlimited`, in a service with LimitMEMLOCK=infinity",
-                    reason(error))};
+                    std::strerror(error))};
   if (locked == RealtimeSystem::Locked::present)
     return {
         "realtime.lock_memory: present memory is locked, but the limit prevents locking later "
@@ -151,7 +149,7 @@ void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string
       fmt::format("realtime.priority: {} is refused priority {} ({}); the run continues without "
                   "it; allow it with `sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v "
                   "vergence)`, in a service with LimitRTPRIO={}",
-                  thread.name, priority, reason(error), settings_.priority));
+                  thread.name, priority, std::strerror(error), settings_.priority));
 }
 
 void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
@@ -162,7 +160,7 @@ void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool sol
   messages->push_back(
       fmt::format("realtime.{}: none of these processors is available ({}); the run continues on "
                   "all; `taskset -pc $$` lists the available ones",
-                  solver ? "solver_affinity" : "affinity", reason(error)));
+                  solver ? "solver_affinity" : "affinity", std::strerror(error)));
 }
 
 std::optional<cpu_set_t> parse_cpu_list(std::string_view text) noexcept {

@@ -12,8 +12,6 @@ class ServiceManager {
  public:
   /// Reads the environment of the process.
   ServiceManager();
-  ServiceManager(const ServiceManager&) = delete;
-  ServiceManager& operator=(const ServiceManager&) = delete;
 
   void ready() noexcept { send("READY=1"); }
   /// Last call; repeated calls have no effect. What follows, such as the report of a long run, may

@@ -1,8 +1,6 @@
 #include "app/session/calibration_writer.hpp"
 
 #include <cstring>
-#include <string_view>
-#include <utility>
 
 #include "app/config/calibration_state.hpp"
 #include "app/runtime/errors.hpp"
@@ -26,18 +24,6 @@ CalibrationWriter::CalibrationWriter(Options options)
       [this](const Item* item) {
         if (item != nullptr) process(*item);
       });
-}
-
-void CalibrationWriter::post(const Item& item) noexcept {
-  if (!thread_.post(item)) ++dropped_;
-}
-
-void CalibrationWriter::on_event(const EventRecord& event) noexcept {
-  if (std::string_view(event.kind) == "calibration_verified") post(event.stamp);
-}
-
-void CalibrationWriter::on_calibration(const CalibrationRecord& calibration) noexcept {
-  post(calibration);
 }
 
 void CalibrationWriter::process(const Item& item) {

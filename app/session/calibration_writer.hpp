@@ -1,17 +1,8 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <variant>
-#include <vector>
-
 #include "app/config/calibration_file.hpp"
 #include "app/runtime/queue_thread.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
-#include "core/memory/ring.hpp"
 
 namespace vergence::app {
 
@@ -54,8 +45,12 @@ class CalibrationWriter final : public SessionObserver {
   explicit CalibrationWriter(Options options);
   ~CalibrationWriter() override { thread_.stop(); }
 
-  void on_event(const EventRecord& event) noexcept override;
-  void on_calibration(const CalibrationRecord& calibration) noexcept override;
+  void on_event(const EventRecord& event) noexcept override {
+    if (std::string_view(event.kind) == "calibration_verified") post(event.stamp);
+  }
+
+  void on_calibration(const CalibrationRecord& calibration) noexcept override { post(calibration); }
+
   /// Pops the oldest event about writing the state file: `calibration_saved`, or
   /// `calibration_save_failed`. Returns false if there is none.
   [[nodiscard]] bool next(EventRecord* event) noexcept { return events_.pop(event); }
@@ -76,7 +71,10 @@ class CalibrationWriter final : public SessionObserver {
   // A Stamp means that the calibration in use was verified then.
   using Item = std::variant<CalibrationRecord, Stamp>;
 
-  void post(const Item& item) noexcept;
+  void post(const Item& item) noexcept {
+    if (!thread_.post(item)) ++dropped_;
+  }
+
   void process(const Item& item);
   void write(const CalibrationRecord& calibration);
   void write(Stamp verified);

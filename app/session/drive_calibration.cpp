@@ -1,30 +1,21 @@
 #include "app/session/drive_calibration.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <iostream>
 #include <iterator>
-#include <memory>
-#include <numbers>
 #include <numeric>
-
-#include <fmt/format.h>
 
 #include "app/datasets/frame_decoder.hpp"
 #include "app/devices/camera_masks.hpp"
-#include "app/runtime/background_thread.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
 #include "core/calibration/segment_solver.hpp"
-#include "core/estimator/estimator.hpp"
-#include "core/math/so3.hpp"
+#include "core/math/angle.hpp"
 
 namespace vergence::app {
 namespace {
 
 // Depth in metres at which independent solutions are compared.
 constexpr double kComparedDepth = 20;
-constexpr const char* kInterrupted = "interrupted";
 // Limits of a calibration pass, which need not keep up with the frame rate.
 constexpr int kMoreFeatures = 2, kMaxFeatures = 1000;
 // Maximum number of observations in a background solve.
@@ -36,12 +27,10 @@ constexpr std::size_t kAloneFrames = 40;
 calibration::AcceptanceInput make_gate_input(const calibration::RigSolution& s,
                                              const StartingCalibration& given,
                                              const Configuration& c) {
-  calibration::AcceptanceInput q;
-  q.solution = &s;
-  q.nominal = &given.nominal;
-  q.pixel_sigma = c.odometry.pixel_sigma;
-  q.must_be_better = false;
-  return q;
+  return {.solution = &s,
+          .nominal = &given.nominal,
+          .pixel_sigma = c.odometry.pixel_sigma,
+          .must_be_better = false};
 }
 
 /// As many frames as make the drive's stretches equally long, at most `most`.
@@ -71,17 +60,13 @@ std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCa
   bool stopped = false;
   for (DecodedPair pair; decoder.next(&pair);) {
     if (pair.decoded) {
-      RigFrame frame;
-      frame.number = pair.frame;
-      frame.stamp = pair.stamp;
-      frame.cameras = 2;
+      RigFrame frame{.number = pair.frame, .stamp = pair.stamp, .cameras = 2};
       for (std::size_t k = 0; k < 2; ++k) frame.images[k] = pool.view(pair.slots[k]);
       const PoseSample sample = estimator.process(frame);
       if (watch) watch(estimator, sample);
       decoder.release(pair);
     }
-    if (pass.progress) pass.progress(++done);
-    if (pass.stopped && pass.stopped()) {
+    if (pass.progress && !pass.progress(++done)) {
       decoder.stop();
       stopped = true;
     }
@@ -99,7 +84,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
       std::max(c.odometry.features, std::min(kMoreFeatures * c.odometry.features, kMaxFeatures));
   c.calibration.max_observations = std::max(c.calibration.max_observations, kObservations);
   c.online = 1;
-  const DrivePass pass{drive.sequence, c, drive.start, drive.count, drive.stopped, drive.progress};
+  const DrivePass pass{drive.sequence, c, drive.start, drive.count, drive.progress};
   StartingCalibration blank = given;
   apply_use({.length_only = true}, &blank.file.rig);
   blank.trust = CalibrationTrust::none;
@@ -112,9 +97,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   });
   if (!first) {
     result.why =
-        pass.stopped && pass.stopped()
-            ? kInterrupted
-            : "none was found; replay with --from-scratch, and see the reasons in calibrations.csv";
+        "none was found; replay with --from-scratch, and see the reasons in calibrations.csv";
     return result;
   }
   StartingCalibration found = given;
@@ -148,10 +131,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
         keep(joined.add(e.tracks()));
         keep_solution(alone.add(e.tracks()));
       });
-  if (!second) {
-    result.why = kInterrupted;
-    return result;
-  }
+  if (!second) return result;
   keep(joined.end());
   keep_solution(alone.end());
   for (std::size_t i = 1; i < result.stretches.size(); ++i) {
@@ -179,18 +159,17 @@ DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCa
   constexpr std::size_t kPasses = 2;
   std::size_t before = 0, last = 0;
   DrivePass watched = pass;
-  watched.stopped = [&] { return signals.stop_requested(); };
   watched.progress = [&](std::size_t done) {
     // A smaller count means that the next pass has begun.
     if (done < last) before += last;
     last = done;
-    ProgressState state;
-    state.state = "calibrating from the sequence";
-    state.frame = before + done;
-    state.frames = kPasses * pass.count;
-    progress->update(state);
+    progress->update({.state = "calibrating from the sequence",
+                      .frame = before + done,
+                      .frames = kPasses * pass.count});
+    return !signals.stop_requested();
   };
   DriveCalibration found = calibrate_drive(watched, given);
+  if (!found.rig && signals.stop_requested()) found.why = "interrupted";
   progress->finish();
   return found;
 }
@@ -211,13 +190,13 @@ std::string describe(const DriveCalibration& found) {
       fmt::format_to(out, " {:.5f} ± {:.5f}", lens.distortion[i], lens.distortion_sigma[i]);
     text += '\n';
     if (k == 0) continue;
-    const Vec3 turn = log_so3(rig.T_camera_left[k].R) * (180 / std::numbers::pi);
+    const Vec3 turn = log_so3(rig.T_camera_left[k].R) * kDegreesPerRadian;
     const Vec3& t = rig.T_camera_left[k].t;
     const auto& sigma = rig.sigma_total[k];
     fmt::format_to(out,
                    "          rotation {:.4f} ± {:.4f}, {:.4f} ± {:.4f}, {:.4f} ± {:.4f} deg\n",
-                   turn.x(), sigma[0] * 180 / std::numbers::pi, turn.y(),
-                   sigma[1] * 180 / std::numbers::pi, turn.z(), sigma[2] * 180 / std::numbers::pi);
+                   turn.x(), sigma[0] * kDegreesPerRadian, turn.y(), sigma[1] * kDegreesPerRadian,
+                   turn.z(), sigma[2] * kDegreesPerRadian);
     fmt::format_to(out, "          t {:.3f} ± {:.3f}, {:.3f} ± {:.3f}, {:.3f} ± {:.3f} mm\n",
                    1e3 * t.x(), 1e3 * sigma[3], 1e3 * t.y(), 1e3 * sigma[4], 1e3 * t.z(),
                    1e3 * sigma[5]);
@@ -247,12 +226,12 @@ ExitCode calibrate_from_drive(ReplayRequest r, const std::filesystem::path& out)
   Progress progress = Progress::on_stderr(r.session.quiet);
   for (const std::string& message : sequence.remarks) progress.print("vergence: " + message);
   if (!sequence.assumptions.empty())
-    progress.print(fmt::format("vergence: assumed: {}", fmt::join(sequence.assumptions, "; ")));
+    progress.print("vergence: assumed: {}", fmt::join(sequence.assumptions, "; "));
   const DriveCalibration found =
       calibrate_with_progress({sequence, c, 0, sequence.pairs.size()}, given, signals, &progress);
   if (!found.rig) {
-    progress.print(fmt::format("vergence: {}: no calibration was found, no file is written: {}",
-                               r.data.string(), found.why));
+    progress.print("vergence: {}: no calibration was found, no file is written: {}",
+                   r.data.string(), found.why);
     return signals.stop_code().value_or(ExitCode::not_usable);
   }
   CalibrationFile written = given.file;

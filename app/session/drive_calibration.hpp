@@ -1,17 +1,5 @@
 #pragma once
-#include <filesystem>
-#include <functional>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "app/config/configuration.hpp"
-#include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
-#include "app/runtime/progress.hpp"
-#include "app/runtime/signals.hpp"
 #include "app/session/replay_session.hpp"
-#include "app/session/starting_calibration.hpp"
 #include "core/calibration/posterior.hpp"
 #include "core/calibration/rig_solver.hpp"
 
@@ -43,10 +31,9 @@ struct DrivePass {
   const Configuration& configuration;
   /// Range of frames.
   std::size_t start = 0, count = 0;
-  /// Called after every frame; may be empty.
-  std::function<bool()> stopped{};
-  /// Receives the number of frames done in this pass; may be empty.
-  std::function<void(std::size_t)> progress{};
+  /// Receives the number of frames done in this pass, and stops it by returning false; may be
+  /// empty.
+  std::function<bool(std::size_t)> progress{};
 };
 
 /// Processes the sequence once, without a session. Returns the calibration in use at the end; empty

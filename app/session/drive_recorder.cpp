@@ -1,12 +1,5 @@
 #include "app/session/drive_recorder.hpp"
 
-#include <algorithm>
-#include <string_view>
-
-#include <fmt/format.h>
-
-#include "app/config/calibration_file.hpp"
-#include "app/recording/session_description.hpp"
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/version.hpp"
 
@@ -75,9 +68,8 @@ std::vector<std::string> list_settings(const Configuration& c) {
 }
 
 std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts& facts) {
-  SessionDescription d;
-  d.program = version();
-  d.calibration = format_calibration(facts.begin.file);
+  SessionDescription d{.program = std::string(version()),
+                       .calibration = format_calibration(facts.begin.file)};
   CalibrationFile nominal = facts.begin.file;
   nominal.rig = facts.begin.nominal;
   d.nominal = format_calibration(nominal);
@@ -119,14 +111,12 @@ std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
 }
 
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
-  Recording::Options o;
-  o.topics = topics(facts.begin.file);
-  o.queues = {queue_bytes(c, facts), kPulseQueue};
-  o.preamble = {{session_topic, description(c, facts)}};
-  o.start = facts.first;
-  o.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
-  o.when_full = facts.when_full;
-  return o;
+  return {.topics = topics(facts.begin.file),
+          .preamble = {{session_topic, description(c, facts)}},
+          .roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000,
+          .queues = {queue_bytes(c, facts), kPulseQueue},
+          .start = facts.first,
+          .when_full = facts.when_full};
 }
 
 }  // namespace
@@ -205,11 +195,6 @@ void DriveRecorder::post_rig(Stamp stamp) noexcept {
     write_rig_transforms(out, stamp, rig_, frames_);
     rig_in_file_ = files;
   });
-}
-
-/// Each file of a split recording has the rig, so that it can be read without the others.
-bool DriveRecorder::rig_is_due() const noexcept {
-  return calibrated_ && rig_in_file_ != recording_.counters().files;
 }
 
 void DriveRecorder::on_pose(const FrameReport& report) noexcept {

@@ -1,21 +1,7 @@
 #pragma once
-#include <array>
-#include <atomic>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "app/config/configuration.hpp"
-#include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
 #include "app/runtime/background_thread.hpp"
 #include "app/session/frame_source.hpp"
-#include "app/session/session_observer.hpp"
-#include "drivers/acquisition/acquired.hpp"
 
 namespace vergence::app {
 
@@ -56,7 +42,10 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
             std::size_t most = kMessageRoom, bool bulky = false) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
-  [[nodiscard]] bool rig_is_due() const noexcept;
+  /// Each file of a split recording has the rig, so that it can be read without the others.
+  [[nodiscard]] bool rig_is_due() const noexcept {
+    return calibrated_ && rig_in_file_ != recording_.counters().files;
+  }
 
   const RecordSettings& settings_;
   const ReplayableSolverRunner& watch_;

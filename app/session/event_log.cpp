@@ -1,11 +1,5 @@
 #include "app/session/event_log.hpp"
 
-#include <algorithm>
-#include <string>
-#include <utility>
-
-#include <fmt/format.h>
-
 namespace vergence::app {
 namespace {
 
@@ -70,11 +64,7 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
   event.fields[0] = {"points_percent", std::int64_t{sample.effort.points_percent}};
   event.fields[1] = {"window_keyframes", std::int64_t{sample.effort.window_keyframes}};
   event.fields[2] = {"window_steps", std::int64_t{sample.effort.window_steps}};
-  log(event, true);
-}
-
-void EventLog::log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept {
-  log({stamp, kind, message}, to_user);
+  log(event);
 }
 
 void EventLog::log(const EventRecord& event, bool to_user) noexcept {
@@ -84,19 +74,18 @@ void EventLog::log(const EventRecord& event, bool to_user) noexcept {
 
 void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
-    progress->print(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
-                                notice.message.data()));
+    progress->print("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
+                    notice.message.data());
   FrameReport newest;
   bool any = false;
   while (reports_.pop(&newest)) any = true;
   if (!any) return;
-  ProgressState state;
-  state.state = describe_state(newest.pose.state, newest.pose.reason);
-  state.frame = newest.counts.read + newest.counts.skipped;
-  state.frames = frames;
-  state.path_m = newest.counts.path_m;
-  state.inliers = newest.pose.inliers;
-  state.estimate_ms = static_cast<double>(newest.pose.estimate_ms);
+  ProgressState state{.state = describe_state(newest.pose.state, newest.pose.reason),
+                      .frame = newest.counts.read + newest.counts.skipped,
+                      .frames = frames,
+                      .path_m = newest.counts.path_m,
+                      .inliers = newest.pose.inliers,
+                      .estimate_ms = static_cast<double>(newest.pose.estimate_ms)};
   if (newest.compared) state.from_ins_m = newest.error_enu.norm();
   progress->update(state);
 }

@@ -1,11 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <limits>
-#include <string_view>
 
 #include "app/runtime/progress.hpp"
 #include "app/session/session_observer.hpp"
-#include "core/estimator/estimator.hpp"
 #include "core/memory/ring.hpp"
 
 namespace vergence::app {
@@ -29,8 +26,7 @@ class EventLog {
   /// Call with each complete report: updates the progress.
   void collect(const FrameReport& report) noexcept { (void)reports_.push(report); }
   /// Logs an event of the session. `kind` points to a constant. `to_user` also prints it on stderr.
-  void log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept;
-  void log(const EventRecord& event, bool to_user) noexcept;
+  void log(const EventRecord& event, bool to_user = true) noexcept;
 
   /// Number of points and observations beyond the estimator's capacity.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }

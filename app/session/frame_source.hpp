@@ -1,20 +1,8 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <optional>
-#include <string>
-#include <variant>
-#include <vector>
-
 #include "app/datasets/trajectory_files.hpp"
 #include "app/recording/session_description.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/runtime/progress.hpp"
-#include "app/session/ins_comparison.hpp"
-#include "app/session/ins_file.hpp"
 #include "app/session/recorder.hpp"
-#include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "app/session/summary.hpp"
 #include "drivers/acquisition/acquired.hpp"

@@ -1,10 +1,10 @@
 #include "app/session/ins_comparison.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/transform_rows.hpp"
 #include "core/math/angle.hpp"
 
 namespace vergence::app {
@@ -14,15 +14,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 }  // namespace
-
-Json matrix_json(const Transform& T) {
-  Json matrix = Json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) matrix.push_back(T.R(row, column));
-    matrix.push_back(T.t(row));
-  }
-  return matrix;
-}
 
 Json ins_mount_json(const Transform& T_ins_left, const std::string& source) {
   const Vec3 turn = boresight_of(T_ins_left.R) * kDegreesPerRadian;
@@ -119,7 +110,7 @@ Json InsComparison::enu_json(const std::string& mount_source) const {
   Json alignments = Json::array();
   for (const auto& [stamp, p] : alignments_)
     alignments.push_back({{"stamp_ns", stamp.ns()},
-                          {"T_enu_world", matrix_json(p.T_enu_world)},
+                          {"T_enu_world", rows_of(p.T_enu_world)},
                           {"fitted_over_m", p.distance},
                           {"residual_m", p.residual},
                           {"heading_sigma_deg", p.rotation_sigma.z() * kDegreesPerRadian}});
@@ -173,8 +164,8 @@ void InsComparison::apply_enu_alignment(Stamp stamp) noexcept {
   if (alignments_.size() < kMaxPlacements) {
     alignments_.push_back({stamp, p});
     if (alignments_.size() == kMaxPlacements)
-      event_log_.log(stamp, "enu_alignment_limit",
-                     "too many ENU alignments for summary.json; poses.csv has all of them", true);
+      event_log_.log({stamp, "enu_alignment_limit",
+                      "too many ENU alignments for summary.json; poses.csv has all of them"});
   }
   output_->post(&SessionObserver::on_enu_alignment, p, comparison_.plane().origin());
   event_log_.log({stamp, "enu_alignment",
@@ -190,20 +181,19 @@ void InsComparison::record_sample(const InsSample& sample) noexcept {
   if (!sample.attitude_valid && sample.heading_source != HeadingSource::none &&
       !std::exchange(attitude_reported_, true))
     event_log_.log(
-        sample.stamp, "ins_without_attitude",
-        sample.heading_source == HeadingSource::heading
-            ? "the INS sends no roll and pitch (assumed level): position and heading are "
-              "compared"
-            : "the INS sends no attitude (assumed level): position and course are compared",
+        {sample.stamp, "ins_without_attitude",
+         sample.heading_source == HeadingSource::heading
+             ? "the INS sends no roll and pitch (assumed level): position and heading are "
+               "compared"
+             : "the INS sends no attitude (assumed level): position and course are compared"},
         false);
   if (counters.ins_contradicted > 0 && !std::exchange(contradiction_reported_, true))
-    event_log_.log(sample.stamp, "ins_attitude",
-                   "the INS heading differs from the direction of travel by more than 30 deg and "
-                   "is not used until it agrees: check its filter and ins.boresight_deg",
-                   true);
+    event_log_.log({sample.stamp, "ins_attitude",
+                    "the INS heading differs from the direction of travel by more than 30 deg and "
+                    "is not used until it agrees: check its filter and ins.boresight_deg"});
   if (std::exchange(jumps_, counters.jumps) != counters.jumps)
-    event_log_.log(sample.stamp, "ins_jump",
-                   "the INS position jumped: errors from here on include the jump", true);
+    event_log_.log({sample.stamp, "ins_jump",
+                    "the INS position jumped: errors from here on include the jump"});
 }
 
 void InsComparison::record_match(const ComparedPose& pose) noexcept {
@@ -214,7 +204,7 @@ void InsComparison::record_match(const ComparedPose& pose) noexcept {
   if (match_run_ != kSettled) return;
   const bool recorded = source_ == InsSource::recording;
   const auto log = [&](const char* kind, const char* message, bool to_user) {
-    event_log_.log(pose.pose.stamp, kind, message, to_user);
+    event_log_.log({pose.pose.stamp, kind, message}, to_user);
   };
   if (pose.ins == InsMatch::ok && matches_ > kSettled)
     log("ins_recovered", "the INS has a position again; the comparison continues", false);
@@ -238,14 +228,13 @@ void InsComparison::record_scale(const ComparedPose& pose) noexcept {
   scale_disagrees_ = pose.scale_disagrees;
   const Stamp stamp = pose.pose.stamp;
   if (!scale_disagrees_)
-    return event_log_.log(stamp, "scale_agrees", "the distance travelled agrees with the INS again",
-                          false);
+    return event_log_.log(
+        {stamp, "scale_agrees", "the distance travelled agrees with the INS again"}, false);
   event_log_.log({stamp, "scale_disagrees",
                   "the distance travelled is {:.1f} % {} than the INS's over {:.0f} m: measure the "
                   "baseline again",
                   100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter",
-                  scale_stretch_m_},
-                 true);
+                  scale_stretch_m_});
 }
 
 }  // namespace vergence::app

@@ -1,25 +1,11 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/session/event_log.hpp"
-#include "app/session/session_observer.hpp"
-#include "core/comparison/comparison.hpp"
-#include "core/comparison/enu_alignment.hpp"
 #include "core/math/se3.hpp"
-#include "core/types/ins_sample.hpp"
 
 namespace vergence::app {
 
-/// Rows of [R t], as summary.json has a transform.
-[[nodiscard]] nlohmann::ordered_json matrix_json(const Transform& T);
 /// INS-to-camera extrinsics and where they were read.
 [[nodiscard]] nlohmann::ordered_json ins_mount_json(const Transform& T_ins_left,
                                                     const std::string& source);

@@ -6,10 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
-#include <span>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "app/datasets/text_file.hpp"
 #include "core/math/angle.hpp"

@@ -1,24 +1,11 @@
 #include "app/session/live_source.hpp"
 
-#include <algorithm>
-#include <array>
-#include <chrono>
-#include <cmath>
-#include <memory>
-#include <utility>
-
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
-
 #include "app/devices/camera_masks.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/exposure_control.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/durable_file.hpp"
-#include "app/session/frame_source.hpp"
-#include "app/session/records.hpp"
-#include "drivers/acquisition/acquisition.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -183,9 +170,8 @@ class LiveSource final : public FrameSource {
   }
   [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override {
     if (acquisition_->missing().empty()) return std::nullopt;
-    progress->print(
-        fmt::format("vergence: camera {} was disconnected at the end; check its cable and power",
-                    fmt::join(acquisition_->missing(), ", ")));
+    progress->print("vergence: camera {} was disconnected at the end; check its cable and power",
+                    fmt::join(acquisition_->missing(), ", "));
     return ExitCode::device_failed;
   }
 

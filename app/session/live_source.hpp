@@ -1,12 +1,5 @@
 #pragma once
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "app/config/configuration.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/session/session_runner.hpp"
-#include "app/session/starting_calibration.hpp"
 
 namespace vergence::app {
 

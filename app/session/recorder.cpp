@@ -3,11 +3,7 @@
 #include <cerrno>
 #include <cstring>
 #include <new>
-#include <optional>
 #include <system_error>
-#include <utility>
-
-#include <fmt/format.h>
 
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/errors.hpp"
@@ -38,18 +34,13 @@ struct Recorder::Files {
   std::vector<LineFile*> all;
 };
 
-namespace {
-
-// Bytes of a line in which every character of an event's message is escaped as \uXXXX.
-constexpr std::size_t kLongestLine = 2048;
-
-}  // namespace
-
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options),
       files_(std::make_unique<Files>(folder, options)),
       newest_(options.first),
       thread_(options.when_full) {
+  // Bytes of a line in which every character of an event's message is escaped as \uXXXX.
+  constexpr std::size_t kLongestLine = 2048;
   line_.reserve(kLongestLine);
   for (LineFile* file : files_->all) {
     memory_ += file->pending();
@@ -60,14 +51,6 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
 }
 
 Recorder::~Recorder() { thread_.stop(); }
-
-void Recorder::on_reading(const InsRecord& reading) noexcept {
-  if (!thread_.post(reading, kOfPoses)) ++dropped_readings_;
-}
-
-void Recorder::post(const Record& record) noexcept {
-  if (!thread_.post(record)) ++dropped_records_;
-}
 
 void Recorder::begin() {
   // Writes the headers of the tables.

@@ -1,21 +1,11 @@
 #pragma once
-#include <array>
 #include <chrono>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
-#include <string>
-#include <variant>
-#include <vector>
 
 #include "app/runtime/queue_thread.hpp"
-#include "app/session/ins_file.hpp"
-#include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
-#include "core/memory/ring.hpp"
 
 namespace vergence::app {
 
@@ -61,7 +51,10 @@ class Recorder final : public SessionObserver {
   void on_report(const FrameReport& report) noexcept override { post(report); }
   void on_event(const EventRecord& event) noexcept override { post(event); }
   /// Precondition: Options::ins.
-  void on_reading(const InsRecord& reading) noexcept override;
+  void on_reading(const InsRecord& reading) noexcept override {
+    if (!thread_.post(reading, kOfPoses)) ++dropped_readings_;
+  }
+
   /// Bytes allocated at construction for waiting lines.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
   /// Messages about the disk since the last call.
@@ -80,7 +73,10 @@ class Recorder final : public SessionObserver {
   using Record = std::variant<FrameReport, EventRecord, InsRecord>;
   void begin();
   void process(const Record* record);
-  void post(const Record& record) noexcept;
+  void post(const Record& record) noexcept {
+    if (!thread_.post(record)) ++dropped_records_;
+  }
+
   void write(const FrameReport& report);
   void write(const EventRecord& event);
   void write(const InsRecord& reading);

@@ -14,10 +14,6 @@
 
 #include "core/comparison/comparison.hpp"
 #include "core/estimator/estimator.hpp"
-#include "core/types/calibration.hpp"
-#include "core/types/calibration_decision.hpp"
-#include "core/types/pose_sample.hpp"
-#include "core/types/rig_frame.hpp"
 #include "core/types/stamped_pose.hpp"
 
 /// Input of a session's observers: values of fixed size, made on the estimator's thread without

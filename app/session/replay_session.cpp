@@ -1,28 +1,14 @@
-#include "app/session/replay_session.hpp"
 
-#include <algorithm>
-#include <array>
-#include <atomic>
-#include <chrono>
-#include <cmath>
-#include <memory>
 #include <numbers>
-#include <utility>
-
-#include <fmt/format.h>
 
 #include "app/config/calibration_checks.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/recorded_session.hpp"
-#include "app/datasets/stereo_sequence.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/runtime/background_thread.hpp"
 #include "app/session/drive_calibration.hpp"
-#include "app/session/frame_source.hpp"
 #include "core/comparison/attitude_check.hpp"
 #include "core/math/robust.hpp"
-#include "core/memory/frame_pool.hpp"
 
 namespace vergence::app {
 namespace {
@@ -56,14 +42,12 @@ Duration usual_interval(const std::vector<InsRecord>& readings) {
 /// False: none is left.
 bool keep_around(const StereoSequence& sequence, std::size_t first, std::size_t count,
                  std::vector<InsRecord>* readings) {
-  Stamp begin = sequence.pairs[first].stamp, end = begin;
-  for (std::size_t i = first; i < first + count; ++i) {
-    begin = std::min(begin, sequence.pairs[i].stamp);
-    end = std::max(end, sequence.pairs[i].stamp);
-  }
-  std::erase_if(*readings, [&](const InsRecord& r) {
-    return r.sample.stamp < begin - kAround || r.sample.stamp > end + kAround;
-  });
+  const auto [begin, end] = std::ranges::minmax_element(
+      std::span(sequence.pairs).subspan(first, count), {}, &StereoPair::stamp);
+  std::erase_if(*readings,
+                [from = begin->stamp - kAround, to = end->stamp + kAround](const InsRecord& r) {
+                  return r.sample.stamp < from || r.sample.stamp > to;
+                });
   return !readings->empty();
 }
 
@@ -154,14 +138,12 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
 constexpr std::uint64_t kMaxListed = 1000;
 
 SourceEvent make_event(const DecodedPair& pair, std::uint64_t unread) noexcept {
-  SourceEvent event;
-  event.skipped = true;
-  event.listed = unread <= kMaxListed + 1;
-  event.record = {
-      pair.stamp, pair.kind,
-      unread <= kMaxListed
-          ? pair.issue.data()
-          : "1000 frames could not be read; further ones are only counted (summary.json: skipped)"};
+  SourceEvent event{.record = {pair.stamp, pair.kind,
+                               unread <= kMaxListed ? pair.issue.data()
+                                                    : "1000 frames could not be read; further ones "
+                                                      "are only counted (summary.json: skipped)"},
+                    .skipped = true,
+                    .listed = unread <= kMaxListed + 1};
   event.record.fields[0] = {"frame", static_cast<std::int64_t>(pair.frame)};
   return event;
 }
@@ -232,12 +214,9 @@ class RecordedSource final : public FrameSource {
     }
     if (ended_) return false;
     waiting_ = false;
-    SourceFrame frame;
-    frame.rig.number = pair_.frame;
-    frame.rig.stamp = pair_.stamp;
-    frame.rig.cameras = 2;
+    SourceFrame frame{.rig = {.number = pair_.frame, .stamp = pair_.stamp, .cameras = 2},
+                      .decode_ms = pair_.decode_ms};
     for (std::size_t k = 0; k < 2; ++k) frame.rig.images[k] = pool_.view(pair_.slots[k]);
-    frame.decode_ms = pair_.decode_ms;
     *item = frame;
     return true;
   }
@@ -284,13 +263,11 @@ const char* to_cause(const std::string& word) {
 
 /// Initial calibration of a recorded session. Throws InputError if its description is damaged.
 StartingCalibration recorded_beginning(const SessionDescription& d, const std::string& name) {
-  StartingCalibration begin;
-  begin.file = parse_calibration(d.calibration, name + " (calibration)");
-  begin.nominal = parse_calibration(d.nominal, name + " (nominal)").rig;
-  begin.trust = d.trust;
-  begin.cause = to_cause(d.cause);
-  begin.source = d.source;
-  return begin;
+  return {.file = parse_calibration(d.calibration, name + " (calibration)"),
+          .nominal = parse_calibration(d.nominal, name + " (nominal)").rig,
+          .trust = d.trust,
+          .cause = to_cause(d.cause),
+          .source = d.source};
 }
 
 /// A recorded session as the source of another: the estimator is given what it was given then, in
@@ -338,9 +315,9 @@ class SessionSource final : public FrameSource {
             (k >= static_cast<std::size_t>(rig.cameras) || image.width != rig.intrinsics[k].width ||
              image.height != rig.intrinsics[k].height))
           throw InputError(
-              fmt::format("{}: frame {} of the recording: the image of camera {} has {} x {} "
-                          "pixels, unlike the calibration; use the calibration of this recording",
-                          request.data.string(), frame.given.number, k, image.width, image.height));
+              "{}: frame {} of the recording: the image of camera {} has {} x {} pixels, unlike "
+              "the calibration; use the calibration of this recording",
+              request.data.string(), frame.given.number, k, image.width, image.height);
       }
     }
     // From the middle of a drive: what came before is not for it.
@@ -375,9 +352,9 @@ class SessionSource final : public FrameSource {
   void finish(Progress* progress) override {
     if (images_missing_ > 0)
       progress->print(
-          fmt::format("vergence: {} images are damaged or missing in the recording; frames were "
-                      "processed without them",
-                      images_missing_));
+          "vergence: {} images are damaged or missing in the recording; frames were processed "
+          "without them",
+          images_missing_);
     // Frees memory before the report is written.
     session_.clear_frames();
   }
@@ -472,7 +449,7 @@ bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
                      const StereoSequence& sequence, StartingCalibration* begin) {
   Progress progress = Progress::on_stderr(request.session.quiet);
   const DriveCalibration found = calibrate_with_progress(
-      {sequence, request.configuration, request.start, request.count_of(sequence), {}, {}}, *begin,
+      {sequence, request.configuration, request.start, request.count_of(sequence), {}}, *begin,
       signals, &progress);
   if (!found.rig) {
     progress.print("vergence: no calibration from the sequence: " + found.why);
@@ -514,9 +491,9 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
     begin.file = read_any_calibration(*request.calibration, ImageSize{lens.width, lens.height},
                                       &begin.remarks, use);
     if (begin.file.rig.cameras != recorded)
-      throw InputError(fmt::format(
+      throw InputError(
           "{}: has {} cameras, but {} was recorded with {}; use the calibration of that rig",
-          *request.calibration, begin.file.rig.cameras, request.data.string(), recorded));
+          *request.calibration, begin.file.rig.cameras, request.data.string(), recorded);
     begin.source = std::filesystem::path(*request.calibration).filename().string();
     for (const std::string& message : begin.remarks)
       if (!request.session.quiet) fmt::print(stderr, "vergence: {}\n", message);
@@ -533,9 +510,8 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
 
 void check_start(const ReplayRequest& request, std::size_t frames) {
   if (request.start >= frames)
-    throw InputError(
-        fmt::format("--start {} is beyond the end: {} has {} frames; choose a smaller index",
-                    request.start, request.data.string(), frames));
+    throw InputError("--start {} is beyond the end: {} has {} frames; choose a smaller index",
+                     request.start, request.data.string(), frames);
 }
 
 ExitCode replay_recording(const ReplayRequest& request) {
@@ -551,10 +527,10 @@ ExitCode replay_recording(const ReplayRequest& request) {
 
 StereoSequence open_drive(const ReplayRequest& request) {
   std::vector<std::string> remarks;
-  SequenceOptions o;
-  o.use = {request.from_scratch || request.known, request.baseline.value_or(0)};
-  o.cameras = {request.configuration.kitti_raw.left, request.configuration.kitti_raw.right};
-  o.topics = request.topics;
+  SequenceOptions o{
+      .use = {request.from_scratch || request.known, request.baseline.value_or(0)},
+      .cameras = {request.configuration.kitti_raw.left, request.configuration.kitti_raw.right},
+      .topics = request.topics};
   if (request.known) o.calibration = given_calibration(*request.known);
   if (request.calibration) o.calibration = given_calibration(*request.calibration, o.use, &remarks);
   StereoSequence sequence = open_sequence(request.format, request.data, o);

@@ -1,16 +1,5 @@
 #pragma once
-#include <algorithm>
-#include <cstddef>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "app/config/configuration.hpp"
-#include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/session/session_runner.hpp"
-#include "app/session/starting_calibration.hpp"
 
 namespace vergence::app {
 
@@ -22,11 +11,11 @@ struct ReplayRequest {
   /// Topics of a bag.
   BagTopics topics{};
   /// File of any supported program, in place of the data set's calibration.
-  std::optional<std::string> calibration;
+  std::optional<std::string> calibration{};
   /// Used in place of a calibration.
-  std::optional<AssumedIntrinsics> known;
+  std::optional<AssumedIntrinsics> known{};
   /// In m, in place of the calibration's length.
-  std::optional<double> baseline;
+  std::optional<double> baseline{};
   /// Uses only intrinsics and length of the calibration.
   bool from_scratch = false;
   /// Calibrates from the whole sequence before the replay.
@@ -34,8 +23,8 @@ struct ReplayRequest {
   /// Index of the first frame.
   std::size_t start = 0;
   /// Maximum number of frames; empty for all.
-  std::optional<std::size_t> frames;
-  Configuration configuration;
+  std::optional<std::size_t> frames{};
+  Configuration configuration{};
 
   /// Number of frames of the sequence to replay. Precondition: start is one of them.
   [[nodiscard]] std::size_t count_of(const StereoSequence& sequence) const {

@@ -1,19 +1,12 @@
 #pragma once
 #include <atomic>
-#include <cstdint>
-#include <optional>
 #include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "app/session/ins_file.hpp"
 #include "app/session/records.hpp"
 #include "core/calibration/track_log.hpp"
 #include "core/comparison/enu_alignment.hpp"
-#include "core/types/calibration.hpp"
-#include "core/types/pose_sample.hpp"
-#include "core/types/rig_frame.hpp"
 
 namespace vergence::app {
 

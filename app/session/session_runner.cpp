@@ -1,35 +1,21 @@
 #include "app/session/session_runner.hpp"
 
 #include <malloc.h>
-#include <pthread.h>
 
-#include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <cstdio>
-#include <functional>
 #include <future>
-#include <memory>
-#include <optional>
 #include <set>
-#include <string>
 #include <system_error>
-#include <utility>
-
-#include <fmt/format.h>
 
 #include "app/datasets/reference_track.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/report/report.hpp"
-#include "app/runtime/background_thread.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/nearest.hpp"
-#include "app/runtime/realtime.hpp"
 #include "app/runtime/service_manager.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/session/calibration_writer.hpp"
 #include "app/session/drive_recorder.hpp"
-#include "app/session/event_log.hpp"
 #include "app/session/session_quota.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "core/memory/thread_allocations.hpp"
@@ -135,13 +121,12 @@ class SessionRunner {
     }
   }
   void open_files() {
-    Recorder::Options to_record;
-    to_record.first = facts_.first;
-    to_record.when_full = facts_.when_full;
-    to_record.keep_trajectory = trajectory_is_asked_for();
-    to_record.ins = comparison_ != nullptr;
-    to_record.disk_full = facts_.disk_full;
-    recorder_ = std::make_unique<Recorder>(request_.out, to_record);
+    recorder_ = std::make_unique<Recorder>(
+        request_.out, Recorder::Options{.when_full = facts_.when_full,
+                                        .keep_trajectory = trajectory_is_asked_for(),
+                                        .ins = comparison_ != nullptr,
+                                        .first = facts_.first,
+                                        .disk_full = facts_.disk_full});
     calibrations_ = std::make_unique<CalibrationWriter>(CalibrationWriter::Options{
         request_.out, facts_.begin.file, facts_.begin.state, facts_.when_full});
     observers_ = {recorder_.get(), calibrations_.get()};
@@ -168,11 +153,10 @@ class SessionRunner {
     return comparison_ != nullptr || !facts_.truth.empty() || facts_.knows_truth;
   }
   [[nodiscard]] SessionStart session_start() const {
-    SessionStart start;
-    start.name = request_.out.filename().string();
-    start.first = facts_.first;
-    start.frames = facts_.frames;
-    start.tie = facts_.tie;
+    SessionStart start{.name = request_.out.filename().string(),
+                       .first = facts_.first,
+                       .frames = facts_.frames,
+                       .tie = facts_.tie};
     const CalibrationFile& file = facts_.begin.file;
     const RigCalibration& rig = file.rig;
     start.camera_names = distinct_names({file.names.begin(), file.names.begin() + rig.cameras});
@@ -187,10 +171,10 @@ class SessionRunner {
   void print_remarks() {
     warn(removed_);
     for (const std::string& message : removed_)
-      log_.log(facts_.first, "session_removed", message, false);
+      log_.log({facts_.first, "session_removed", message}, false);
     for (const SourceRemark& remark : facts_.remarks) {
       if (remark.print) progress_.print("vergence: " + remark.message);
-      if (remark.kind != nullptr) log_.log(facts_.first, remark.kind, remark.message, false);
+      if (remark.kind != nullptr) log_.log({facts_.first, remark.kind, remark.message}, false);
     }
   }
   /// Threads are examined at every poll in the first second, then once per second.
@@ -237,9 +221,9 @@ class SessionRunner {
       halt_source();
       leave_no_folder();
       throw InputError(
-          fmt::format("the estimator thread cannot be started ({}); raise the limit of processes "
-                      "(ulimit -u; in a service TasksMax) or of memory",
-                      e.code().message()));
+          "the estimator thread cannot be started ({}); raise the limit of processes (ulimit -u; "
+          "in a service TasksMax) or of memory",
+          e.code().message());
     }
   }
   /// Handles a session that ends before it began: a service is started again and again until its
@@ -264,8 +248,7 @@ class SessionRunner {
   }
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
                                            std::uint64_t runtime_allocations) const {
-    SummaryInput input;
-    input.dropped_by_estimator = log_.dropped();
+    SummaryInput input{.dropped_by_estimator = log_.dropped()};
     const Trajectory& reference = comparison_ != nullptr ? totals.reference : facts_.truth;
     if (!reference.empty() && !totals.trajectory.empty())
       input.evaluation = evaluate(totals.trajectory, reference, summary_evaluation_options());
@@ -307,11 +290,11 @@ class SessionRunner {
   }
   void print_metrics(const SessionTotals& totals, const SummaryInput& input) {
     progress_.print(
-        fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; "
-                    "estimator {:.1f} ms per frame, p99 {:.1f} ms",
-                    request_.out.string(), totals.read, totals.ok + totals.degraded,
-                    totals.degraded, totals.lost, input.skipped, facts_.skipped_label,
-                    totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
+        "session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; estimator {:.1f} "
+        "ms per frame, p99 {:.1f} ms",
+        request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded,
+        totals.lost, input.skipped, facts_.skipped_label, totals.path_m, totals.estimate.mean(),
+        totals.estimate.percentile(0.99));
     if (input.calibrated && !input.online)
       progress_.print("the calibration is not verified: calibration.online is off");
     else if (input.calibrated && !input.verified)
@@ -326,8 +309,7 @@ class SessionRunner {
     for (const auto* threads : {&allocations.own, &allocations.libraries})
       for (const auto& [name, count] : *threads)
         if (count > 0) list.push_back(fmt::format("{} {}", name, count));
-    if (!list.empty())
-      progress_.print(fmt::format("runtime heap allocations: {}", fmt::join(list, ", ")));
+    if (!list.empty()) progress_.print("runtime heap allocations: {}", fmt::join(list, ", "));
   }
   [[nodiscard]] ExitCode verdict(const SessionTotals& totals) {
     // Also without a pose the user is informed which device was disconnected.
@@ -364,7 +346,7 @@ class SessionRunner {
     // Number of columns.
     constexpr std::size_t kWidth = 110;
     for (const std::string& message : closing_lines(outcome))
-      progress_.print(fmt::format("{}", fmt::join(wrapped(message, kWidth), "\n  ")));
+      progress_.print("{}", fmt::join(wrapped(message, kWidth), "\n  "));
     return outcome.assessment.usable;
   }
   /// Bytes by component.
@@ -443,7 +425,7 @@ class SessionRunner {
 
   void request_recalibration(Stamp stamp, const char* message) noexcept {
     estimator_.request_recalibration();
-    log_.log(stamp, "recalibration_requested", message, true);
+    log_.log({stamp, "recalibration_requested", message});
   }
 
   /// Handles requests of viewers.
@@ -452,10 +434,10 @@ class SessionRunner {
     SessionRequests& requests = *request_.requests;
     if (requests.recalibrate.exchange(false) && facts_.on_request)
       request_recalibration(stamp, "a recalibration was requested on the live page");
-    if (requests.mark.exchange(false)) log_.log(stamp, "mark", "marked on the live page", true);
+    if (requests.mark.exchange(false)) log_.log({stamp, "mark", "marked on the live page"});
     if (requests.stop_recording.exchange(false) && recording_) {
-      log_.log(stamp, "recording_stopped", "recording stopped on the live page; the run continues",
-               true);
+      log_.log(
+          {stamp, "recording_stopped", "recording stopped on the live page; the run continues"});
       recording_->stop();
     }
   }

@@ -1,12 +1,6 @@
 #pragma once
-#include <filesystem>
-#include <vector>
-
-#include "app/config/configuration.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/session/frame_source.hpp"
-#include "app/session/session_observer.hpp"
 
 namespace vergence::app {
 

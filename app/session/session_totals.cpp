@@ -27,11 +27,6 @@ void SessionTotals::add(const FrameReport& report) {
     stages[i].add(static_cast<double>(p.stage_ms[i]));
 }
 
-/// An event comes before the pose of its frame, or after the last one.
-void SessionTotals::match_verified() {
-  if (verified == newest_ && !verified_frame && read > 0) verified_frame = newest_frame_;
-}
-
 void SessionTotals::add(const EventRecord& e) {
   const std::string_view kind = e.kind;
   if (kind == "calibration_verified" && !verified) {

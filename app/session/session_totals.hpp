@@ -1,13 +1,5 @@
 #pragma once
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "app/session/records.hpp"
 
@@ -140,7 +132,10 @@ struct SessionTotals : FrameCounts, CalibrationTotals {
   void add(const EventRecord& event);
 
  private:
-  void match_verified();
+  /// An event comes before the pose of its frame, or after the last one.
+  void match_verified() {
+    if (verified == newest_ && !verified_frame && read > 0) verified_frame = newest_frame_;
+  }
 
   Stamp newest_{};
   std::uint64_t newest_frame_ = 0;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <system_error>
 
-#include <fmt/format.h>
-
 #include "app/config/calibration_state.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 #include "app/devices/rig_settings.hpp"
@@ -87,19 +85,15 @@ GivenCalibration given_calibration(const std::string& in, const CalibrationUse& 
 GivenCalibration given_calibration(const AssumedIntrinsics& known) {
   return {"--focal", [known](const StereoSequence& sequence) {
             const ImageSize size = first_image_size(sequence, 0);
-            CalibrationFile file;
-            file.source = "given";
-            RigCalibration& rig = file.rig;
-            rig.cameras = 2;
-            rig.baseline = known.baseline;
-            Intrinsics lens;
-            lens.kind = known.model;
+            CalibrationFile file{.rig = {.cameras = 2, .baseline = known.baseline},
+                                 .source = "given"};
+            Intrinsics lens{.kind = known.model};
             lens.width = size.width, lens.height = size.height;
             lens.fx = lens.fy = known.focal;
             lens.cx = (size.width - 1) / 2.0, lens.cy = (size.height - 1) / 2.0;
             if (known.wide) lens.distortion = {-0.28, 0.07, 0, 0, 0};
-            rig.intrinsics = {lens, lens};
-            make_parallel(&rig);
+            file.rig.intrinsics = {lens, lens};
+            make_parallel(&file.rig);
             return file;
           }};
 }
@@ -123,15 +117,11 @@ RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibratio
 
 StartingCalibration starting_calibration(const Configuration& c, const CalibrationSource& source,
                                          const std::vector<std::string>& serials) {
-  StartingCalibration start;
-  CalibrationFile configured;
-  configured.rig = nominal_rig(c);
-  configured.source = "given";
+  CalibrationFile configured{.rig = nominal_rig(c), .source = "given"};
   name_cameras(c, serials, &configured);
   configured.configured = configured_rig(c);
-  start.file = configured;
-  start.source = "the configuration";
-  start.state = state_file(c.rig);
+  StartingCalibration start{
+      .file = configured, .source = "the configuration", .state = state_file(c.rig)};
 
   const bool from_scratch =
       source.from_scratch || (!source.file && !placed_by_configuration(c, configured.rig.cameras));
@@ -165,12 +155,10 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
 
 StartingCalibration replayed_calibration(const Configuration& c, const StereoSequence& sequence,
                                          bool from_scratch) {
-  StartingCalibration start;
-  start.file.rig = sequence.calibration;
-  start.file.rig_name = c.rig.name;
-  start.file.source = "given";
+  StartingCalibration start{
+      .file = {.rig = sequence.calibration, .rig_name = c.rig.name, .source = "given"},
+      .source = from_scratch ? "none" : sequence.calibration_source};
   name_cameras(c, {}, &start.file);
-  start.source = from_scratch ? "none" : sequence.calibration_source;
   if (from_scratch) start.trust = CalibrationTrust::none;
   start.nominal = nominal_geometry(sequence.calibration, sequence.calibration, c.calibration);
   return start;
@@ -180,16 +168,14 @@ EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trus
                                    Adoption adoption,
                                    const std::array<ImageView, kMaxCameras>& masks,
                                    Duration frame_budget) {
-  EstimatorOptions o;
-  o.frame_budget = frame_budget;
-  o.odometry = c.odometry;
-  o.calibration = c.calibration;
-  o.monitor = c.monitor;
-  o.trust = trust;
-  o.adoption = adoption;
-  o.online = c.online != 0;
-  o.masks = masks;
-  return o;
+  return {.odometry = c.odometry,
+          .calibration = c.calibration,
+          .monitor = c.monitor,
+          .trust = trust,
+          .adoption = adoption,
+          .masks = masks,
+          .frame_budget = frame_budget,
+          .online = c.online != 0};
 }
 
 }  // namespace vergence::app

@@ -1,11 +1,6 @@
 #pragma once
 #include <array>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
-#include "app/config/calibration_file.hpp"
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/estimator/estimator.hpp"

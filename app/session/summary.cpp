@@ -1,15 +1,10 @@
 #include "app/session/summary.hpp"
 
-#include <algorithm>
-#include <cmath>
-
-#include <fmt/format.h>
-
+#include "app/runtime/transform_rows.hpp"
 #include "app/runtime/version.hpp"
 #include "core/calibration/health.hpp"
 #include "core/features/simd_target.hpp"
 #include "core/math/angle.hpp"
-#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
@@ -123,13 +118,12 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   const RigCalibration& rig = input.calibration;
   Json json = {{"source", input.calibration_source},
                {"baseline_m", rig.T_camera_left[1].t.norm()},
-               {"T_right_left", input.calibrated ? matrix_json(rig.T_camera_left[1]) : Json()},
+               {"T_right_left", input.calibrated ? Json(rows_of(rig.T_camera_left[1])) : Json()},
                {"sigma_noise", sigmas_json(rig.sigma_noise[1])},
                {"sigma_total", sigmas_json(rig.sigma_total[1])},
                {"scale_sigma", rig.scale_sigma > 0 ? Json(rig.scale_sigma) : Json()},
                {"frames", rig.frames}};
-  const Json health = health_json(rig, input.options);
-  for (const auto& [key, value] : health.items()) json[key] = value;
+  json.update(health_json(rig, input.options));
   json["limited_by"] = limited_by(rig);
   json["online"] = input.online;
   json["verified"] = input.verified;
@@ -239,10 +233,9 @@ void print_evaluation(const char* reference, const std::optional<TrajectoryEvalu
       far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
       : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
                        : "";
-  progress->print(fmt::format(
-      "error against {} over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m (Sim(3), scale "
-      "{:.4f}){}",
-      reference, e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
+  progress->print(
+      "error against {} over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m (Sim(3), scale {:.4f}){}",
+      reference, e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments);
 }
 
 std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& estimate,

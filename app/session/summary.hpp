@@ -1,21 +1,12 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <map>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
-#include "app/runtime/progress.hpp"
 #include "app/session/ins_comparison.hpp"
 #include "app/session/session_totals.hpp"
 #include "core/calibration/options.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
-#include "core/types/calibration.hpp"
 
 namespace vergence::app {
 
@@ -46,13 +37,13 @@ struct SummaryInput {
   /// Points and observations dropped for lack of capacity.
   std::uint64_t dropped_by_estimator = 0;
   /// Evaluation against the reference, with summary_evaluation_options().
-  std::optional<TrajectoryEvaluation> evaluation;
+  std::optional<TrajectoryEvaluation> evaluation{};
   /// False if no calibration was found.
   bool calibrated = true;
   /// Calibration in use at the end.
-  RigCalibration calibration;
+  RigCalibration calibration{};
   /// Origin of that calibration.
-  std::string calibration_source;
+  std::string calibration_source{};
   /// True if the rig was monitored; without monitoring a calibration cannot be verified.
   bool online = true;
   /// True if the calibration in use at the end is verified.
@@ -66,8 +57,8 @@ struct SummaryInput {
   Duration frame_budget{};
   ThreadAllocationCounts allocations{};
   /// Bytes by component.
-  std::vector<std::pair<std::string, std::size_t>> memory;
-  std::string configuration_hash;
+  std::vector<std::pair<std::string, std::size_t>> memory{};
+  std::string configuration_hash{};
   /// Counters of the devices and of the pairing; none in a replay.
   std::vector<std::pair<std::string, std::uint64_t>> devices{};
   /// Counters of the comparison with an INS.

@@ -4,7 +4,6 @@
 #include <fstream>
 #include <iostream>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/progress.hpp"
@@ -39,7 +38,7 @@ struct Statistic {
 struct Level {
   double noise = 0;
   int runs = 0, failed = 0;
-  Statistic reprojection_px, pose_m, rotation_rad, translation_m, ms, steps;
+  Statistic reprojection_px{}, pose_m{}, rotation_rad{}, translation_m{}, ms{}, steps{};
 };
 
 /// Solves one problem and books what came out.
@@ -48,8 +47,7 @@ void run_once(BundleAdjuster& adjuster, const Experiment& a, const SimulationOpt
   // Each run has its own random stream, so the geometry is equal at every noise level.
   Random random(a.seed, run + 1);
   SimulatedRig rig = simulate_rig(s, random);
-  BundleOptions options;
-  options.configuration = BundleConfiguration::stereo_calibration;
+  BundleOptions options{.configuration = BundleConfiguration::stereo_calibration};
   if (a.length == "measured")
     for (std::size_t k = 1; k < rig.cameras.size(); ++k)
       options.length[k] = {BundleLength::measured,
@@ -155,14 +153,12 @@ ExitCode run_experiment(const Experiment& given) {
   BundleAdjuster adjuster(capacities_for(a.simulation), arena);
   Progress progress = Progress::on_stderr(a.quiet);
   std::vector<Level> levels;
-  ProgressState state;
-  state.state = "simulate";
-  state.frames = a.noise.size() * static_cast<std::uint64_t>(a.runs);
+  ProgressState state{.state = "simulate",
+                      .frames = a.noise.size() * static_cast<std::uint64_t>(a.runs)};
   for (const double n : a.noise) {
     SimulationOptions s = a.simulation;
     s.noise = n;
-    Level level;
-    level.noise = n;
+    Level level{.noise = n};
     for (int i = 0; i < a.runs; ++i) {
       try {
         run_once(adjuster, a, s, static_cast<std::uint64_t>(i), &level);

@@ -16,9 +16,7 @@ constexpr double kHalfField = M_PI / 6;
 constexpr int kMaxTries = 1000;
 
 Camera pinhole() {
-  Intrinsics k;
-  k.width = kWidth;
-  k.height = kHeight;
+  Intrinsics k{.width = kWidth, .height = kHeight};
   k.fx = k.fy = 0.5 * kWidth / std::tan(kHalfField);
   k.cx = 0.5 * (kWidth - 1);
   k.cy = 0.5 * (kHeight - 1);

@@ -1,6 +1,5 @@
 #include "app/datasets/detail/bag_index.hpp"
 
-#include <charconv>
 #include <cstdlib>
 #include <system_error>
 
@@ -266,24 +265,17 @@ std::string BagImages::name(std::size_t camera, std::size_t index) const {
   return topic.substr(topic.starts_with('/') ? 1 : 0) + "#" + std::to_string(index);
 }
 
-const BagImage* BagImages::find(const std::string& name, std::size_t* camera) const noexcept {
-  const std::size_t mark = name.rfind('#');
-  if (mark == std::string::npos) return nullptr;
+const BagImage* BagImages::find(const std::string& image) const {
   std::size_t index = 0;
-  if (std::from_chars(name.data() + mark + 1, name.data() + name.size(), index).ec != std::errc{})
-    return nullptr;
-  for (*camera = 0; *camera < 2; ++*camera) {
-    std::string_view topic = topics_[*camera];
-    if (topic.starts_with('/')) topic.remove_prefix(1);
-    if (topic == std::string_view(name).substr(0, mark))
-      return index < images_[*camera].size() ? &images_[*camera][index] : nullptr;
-  }
+  if (!parse_whole(std::string_view(image).substr(image.rfind('#') + 1), &index)) return nullptr;
+  for (std::size_t camera = 0; camera < 2; ++camera)
+    if (index < images_[camera].size() && name(camera, index) == image)
+      return &images_[camera][index];
   return nullptr;
 }
 
 ImageFileStatus BagImages::size(const std::string& name, ImageSize* size) const {
-  std::size_t camera = 0;
-  const BagImage* entry = find(name, &camera);
+  const BagImage* entry = find(name);
   if (entry == nullptr) return ImageFileStatus::missing;
   *size = entry->image.size;
   return ImageFileStatus::ok;
@@ -314,8 +306,7 @@ bool BagImages::load(const BagImage& entry, std::vector<std::uint8_t>* data) con
 ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out,
                                   std::size_t stride, int deep_bits,
                                   std::vector<std::uint8_t>* work) const {
-  std::size_t camera = 0;
-  const BagImage* entry = find(name, &camera);
+  const BagImage* entry = find(name);
   if (entry == nullptr) return ImageFileStatus::missing;
   const RosImage& image = entry->image;
   if (image.size != size) return ImageFileStatus::wrong_size;

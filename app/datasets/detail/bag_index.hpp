@@ -1,7 +1,5 @@
 #pragma once
-#include <filesystem>
 #include <map>
-#include <memory>
 #include <mutex>
 
 #include "app/datasets/detail/ros_messages.hpp"
@@ -91,7 +89,7 @@ class BagImages {
     std::shared_ptr<const std::vector<std::uint8_t>> records{};
   };
   /// Returns null if there is no such image.
-  [[nodiscard]] const BagImage* find(const std::string& name, std::size_t* camera) const noexcept;
+  [[nodiscard]] const BagImage* find(const std::string& image) const;
   [[nodiscard]] bool load(const BagImage& entry, std::vector<std::uint8_t>* data) const;
   /// Records of the image's chunk; null: it does not unpack.
   [[nodiscard]] std::shared_ptr<const std::vector<std::uint8_t>> unpacked(

@@ -1,4 +1,3 @@
-#include "app/datasets/detail/bag_scan.hpp"
 
 #include <bzlib.h>
 #include <fcntl.h>

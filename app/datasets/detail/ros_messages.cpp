@@ -62,8 +62,7 @@ double sigma(double a, double b) noexcept {
 std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::size_t size,
                                        MessageEncoding encoding, std::string* name) {
   RosReader in(head, encoding);
-  RosImage image;
-  image.stamp = in.header();
+  RosImage image{.stamp = in.header()};
   const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
   const std::string pixels = in.text();
   if (name != nullptr) *name = pixels.substr(0, 40);
@@ -89,8 +88,7 @@ std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> 
                                                   std::size_t size, MessageEncoding encoding,
                                                   std::string* name) {
   RosReader in(head, encoding);
-  RosImage image;
-  image.stamp = in.header();
+  RosImage image{.stamp = in.header()};
   // The format is only used to detect mosaics, because the data identify PNG and JPEG.
   const std::string format = in.text();
   if (name != nullptr) *name = format.substr(0, 40);
@@ -193,9 +191,7 @@ std::optional<InsRecord> read_ros_fix(std::span<const std::uint8_t> message,
 std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> message,
                                              MessageEncoding encoding) {
   RosReader in(message, encoding);
-  RosAttitude attitude;
-  attitude.stamp = in.header();
-  attitude.q_world_body = in.doubles<4>();
+  RosAttitude attitude{.stamp = in.header(), .q_world_body = in.doubles<4>()};
   // In rad² about x, y, z; the first is −1 without an orientation.
   const auto covariance = in.doubles<9>();
   auto& q = attitude.q_world_body;

@@ -166,14 +166,15 @@ class RosReader {
 class StreamSession {
  public:
   explicit StreamSession(const std::string& socket)
-      : publisher_(app::open_line_socket({app::LineAddress::Kind::unix_socket, socket, {}}, "test"),
-                   &requests, {}) {
+      : publisher_(app::make_line_publisher(
+            app::open_line_socket({app::LineAddress::Kind::unix_socket, socket, {}}, "test"),
+            &requests, {})) {
     app::SessionStart start;
     start.name = "session";
     start.camera_names = {"left", "right"};
     start.can_recalibrate = true;
     start.image_bytes = kWidth * kHeight;
-    publisher_.on_start(start);
+    publisher_->on_start(start);
   }
 
   void calibrate(double fx) {
@@ -186,21 +187,21 @@ class StreamSession {
           CameraModelKind::pinhole_radtan, 640, 480, fx, fx + 1, 322, 239,
           {-0.3, 0.1, 1e-4, -2e-4, 0.01},  {},  {}};
     record.calibration.T_camera_left[1].t = {-0.75, 0, 0};
-    publisher_.on_calibration(record);
+    publisher_->on_calibration(record);
   }
   void align() {
     EnuAlignment alignment;
     alignment.T_enu_world.R << 1, 0, 0, 0, 0, 1, 0, -1, 0;
     alignment.T_enu_world.t = {1, 2, 3};
     alignment.position_sigma = {0.5, 0.5, 1};
-    publisher_.on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
+    publisher_->on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
   }
   /// The pose of a camera that looks and drives straight ahead at 0.1 m per frame.
   void pose() {
     RigFrame frame{.number = frames_, .cameras = 2};
     frame.stamp = Stamp(kFirst + static_cast<std::int64_t>(frames_) * kInterval);
     for (std::size_t k = 0; k < 2; ++k) frame.images[k] = image(frames_, k);
-    publisher_.on_frame(frame);
+    publisher_->on_frame(frame);
     app::FrameReport report;
     PoseSample& sample = report.pose;
     sample.frame = frames_;
@@ -210,11 +211,11 @@ class StreamSession {
     sample.T_world_left.t.z() = 0.1 * static_cast<double>(frames_);
     sample.covariance[0] = 0.25F;
     ++frames_;
-    publisher_.on_pose(report);
+    publisher_->on_pose(report);
   }
   [[nodiscard]] std::map<std::string, std::uint64_t> counters() {
     std::map<std::string, std::uint64_t> out;
-    for (const auto& [name, value] : publisher_.counters()) out[name] = value;
+    for (const auto& [name, value] : publisher_->counters()) out[name] = value;
     return out;
   }
 
@@ -239,7 +240,7 @@ class StreamSession {
   app::SessionRequests requests;
 
  private:
-  app::LinePublisher publisher_;
+  std::unique_ptr<app::SessionObserver> publisher_;
   std::uint64_t frames_ = 0;
 };
 

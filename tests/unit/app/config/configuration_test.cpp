@@ -137,14 +137,13 @@ TEST(Configuration, unreadableFilesAreNamed) {
   const auto message = [](const std::filesystem::path& path) {
     return test::refusal_of([&] { (void)load_configuration(path, {}); });
   };
-  EXPECT_EQ(message(folder / "none.yaml"),
-            (folder / "none.yaml").string() + ": no such file; check the path");
+  EXPECT_TRUE(contains(message(folder / "none.yaml"), "none.yaml: cannot be opened (No such "));
   EXPECT_TRUE(contains(message(folder.path()), "is a directory"));
   const std::filesystem::path pipe = folder / "pipe.yaml";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_TRUE(contains(message(pipe), "is a pipe or a device"));
   EXPECT_TRUE(
-      contains(message(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is larger than"));
+      contains(message(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is longer than"));
   EXPECT_EQ(load_configuration(folder.write("good.yaml", "threads: 1\n"), {}).threads, 1);
 }
 

@@ -93,16 +93,16 @@ TEST(SoftwareTrigger, everyCameraExposesAtEveryPulse) {
   std::vector<std::string> remarks;
   const auto cameras = open_cameras(gige({small(1).address, small(2).address}), &remarks);
   std::vector<CameraDevice*> devices{cameras[0].device.get(), cameras[1].device.get()};
-  SoftwareTrigger trigger(devices);
-  EXPECT_EQ(trigger.start(nullptr), DeviceStatus::bad_configuration);
-  EXPECT_EQ(trigger.configure({0}, nullptr), DeviceStatus::bad_configuration);
-  ASSERT_EQ(trigger.configure({40}, nullptr), DeviceStatus::ok);
+  const auto trigger = make_software_trigger(devices);
+  EXPECT_EQ(trigger->start(nullptr), DeviceStatus::bad_configuration);
+  EXPECT_EQ(trigger->configure({0}, nullptr), DeviceStatus::bad_configuration);
+  ASSERT_EQ(trigger->configure({40}, nullptr), DeviceStatus::ok);
   for (CameraDevice* camera : devices)
     ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
-  ASSERT_EQ(trigger.start(nullptr), DeviceStatus::ok);
+  ASSERT_EQ(trigger->start(nullptr), DeviceStatus::ok);
   for (std::uint64_t n = 0; n < 10; ++n) {
     Pulse pulse;
-    ASSERT_EQ(trigger.wait(Duration::seconds(2), &pulse), DeviceStatus::ok);
+    ASSERT_EQ(trigger->wait(Duration::seconds(2), &pulse), DeviceStatus::ok);
     EXPECT_EQ(pulse.number, n);
     for (CameraDevice* camera : devices) {
       Frame frame;
@@ -111,11 +111,11 @@ TEST(SoftwareTrigger, everyCameraExposesAtEveryPulse) {
       camera->release(frame.slot);
     }
   }
-  trigger.stop();
+  trigger->stop();
   Pulse pulse;
-  while (trigger.wait(Duration{}, &pulse) == DeviceStatus::ok) {
+  while (trigger->wait(Duration{}, &pulse) == DeviceStatus::ok) {
   }
-  EXPECT_EQ(trigger.wait(Duration::milliseconds(200), &pulse), DeviceStatus::stopped);
+  EXPECT_EQ(trigger->wait(Duration::milliseconds(200), &pulse), DeviceStatus::stopped);
 }
 
 }  // namespace

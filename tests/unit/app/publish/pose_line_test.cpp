@@ -4,13 +4,14 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 
-#include <chrono>
 #include <limits>
 #include <map>
 #include <numbers>
+#include <thread>
 
 #include <nlohmann/json.hpp>
 
+#include "app/publish/pose_stream.hpp"
 #include "core/math/so3.hpp"
 #include "core/memory/allocation_guard.hpp"
 
@@ -175,14 +176,13 @@ struct Publishing {
                       bool open = true) {
     socket->request = request;
     socket->open = open;
-    publisher = std::make_unique<LinePublisher>(std::move(kept), &requests,
-                                                calibration::CalibrationOptions{});
+    publisher = make_line_publisher(std::move(kept), &requests, calibration::CalibrationOptions{});
     publisher->on_start(start);
   }
   SessionRequests requests{};
   std::unique_ptr<Kept> kept = std::make_unique<Kept>();
   Kept* socket = kept.get();
-  std::unique_ptr<LinePublisher> publisher{};
+  std::unique_ptr<SessionObserver> publisher{};
 };
 
 FrameReport report(std::uint64_t frame) {
