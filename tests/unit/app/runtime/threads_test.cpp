@@ -50,28 +50,21 @@ TEST(BackgroundThread, resultIsVisibleWhenNotBusy) {
 
 TEST(ThreadRunner, runsOneHalfOnEachThread) {
   ThreadRunner runner;
-  std::thread::id here_id, there_id, there_again;
+  std::thread::id there_id[2];
   std::atomic<int> started{0};
-  // While the second half has not started, the caller may still run it.
-  const auto here_until = [&](int count) {
-    here_id = std::this_thread::get_id();
-    while (started < count) std::this_thread::yield();
-  };
-  auto here = [&] { here_until(1); };
-  auto there = [&] {
-    ++started;
-    there_id = std::this_thread::get_id();
-  };
-  auto here_again = [&] { here_until(2); };
-  auto again = [&] {
-    ++started;
-    there_again = std::this_thread::get_id();
-  };
-  runner.run(TaskRef(here), TaskRef(there));
-  runner.run(TaskRef(here_again), TaskRef(again));
-  EXPECT_EQ(here_id, std::this_thread::get_id());
-  EXPECT_NE(there_id, std::this_thread::get_id());
-  EXPECT_EQ(there_id, there_again);
+  for (int i = 0; i < 2; ++i) {
+    // Until the second half has started, the caller may still run it.
+    auto here = [&] {
+      while (started <= i) std::this_thread::yield();
+    };
+    auto there = [&] {
+      there_id[i] = std::this_thread::get_id();
+      ++started;
+    };
+    runner.run(TaskRef(here), TaskRef(there));
+  }
+  EXPECT_NE(there_id[0], std::this_thread::get_id());
+  EXPECT_EQ(there_id[0], there_id[1]);
 }
 
 TEST(ThreadRunner, everyIndexIsVisitedOnceWithEitherRunner) {
