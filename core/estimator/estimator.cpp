@@ -145,7 +145,6 @@ struct Estimator::Parts {
         state == State::stereo_odometry && options.online)
       suspect_rig(CalibrationCause::requested, last_number);
 
-    odometry.trust_rig(!degradations.active(Degradation::calibration));
     odometry::FrameOutcome out = odometry.process(frame, options.frame_budget);
     follow(out);
     if (options.online && out.posed) {

@@ -134,10 +134,6 @@ class Odometry {
   /// estimating it.
   void reset_extrinsics() noexcept;
   [[nodiscard]] Link linked() const noexcept { return link_; }
-  /// Sets whether gross residuals are treated as wrong points and left out of fits, from the next
-  /// frame on (initially true). Set it to false while the calibration is unverified, because it may
-  /// cause them.
-  void trust_rig(bool trusted) noexcept { poses_.drop_gross(trusted); }
 
   [[nodiscard]] const RigCalibration& rig() const noexcept { return rig_; }
   [[nodiscard]] const Map& map() const noexcept { return map_; }

@@ -76,8 +76,9 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample,
     if (!m.found) return s;
     s.T = m.T_left_world;
   }
+  // A sampled pose is rough, so its gross residuals are no outliers yet.
   const RefinedPose r =
-      refiner_.refine(table_.view(), s.T, sample ? mlesac_.flags() : used, drop_gross_ && !sample);
+      refiner_.refine(table_.view(), s.T, sample ? mlesac_.flags() : used, !sample);
   if (!r.usable) return s;
   s.found = true;
   s.T = r.T_left_world;

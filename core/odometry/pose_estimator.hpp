@@ -75,10 +75,6 @@ class PoseEstimator {
   /// another motion as one rigid scene; fewer wrong matches do.
   [[nodiscard]] bool others_move(const Map& map, const Transform& T_left_world) noexcept;
 
-  /// Sets whether a fit by refinement alone leaves out gross outliers (initially true) or weights
-  /// them by Huber's loss. After sampling, whose result is rough, they always count.
-  void drop_gross(bool drop) noexcept { drop_gross_ = drop; }
-
   /// Per map point, bit k is set if camera k's observation agrees with the last fit or the one that
   /// prefer_left() returned.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return agrees_; }
@@ -117,7 +113,6 @@ class PoseEstimator {
   // agrees_all_ keeps the flags while prefer_left() tries another fit.
   std::span<std::uint8_t> agrees_, agrees_all_;
   Random random_;
-  bool drop_gross_ = true;
 };
 
 }  // namespace vergence::odometry

@@ -113,18 +113,13 @@ TEST(PoseEstimator, outliersInAThirdDoNotMoveThePose) {
   EXPECT_EQ(fit.inliers, kPoints - 100);
 }
 
-TEST(PoseEstimator, grossObservationsAreDroppedIfRequested) {
+TEST(PoseEstimator, grossObservationsAreDropped) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   for (int i = 0; i < 5; ++i)
     for (std::size_t k = 0; k < 2; ++k)
       s.points()[static_cast<std::size_t>(60 * i)].now.pixel[k].x() += 10;
   expect_exact(e.fit_linked(s.map, s.near(0.01, 0.1), false).T_left_world, s.T_left_world);
-  e.drop_gross(false);
-  // Huber's loss lets each pull with 1.3 sigmas: 0.2 px of a shift that 595 others hold.
-  const PoseFit pulled = e.fit_linked(s.map, s.near(0.01, 0.1), false);
-  ASSERT_TRUE(pulled.found);
-  EXPECT_GT((pulled.T_left_world.t - s.T_left_world.t).norm(), 5 * kExactShift);
 }
 
 TEST(PoseEstimator, contradictingCamerasPreferTheLeft) {
