@@ -1,4 +1,3 @@
-
 #include "app/command_line/calibrate_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/session/drive_calibration.hpp"

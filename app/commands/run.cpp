@@ -1,4 +1,3 @@
-
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/publish/publish.hpp"

@@ -1,3 +1,4 @@
+#include "app/config/configuration.hpp"
 
 #include <yaml-cpp/yaml.h>
 

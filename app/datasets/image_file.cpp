@@ -1,3 +1,4 @@
+#include "app/datasets/image_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>

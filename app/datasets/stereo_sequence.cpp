@@ -1,3 +1,4 @@
+#include "app/datasets/stereo_sequence.hpp"
 
 #include <new>
 #include <system_error>

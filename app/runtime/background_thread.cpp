@@ -98,11 +98,12 @@ ThreadRunner::~ThreadRunner() {
 
 void ThreadRunner::run(TaskRef here, TaskRef there) noexcept {
   there_ = there;
-  state_.store(offered, std::memory_order_release);
+  // Stores are sequentially consistent, so that notify_one() sees a thread that sleeps.
+  state_ = offered;
   state_.notify_one();
   here();
   std::uint32_t now = offered;
-  if (state_.compare_exchange_strong(now, idle, std::memory_order_acquire))
+  if (state_.compare_exchange_strong(now, idle))
     there();
   else if (now == taken)
     await_change(state_, taken);
@@ -111,13 +112,13 @@ void ThreadRunner::run(TaskRef here, TaskRef there) noexcept {
 void ThreadRunner::work(BackgroundThread::Role role) noexcept {
   set_up_thread(role);
   for (std::uint32_t now = state_; now != ended; now = state_) {
-    if (now == offered && state_.compare_exchange_strong(now, taken, std::memory_order_acquire)) {
+    if (now != offered) {
+      await_change(state_, now);
+    } else if (state_.compare_exchange_strong(now, taken)) {
       (*there_)();
-      state_.store(idle, std::memory_order_release);
+      state_ = idle;
       state_.notify_one();
-      now = idle;
     }
-    await_change(state_, now);
   }
 }
 

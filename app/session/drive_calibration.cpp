@@ -95,11 +95,9 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
     newest = tracks.frame(tracks.size() - 1).number;
     ++result.frames;
   });
-  if (!first) {
-    result.why =
-        "none was found; replay with --from-scratch, and see the reasons in calibrations.csv";
-    return result;
-  }
+  result.why =
+      "none was found; replay with --from-scratch, and see the reasons in calibrations.csv";
+  if (!first) return result;
   StartingCalibration found = given;
   found.file.rig = *first;
   found.trust = CalibrationTrust::given;

@@ -1,3 +1,4 @@
+#include "app/session/replay_session.hpp"
 
 #include <numbers>
 

@@ -24,7 +24,7 @@ class CalibrationFrames {
   /// by at least a pixel on average since the last logged frame.
   void add(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
            const RigFrame& frame) noexcept;
-  /// Returns true if no frame was logged for so long that the rig must be standing still.
+  /// Returns true if this segment logged no frame for so long that the rig must be standing still.
   [[nodiscard]] bool standing() const noexcept { return frames_still_ > options_.min_frames; }
 
   /// Begins another segment with the logged frames from `number` on; drops older ones.
@@ -72,7 +72,7 @@ class CalibrationFrames {
   calibration::TrackLog log_;
   std::size_t logged_ = 0, required_ = 0;
   std::size_t solved_frames_ = 0;
-  // Number of frames since one was logged.
+  // Number of frames since one was logged, or since the segment began.
   int frames_still_ = 0;
 };
 

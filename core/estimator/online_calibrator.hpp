@@ -115,8 +115,8 @@ class OnlineCalibrator {
   [[nodiscard]] bool outdated() const noexcept {
     return discarded_ || request_.from_rig == estimating();
   }
-  /// An estimate must fit better than the calibration in use; evaluate_refinement() compares the
-  /// two otherwise.
+  /// An estimate must fit better than the calibration in use; for refinements,
+  /// evaluate_refinement() has its own comparison.
   [[nodiscard]] calibration::Gate gate() const noexcept;
   /// Compares the solution with the calibration `current`.
   [[nodiscard]] calibration::Assessment assess(

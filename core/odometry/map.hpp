@@ -126,7 +126,8 @@ class Map {
   /// Returns a cleared free slot, or null if there is none.
   [[nodiscard]] MapPoint* make_point() noexcept;
   /// Call before a frame's points are made, which then take the first free slots: few slots are in
-  /// use and stay in the cache, and points that were only tried leave no trace.
+  /// use and stay in the cache, and points that were only tried do not change the order of later
+  /// ones.
   void reuse_slots() noexcept { next_point_ = 0; }
   /// Returns the slot of a new keyframe without observations; drops the oldest one if the window is
   /// full.

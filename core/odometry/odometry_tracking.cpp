@@ -44,13 +44,15 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     Transform start = better ? best.T_left_world : predicted;
     if (attempt == 2 && !better)
       start = Transform{front_end_.turn_since_kept(), Vec3::Zero()} * motion_.T_left_world();
-    // A quarter of the points is enough for MLESAC, for a third of the work, unless hardly any of
-    // them is found.
-    front_end_.follow_sample(map_, start, options_.features / (attempt == 0 ? 4 : 1), coarsest);
+    // A quarter of the points is enough for MLESAC, for a third of the work. An attempt that
+    // follows a failed one takes half of them, because few are found from a wrong prediction.
+    front_end_.follow_sample(map_, start, options_.features / (attempt == 0 ? 4 : 2), coarsest);
     clock.mark(Stage::track);
     fit = this->fit(start, true);
     clock.mark(Stage::pose);
-    better = sample_agrees(fit, kChanceShare) && fit.inliers > best.inliers;
+    // Attempts take samples of different sizes.
+    better = sample_agrees(fit, kChanceShare) &&
+             fit.inliers * std::max(best.given, 1) > best.inliers * fit.given;
     if (better) best = fit;
     as_predicted = attempt == 0 && sample_agrees(fit, kRigidShare);
     if (sample_agrees(fit, kRigidShare)) break;
@@ -71,23 +73,29 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     clock.mark(Stage::track);
     PoseFit all = this->fit(start, false);
     if (!all.found || all.inliers < kRigidShare * all.given) all = this->fit(start, true);
+    clock.mark(Stage::pose);
     return all;
   };
-  fit = follow_all(fit.T_left_world);
+  Transform start = fit.T_left_world;
+  fit = follow_all(start);
   // A pose that was not predicted may be rough: from there the finest level finds few points, and
-  // some at wrong places. Continue from the better pose while more points are found.
-  int given = 0;
-  for (int round = 0; !as_predicted && fit.found && fit.given > given && round < kReweightings;
-       ++round) {
-    given = fit.given;
-    fit = follow_all(fit.T_left_world);
+  // some at wrong places. Continue from the better pose while more points are found; each round
+  // reduces the error as one of a reweighted fit does.
+  for (int round = 0; !as_predicted && fit.found && round < kReweightings; ++round) {
+    const PoseFit before = fit;
+    fit = follow_all(before.T_left_world);
+    if (fit.found && fit.given > before.given) {
+      start = before.T_left_world;
+      continue;
+    }
+    if (!fit.found || fit.given < before.given) fit = follow_all(start);
+    break;
   }
   if (share > 0 && fit.inliers < share * points_in_view(fit.T_left_world, revived))
     fit.found = false;
   // If they stayed active, they would count as missing in the next attempt.
   for (std::size_t i = 0; !fit.found && i < map_.points().size(); ++i)
     if (revived[i]) map_.points()[i].stage = PointStage::dormant;
-  clock.mark(Stage::pose);
   return fit;
 }
 

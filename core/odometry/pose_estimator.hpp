@@ -72,7 +72,7 @@ class PoseEstimator {
                                 Transform* T_camera_world) noexcept;
 
   /// Call after settle_points(). Returns true if the points that do not fit the pose agree on
-  /// another motion as one rigid scene; fewer wrong matches do.
+  /// another motion as one rigid scene, which wrong matches hardly ever do.
   [[nodiscard]] bool others_move(const Map& map, const Transform& T_left_world) noexcept;
 
   /// Per map point, bit k is set if camera k's observation agrees with the last fit or the one that

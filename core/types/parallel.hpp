@@ -22,7 +22,8 @@ class TaskRef {
 /// Runs two independent tasks and returns when both are done. The core owns no threads: the app
 /// supplies one.
 ///
-/// Threads  Called from the estimator's thread only. Tasks share no data that they write.
+/// Threads  Called from the estimator's thread only. Tasks share nothing that they write but
+///          atomics.
 /// Errors   None; tasks are noexcept.
 class PairRunner {
  public:

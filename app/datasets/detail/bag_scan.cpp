@@ -1,3 +1,4 @@
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <bzlib.h>
 #include <fcntl.h>

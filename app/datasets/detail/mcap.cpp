@@ -1,4 +1,3 @@
-
 #include <algorithm>
 
 #include "app/datasets/detail/record_scanner.hpp"

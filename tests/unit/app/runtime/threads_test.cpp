@@ -67,6 +67,14 @@ TEST(ThreadRunner, runsOneHalfOnEachThread) {
   EXPECT_EQ(there_id[0], there_id[1]);
 }
 
+TEST(ThreadRunner, endsWhenItsHalvesHaveJustRun) {
+  auto nothing = [] {};
+  for (int i = 0; i < 2000; ++i) {
+    ThreadRunner runner;
+    for (int k = 0; k < 3; ++k) runner.run(TaskRef(nothing), TaskRef(nothing));
+  }
+}
+
 TEST(ThreadRunner, everyIndexIsVisitedOnceWithEitherRunner) {
   ThreadRunner two;
   SequentialRunner one;
