@@ -25,7 +25,7 @@ PoseProblem::PoseProblem(std::size_t capacity, Arena& arena, const char* who) {
 }
 
 void PoseProblem::gather(const RigObservations& o) noexcept {
-  assert(o.size() <= capacity());
+  assert(o.size() <= sets_[0].point.size());
   cameras_ = o.cameras;
   for (int k = 0; k < o.cameras; ++k) {
     const auto kk = static_cast<std::size_t>(k);
