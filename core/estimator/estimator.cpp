@@ -521,12 +521,14 @@ struct Estimator::Parts {
              {0, decision.evidence.shift_px, decision.evidence.rotation_mrad});
       adopt(decision);
     }
+    // Until the map is rebuilt, poses depend on the calibration before the refinement.
+    const bool as_good =
+        decision.depth_error_percent <= options.calibration.max_depth_error_percent;
     if (decision.verified && !contradicted) {
-      // The calibration before the refinement is verified as well.
-      degradations.clear(Degradation::calibration);
       verified_percent = decision.depth_sigma_percent;
       if (!decision.accepted) verified_by = decision.evidence;
-      if (was_suspect) notify_verified();
+      if (!decision.accepted || as_good) degradations.clear(Degradation::calibration);
+      if (was_suspect && !degradations.active(Degradation::calibration)) notify_verified();
     } else if (!calibrator.verified() && !degradations.active(Degradation::calibration)) {
       degradations.enter(Degradation::calibration, Reason::unverified_calibration);
     }
