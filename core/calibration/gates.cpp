@@ -42,7 +42,7 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
     const LoggedObservation& s = frame.observations[i];
     Vec3 a, b;
     double d = 0;
-    if (!s.by(0) || !s.by(k) || !left.unproject(s.raw[0].cast<double>(), &a) ||
+    if (!s.by(0) || !s.by(other) || !left.unproject(s.raw[0].cast<double>(), &a) ||
         !right.unproject(s.raw[other].cast<double>(), &b) ||
         !geometry.to_line(a.head<2>() / a.z(), b.head<2>() / b.z(), &d, nullptr))
       continue;
