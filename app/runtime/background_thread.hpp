@@ -10,8 +10,7 @@
 namespace vergence::app {
 
 /// BackgroundRunner on its own thread. Both sides spin for 20 µs before they sleep in the kernel:
-/// the two halves of a front end finish within microseconds of each other, and waking a sleeper
-/// costs more.
+/// a task often ends, or follows, within microseconds, and waking a sleeper costs more.
 ///
 /// Threads  One thread calls start(), busy() and wait(); the task runs on the other. The
 ///          calibration solver's thread has lower priority than the estimator's.
@@ -51,7 +50,10 @@ class BackgroundThread final : public BackgroundRunner {
 /// started `there` when the caller is done with `here`, because its core is busy, the caller runs
 /// both.
 ///
-/// Threads, memory, errors  As BackgroundThread.
+/// Threads  One caller; run() returns when both are done. The thread is sealed as a
+///          BackgroundThread's is.
+/// Memory   Does not allocate after construction.
+/// Errors   The constructor throws std::system_error if there is no thread.
 class ThreadRunner final : public PairRunner {
  public:
   explicit ThreadRunner(BackgroundThread::Role role = BackgroundThread::Role::front_end);
@@ -69,7 +71,7 @@ class ThreadRunner final : public PairRunner {
   std::thread thread_;
 };
 
-/// Runs the two halves of a front end on one thread, or on two or more in parallel.
+/// Runner of a front end for one thread, or for two if there are two or more.
 [[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
 
 /// The calibration solver's runner, with a note of the frames at which it was found idle: the one

@@ -65,7 +65,7 @@ struct EstimatorOptions {
 ///
 /// Ownership  Keeps references to the arena and the runners; images are read during process() only,
 ///            masks in the constructor only.
-/// Threads    One caller; process() uses `runner` for the other images' front end and `solver` for
+/// Threads    One caller; process() shares the front end's work with `runner` and uses `solver` for
 ///            calibration in the background. With Adoption::after_fixed_frames, poses do not depend
 ///            on the runners. request_recalibration(): any thread.
 /// Memory     All of it from the arena in the constructor. process() allocates nothing, nor does

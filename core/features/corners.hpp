@@ -37,7 +37,7 @@ inline constexpr int kMaxGridCells = 4096;
 /// as `out` can hold. The ranking needs no absolute contrast, which a scene may not offer; only
 /// corners that cannot be aligned are left out.
 ///
-/// Threads  The runner processes the lower half of the grid in parallel; the result does not depend
+/// Threads  The runner takes part of the grid's rows; the result does not depend
 ///          on it.
 /// Memory   On the stack, bounded by kMaxCell and kMaxGridCells. If `out` is full, the weakest
 ///          corners are dropped.

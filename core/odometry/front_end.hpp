@@ -61,7 +61,7 @@ struct FreeMatch {
 ///
 /// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the
 ///            owner's.
-/// Threads    One caller; the runner processes the additional cameras in parallel. Results do not
+/// Threads    One caller; the runner takes part of the images and points. Results do not
 ///            depend on it.
 /// Masks      Nothing is found, followed or matched within half a window of a masked pixel.
 /// Memory     From the arena at construction. If the map has no room for new points, the weakest
