@@ -114,7 +114,7 @@ void refuse_packed(const std::filesystem::path& file) {
                                Packed{".tar", "tar -xf"},    Packed{".tgz", "tar -xf"}};
   const std::string name = file.filename().string();
   for (const auto& [ending, command] : kPacked)
-    if (name.ends_with(ending))
+    if (detail::lower(name).ends_with(ending))
       refuse(file, 0, "is compressed ({}); unpack it with `{} {}` and pass the result",
              ending.substr(1), command, name);
 }
@@ -147,7 +147,7 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
 }
 
 std::optional<SequenceFormat> bag_format(const std::filesystem::path& file) {
-  const std::string name = file.filename().string();
+  const std::string name = detail::lower(file.filename().string());
   if (name.ends_with(".mcap")) return SequenceFormat::mcap;
   if (name.ends_with(".db3")) return SequenceFormat::db3;
   // rosbag uses the second ending while recording, and after a power failure.
@@ -342,7 +342,7 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
     if (const auto bag = bag_format(folder)) return *bag;
     refuse_packed(folder);
     refuse(folder, 0, "{}; pass a data-set directory, or a .mcap, .db3 or .bag file",
-           std::filesystem::exists(folder, ignored) ? "is a file that is not a bag"
+           std::filesystem::exists(folder, ignored) ? "is a file without the ending of a bag"
                                                     : "no such directory");
   }
   if (const auto found = find_format(folder)) return *found;

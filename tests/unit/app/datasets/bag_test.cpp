@@ -104,13 +104,12 @@ TEST_P(Bag, readsPairsCalibrationAndPixels) {
 TEST_P(Bag, readsActiveBagAndPrefersNewerKind) {
   frame(0);
   writer_->finish();
-  const std::string name = GetParam().is_mcap() ? "drive_0.mcap" : "drive_0.bag.active";
+  const std::string name = GetParam().is_mcap() ? "drive_0.MCAP" : "drive_0.bag.active";
   folder_.write("drive/" + name, writer_->bytes());
   EXPECT_EQ(find_format(folder_ / "drive" / name), format());
   EXPECT_EQ(find_format(folder_ / "drive"), format());
   EXPECT_EQ(open_sequence(format(), folder_ / "drive").pairs.size(), 1U);
-  folder_.write("drive/a.mcap", "");
-  folder_.write("drive/z.bag", "");
+  folder_.write("drive/a.mcap", ""), folder_.write("drive/z.bag", "");
   EXPECT_EQ(find_format(folder_ / "drive"), SequenceFormat::mcap);
 }
 
