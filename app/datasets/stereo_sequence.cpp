@@ -68,7 +68,6 @@ void check(const std::filesystem::path& source, const CalibrationUse& use, Stere
   }
   for (const std::size_t kept : detail::ascending(stamps)) sequence.pairs[kept].in_order = true;
   apply_use(use, &sequence.calibration);
-  if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->message);
   if (sequence.calibration.cameras != 2)
     refuse(source, 0, "describes {} cameras; use a calibration with two",
            sequence.calibration.cameras);
@@ -78,7 +77,9 @@ void check(const std::filesystem::path& source, const CalibrationUse& use, Stere
     refuse(source, 0,
            "gives the left camera {}x{} pixels and the right one {}x{}; both must have one size",
            left.width, left.height, right.width, right.height);
+  // Numbers for another size are implausible for that reason.
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
+  if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->message);
   find_deep_bits(&sequence);
   // The messages contain names and text from files.
   for (auto* messages : {&sequence.remarks, &sequence.assumptions})
