@@ -75,6 +75,8 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
   image.offset = static_cast<std::uint32_t>(in.position());
   for (const Encodings& known : kEncodings) {
     if (known.names.find(" " + lower(pixels) + " ") == std::string_view::npos) continue;
+    // Some publishers do not set it.
+    if (image.step == 0) image.step = width * known.bytes;
     if (image.step < width * known.bytes || std::uint64_t{image.step} * height > image.bytes ||
         image.bytes > size - image.offset)
       return std::nullopt;

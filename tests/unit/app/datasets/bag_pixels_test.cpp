@@ -135,9 +135,10 @@ TEST_P(BagPixels, refusesOtherEncodingsAndShortData) {
   ImageMessage image = image_of("mono8", 1);
   image.data.pop_back();
   EXPECT_TRUE(grey_of(image).empty());
+  image.step = 0;
+  EXPECT_FALSE(grey_of(image).empty()) << "a step that is not set";
   // The rows are too short for three bytes per pixel.
-  image = image_of("rgb8", 1);
-  EXPECT_TRUE(grey_of(image).empty());
+  EXPECT_TRUE(grey_of(image_of("rgb8", 1)).empty());
   EXPECT_TRUE(grey_of(image_of("mono16", 1)).empty());
 }
 
