@@ -18,11 +18,13 @@ std::string camera_namespace(std::string_view topic) {
   return std::string(topic.substr(0, slash == std::string_view::npos ? 0 : slash));
 }
 
-/// Topic of the CameraInfo: next to the image topic, or below it if that topic is the camera's
-/// name.
+/// Topic of the CameraInfo: next to the image topic, below it if that topic is the camera's name,
+/// or where the RealSense viewer has it (`CAMERA/image/data`, `CAMERA/info/camera_info`).
 std::string camera_info_topic(const BagIndex& bag, const std::string& topic) {
-  const std::string below = topic + "/camera_info";
-  return bag.infos.contains(below) ? below : camera_namespace(topic) + "/camera_info";
+  const std::string space = camera_namespace(topic);
+  for (const std::string& name : {topic, camera_namespace(space) + "/info"})
+    if (bag.infos.contains(name + "/camera_info")) return name + "/camera_info";
+  return space + "/camera_info";
 }
 
 bool is_rectified(std::string_view topic) {

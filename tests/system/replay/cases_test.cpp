@@ -612,6 +612,7 @@ Case bag(const char* name, const Bag& b, std::string mentions = "", int code = k
               std::string camera = topic;
               if (camera.ends_with("/compressed")) camera.erase(camera.rfind('/'));
               camera.erase(camera.rfind('/'));
+              if (camera.ends_with("/image")) camera.replace(camera.rfind('/'), 6, "/info");
               if (!b.infos) continue;
               w.channel(static_cast<std::uint16_t>(3 + k), camera + "/camera_info",
                         "sensor_msgs/CameraInfo");
@@ -667,18 +668,17 @@ std::vector<Case> bags() {
   all.push_back(bag("nor do recordings", ambiguous, "24 ms later|ambiguous", 2));
   all.push_back(bag("a frame later", {later(51)}, "a frame early or late", kRead));
   all.back().frames = kFrames - 1;
-  Bag wrong{mono};
-  wrong.fx_times_b = -880;
+  Bag wrong{.image = mono, .fx_times_b = -880};
   all.push_back(bag("P in centimetres", wrong, "11 m|unusually long"));
   wrong.fx_times_b = 8.8;
   all.push_back(bag("sign of P", wrong, "/stereo/right/camera_info|--calibration", 2));
   for (const auto& [left, right] :
        {std::pair{"/camera/infra1/image_rect_raw", "/camera/infra2/image_rect_raw"},
+        std::pair{"/rig/Infrared_1/image/data", "/rig/Infrared_2/image/data"},
         std::pair{"/cam0/image_raw", "/cam1/image_raw"}})
     all.push_back(
         bag("the usual topics", {mono, "sensor_msgs/Image", {left, right}}, "is left and"));
-  Bag none{mono};
-  none.infos = false;
+  Bag none{.image = mono, .infos = false};
   all.push_back(bag("no CameraInfo", none, "CameraInfo|--calibration", 2));
   all.push_back(bag("packed messages", {[](int, int, std::int64_t) {
                       return std::string("\x28\xB5\x2F\xFD") + std::string(60, 'x');
