@@ -33,7 +33,7 @@ constexpr std::array kContainers{
     Container{BagFormat::rosbag, SequenceFormat::rosbag, ".bag",
               "a ROS 1 bag of version 2.0 (offset 0: #ROSBAG V2.0)"},
     Container{BagFormat::sqlite, SequenceFormat::db3, ".db3",
-              "an SQLite file of rosbag2, with the tables topics and messages"}};
+              "a complete SQLite file of rosbag2, with the tables topics and messages"}};
 
 const Container& find_container(BagFormat format) {
   return kContainers[static_cast<std::size_t>(format)];
