@@ -135,9 +135,17 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
   const std::string text = read_text(file);
   std::vector<Fields> rows;
   std::vector<std::size_t> lines;
+  TimesFile out;
   TextTable table(text);
-  while (table.next()) rows.push_back(table.fields()), lines.push_back(table.line());
-  if (rows.empty()) refuse(file, 0, "holds no times; write one line per frame");
+  while (table.next())
+    if (table.unfinished() && !rows.empty() && table.fields().size() < rows.back().size())
+      out.remarks.emplace_back("the last line of the times is incomplete and is skipped");
+    else
+      rows.push_back(table.fields()), lines.push_back(table.line());
+  if (rows.empty())
+    refuse(
+        file, 0,
+        "holds no times; write nanoseconds, or seconds with a decimal point, one line per frame");
 
   const TimeColumns columns = find_time_columns(rows);
   std::vector<std::string_view> times;
@@ -151,7 +159,6 @@ TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeU
   const TimeForm form =
       find_time_form(times, columns.nanoseconds ? std::optional(TimeUnit::seconds) : std::nullopt,
                      relative.value_or(whole ? TimeUnit::nanoseconds : TimeUnit::seconds));
-  TimesFile out;
   if (columns.counted) out.remarks.emplace_back("the first column counts the lines");
   if (columns.nanoseconds)
     out.remarks.emplace_back("times are seconds and nanoseconds in two columns");
