@@ -173,8 +173,7 @@ class RecordedSource final : public FrameSource {
       facts_.ins = SourceIns{ins_.options, InsSource::recording, ins_.mount_source,
                              ins_.readings.capacity() * sizeof(InsRecord)};
     for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
-      for (const std::string& message : *remarks)
-        facts_.remarks.push_back({message, "data", !request.session.quiet});
+      for (const std::string& message : *remarks) facts_.remarks.push_back({message, "data"});
     facts_.assumptions = sequence_.assumptions;
     if (!facts_.assumptions.empty())
       facts_.remarks.push_back({fmt::format("assumed: {}", fmt::join(facts_.assumptions, "; ")),
@@ -185,7 +184,7 @@ class RecordedSource final : public FrameSource {
       facts_.remarks.push_back({baseline_message(rig) + " (" + facts_.begin.source + ")", nullptr,
                                 !request.session.quiet});
       if (std::string warning = baseline_warning(rig); !warning.empty())
-        facts_.remarks.push_back({std::move(warning), "calibration", !request.session.quiet});
+        facts_.remarks.push_back({std::move(warning), "calibration"});
     }
     facts_.image_bytes = frames_arena_.used();
     facts_.ring_bytes = sizeof(FrameDecoder);
@@ -297,11 +296,10 @@ class SessionSource final : public FrameSource {
       facts_.ins = SourceIns{comparison_options(request.configuration), InsSource::recording,
                              d.mount_source, session_.readings().capacity() * sizeof(InsRecord)};
     for (const std::string& message : session_.remarks())
-      facts_.remarks.push_back({message, "data", !request.session.quiet});
+      facts_.remarks.push_back({message, "data"});
     if (!other_ && !session_.complete())
       facts_.remarks.push_back(
-          {"the recording is incomplete: the poses differ from those of the run", "data",
-           !request.session.quiet});
+          {"the recording is incomplete: the poses differ from those of the run", "data"});
     const RigCalibration& rig = facts_.begin.file.rig;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
       pixels_[k].resize(static_cast<std::size_t>(rig.intrinsics[k].width) *
@@ -496,8 +494,7 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
           "{}: has {} cameras, but {} was recorded with {}; use the calibration of that rig",
           *request.calibration, begin.file.rig.cameras, request.data.string(), recorded);
     begin.source = std::filesystem::path(*request.calibration).filename().string();
-    for (const std::string& message : begin.remarks)
-      if (!request.session.quiet) fmt::print(stderr, "vergence: {}\n", message);
+    for (const std::string& message : begin.remarks) fmt::print(stderr, "vergence: {}\n", message);
   } else {
     apply_use(use, &begin.file.rig);
   }
@@ -535,8 +532,7 @@ StereoSequence open_drive(const ReplayRequest& request) {
   if (request.known) o.calibration = given_calibration(*request.known);
   if (request.calibration) o.calibration = given_calibration(*request.calibration, o.use, &remarks);
   StereoSequence sequence = open_sequence(request.format, request.data, o);
-  if (!request.session.quiet)
-    for (const std::string& message : remarks) fmt::print(stderr, "vergence: {}\n", message);
+  for (const std::string& message : remarks) fmt::print(stderr, "vergence: {}\n", message);
   return sequence;
 }
 
