@@ -550,7 +550,9 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
                                                cameras[0].names.front(), cameras[1].names.front()));
   sequence.times = folder / "times.txt";
   pair_cameras(cameras, find_lists(folder, cameras), &sequence);
-  if (const auto& left = cameras[0].names, &right = cameras[1].names; left.size() != right.size())
+  // Images without a partner by their stamps are reported already.
+  if (const auto& left = cameras[0].names, &right = cameras[1].names;
+      left.size() != right.size() && sequence.left_out == 0)
     sequence.remarks.push_back(
         fmt::format("there are {} left images and {} right ones: if one camera lost an image "
                     "without a gap in the names, all later pairs are one frame off; check that the "
