@@ -505,8 +505,9 @@ void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
   std::string other;
   for (const fs::path& entry : entries_in(folder))
     for (const char* ending : {".yaml", ".yml", ".json", ".xml"})
-      if (other.empty() && lower(entry.extension().string()) == ending)
-        other = entry.filename().string();
+      if (const std::string name = entry.filename().string();
+          other.empty() && (lower(name).ends_with(ending) || name.starts_with("calib")))
+        other = name;
   refuse(folder, 0,
          "has no calibration.yaml; pass a calibration with --calibration (of vergence, Kalibr, "
          "ROS, OpenCV or another program), or --focal and --baseline{}",
