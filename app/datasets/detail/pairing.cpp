@@ -82,7 +82,7 @@ PairOffset pair_offset(std::span<const Stamp> left, std::span<const Stamp> right
 }
 
 std::string describe(const PairOffset& offset) {
-  return fmt::format("{:.4g} ms (median; 95 % within {:.4g} ms)", 1e3 * offset.median.to_seconds(),
+  return fmt::format("{:.6g} ms (median; 95 % within {:.6g} ms)", 1e3 * offset.median.to_seconds(),
                      1e3 * offset.farthest.to_seconds());
 }
 
