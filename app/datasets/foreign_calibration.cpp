@@ -83,7 +83,9 @@ constexpr std::array kPrograms{
     Program{"Camera", "stella_vslam", "cols, rows and focal_x_baseline"},
     Program{"T_BS", "EuRoC or Kimera", "both cameras' files, left first, with a comma between"},
     Program{"projection_matrix", "ROS", "camera_info of both cameras, with P"},
-    Program{"cam0", "Kalibr", "T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) of both"}};
+    Program{"cam0", "Kalibr",
+            "intrinsics, indented below cam0 and cam1, and T_cn_cnm1 of cam1, or T_cam_imu "
+            "(T_imu_cam) of both"}};
 
 /// Splits a key into parts: digits are separate from letters, and a capital inside a word begins a
 /// new part.
