@@ -9,6 +9,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "app/config/calibration_checks.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/text_file.hpp"
@@ -872,12 +873,20 @@ void check_binning(const std::string& name, const Intrinsics& lens) {
              lens.width, lens.height, lens.cx, lens.cy, lens.width / parts, lens.height / parts);
 }
 
-/// Files of an argument; a directory stands for its left.yaml and right.yaml. Commas separate files
-/// unless one has the whole name.
+/// Files of an argument; a directory stands for its left.yaml and right.yaml, or two files with
+/// other usual names. Commas separate files unless one has the whole name.
 std::vector<fs::path> split_files(const std::string& text) {
   std::error_code ignored;
-  if (fs::is_directory(text, ignored))
-    return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
+  if (const fs::path folder = text; fs::is_directory(folder, ignored)) {
+    std::vector<std::string> names;
+    for (const fs::path& entry : detail::entries_in(folder))
+      if (const std::string ending = detail::lower(entry.extension().string());
+          ending == ".yaml" || ending == ".yml")
+        names.push_back(entry.filename().string());
+    if (const auto pairs = detail::stereo_names(names); pairs.size() == 1)
+      return {folder / pairs[0][0], folder / pairs[0][1]};
+    return {folder / "left.yaml", folder / "right.yaml"};
+  }
   if (fs::exists(text, ignored)) return {text};
   std::vector<fs::path> files;
   std::istringstream parts(text);
