@@ -134,10 +134,10 @@ class BoardCalibrator {
       if (cameras_ == 1) return result;
       rig.baseline = rig.T_camera_left[1].t.norm();
       if (const auto bad = find_implausible(&rig))
-        result.error = "the views do not determine the intrinsics: " + bad->message;
+        result.error = "the views do not determine a plausible calibration: " + bad->message;
     } catch (const cv::Exception& e) {
-      result.error =
-          "the views do not determine intrinsics and extrinsics (" + e.err + "); add tilted views";
+      result.error = "the views do not determine intrinsics and extrinsics (" + e.err +
+                     "); add tilted views, and check that both images of a pair are of one instant";
     }
     return result;
   }
