@@ -44,7 +44,9 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns,
   std::set<fs::path> files;
   for (const std::string& pattern : patterns) {
     glob_t found{};
-    const int status = ::glob(pattern.c_str(), 0, nullptr, &found);
+    std::error_code ignored;
+    const std::string all = fs::is_directory(pattern, ignored) ? pattern + "/*" : pattern;
+    const int status = ::glob(all.c_str(), 0, nullptr, &found);
     for (std::size_t i = 0; status == 0 && i < found.gl_pathc; ++i) files.insert(found.gl_pathv[i]);
     ::globfree(&found);
     if (status != 0)

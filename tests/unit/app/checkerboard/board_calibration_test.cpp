@@ -165,10 +165,10 @@ using Paths = std::vector<std::filesystem::path>;
 
 TEST(BoardImages, globsGiveSortedFilesOnce) {
   const test::TemporaryFolder folder;
-  for (const char* name : {"left2.png", "left1.png", "right1.png"}) (void)folder.write(name, "x");
-  const std::string all = (folder / "left*.png").string(), one = (folder / "left1.png").string();
+  for (const char* name : {"left/2.png", "left/1.png", "right1.png"}) (void)folder.write(name, "x");
+  const std::string all = (folder / "left").string(), one = (folder / "left/1*").string();
   const Paths files = matching_files({all, one}, "--left");
-  EXPECT_EQ(files, (Paths{folder / "left1.png", folder / "left2.png"}));
+  EXPECT_EQ(files, (Paths{folder / "left/1.png", folder / "left/2.png"}));
   EXPECT_THROW((void)matching_files({(folder / "none*.png").string()}, "--left"), InputError);
 }
 
