@@ -19,7 +19,8 @@ constexpr std::array kAdvice{
     "",
     "A camera delivered no image: check its cable, its power and the trigger line.",
     "Images without structure: clean the lenses, take covers off, set exposure and gain.",
-    "A camera sent an image twice: check its link, its buffers and its trigger rate.",
+    "An image came twice, from one camera or as left and right: check the directories or topics, "
+    "links, buffers and the trigger rate.",
     "Too little texture: raise the exposure; check for fog, rain or dirt on the lenses.",
     "Left and right do not fit this calibration: check for directories of different sequences, an "
     "inverted T_camera_left (X_camera = R X_left + t), distortion set for rectified images, wrong "
