@@ -22,14 +22,14 @@ expect_refusal() {  # words that the message holds, then the command
 
 expect_refusal "$work/nowhere is not a folder" "$source/scripts/demo" nowhere
 expect_refusal "$work/empty is neither KITTI" "$source/scripts/demo" empty
-expect_refusal "takes nothing, or the word program" "$source/scripts/setup" everything
-expect_refusal "takes nothing, or the word program" "$source/scripts/setup" tests slow
+expect_refusal "usage: scripts/setup [program" "$source/scripts/setup" everything
+expect_refusal "usage: scripts/setup [program" "$source/scripts/setup" tests slow
 expect_refusal "--tier takes default" "$source/scripts/test" --tier slow
 expect_refusal "takes arm64 or armhf" "$source/scripts/cross" riscv64
 expect_refusal "takes arm64 or armhf" "$source/scripts/sysroot" arm64 everything
 expect_refusal "ten is neither seconds nor a number of inputs" "$source/scripts/fuzz" ten
 expect_refusal "takes subset, asan or tsan" "$source/scripts/sanitize" everything
-expect_refusal "takes nothing, or --keep and a folder" "$source/scripts/deployment-test" arm64
+expect_refusal "usage: scripts/deployment-test [--keep" "$source/scripts/deployment-test" arm64
 [ -z "$(find . -mindepth 1 -not -name empty -not -name out -not -name err)" ] || { echo "a script left files behind"; failures=$((failures + 1)); }
 
 # A package stands in one list, and each line names one as Debian does.
