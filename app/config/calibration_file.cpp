@@ -79,13 +79,13 @@ std::string format_covariance(const CalibrationFile& calibration) {
   std::string upper;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     names.push_back(yaml_scalar(rows[i].name));
-    // A line a row: a person finds the variance of a parameter at the start of its own.
+    // One line per row, so that the variance of each parameter is at the start of its line.
     upper += i == 0 ? "\n    " : ",\n    ";
     for (std::size_t j = i; j < rows.size(); ++j)
       upper += fmt::format("{}{}", j == i ? "" : ", ", C(rows[i].row, rows[j].row));
   }
   return fmt::format(
-      "covariance:  # of all parameters together, wide; rad, m, px\n  parameters: [{}]\n  upper: "
+      "covariance:  # joint, with uncertain intrinsics; rad, m, px\n  parameters: [{}]\n  upper: "
       "[{}]\n",
       fmt::join(names, ", "), upper);
 }

@@ -125,7 +125,7 @@ void write_state(const std::filesystem::path& file, const CalibrationFile& calib
                      "); set rig.state_dir to a writable directory, or to none");
   std::string text = format_calibration(calibration);
   if (calibration.configured) {
-    text += "configured:  # keys that were not at their default when it was found\n";
+    text += "configured:  # keys that differed from their defaults when it was estimated\n";
     for (const auto& [key, value] : *calibration.configured)
       text += fmt::format("  {}: {}\n", key, value);
     if (calibration.configured->empty()) text += "  {}\n";

@@ -234,7 +234,7 @@ Group cameras() {
             "cameras." + std::to_string(k), "The cameras, a list; the first is the left one.",
             [k](auto& c) -> auto& { return c.cameras[k]; })
             .word("driver", &C::driver, {"mock", "gige", "iidc-usb", "iidc-1394", "v4l2"},
-                  "Driver. Empty: there is no such camera.")
+                  "Driver; empty: no such camera.")
             .text("name", &C::name, 32, "Name in messages and in calibration.yaml.")
             .text("serial", &C::serial, 64,
                   "Serial number, or address of a GigE camera; empty: the next found.")
@@ -246,7 +246,7 @@ Group cameras() {
                      "Left edge of the region of interest on the sensor.")
             .integer("offset.1", &C::offset_y, 0, 16384, "px", "Upper edge of that region.")
             .text("pixel_format", &C::pixel_format, 32,
-                  "The device's name, e.g. `Mono8`; empty: the cheapest with grey values.")
+                  "Format as the device names it, e.g. `Mono8`; empty: the cheapest for grey.")
             .choice("trigger", &C::trigger, {"hardware", "software", "free"},
                     "Trigger source, equal for all cameras (docs/synchronisation.md).")
             .options("options", 400,
@@ -291,7 +291,7 @@ Group exposure() {
               "Maximum exposure; beyond it the gain is raised.")
       .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Maximum gain.")
       .integer("settle_frames", &E::settle_frames, 2, 60, "frames",
-               "Images skipped after a change: one more than the cameras need.");
+               "Images skipped after a change: one more than the change takes.");
 }
 
 Group trigger() {
@@ -350,7 +350,7 @@ Group ins() {
       .number("sync_out_width_ms", &I::sync_out_width_ms, 0.1, 100, "ms",
               "Length of a SyncOut pulse.")
       .number("processing_ms", &I::processing_ms, 0, 50, "ms",
-              "Delay from a sample to its first byte on the serial link (manual).")
+              "Delay from a sample to its first byte on the serial link (see its manual).")
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
                "Position of the left camera in the INS body: forward, left, up.")
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
@@ -388,11 +388,11 @@ Group odometry() {
       .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
               "Standard deviation of a tracked corner per coordinate.")
       .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
-              "Added in quadrature, times the sideways motion divided by the depth.")
+              "Added to pixel_sigma in quadrature, times the sideways motion over the depth.")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
                "Keyframes in the sliding window.")
       .number("extrinsic_rotation_sigma_rad", &O::extrinsic_rotation_sigma_rad, 0, 0.05, "rad",
-              "Minimum sigma of the rotation between cameras; 0: exact.")
+              "Maximum prior sigma of the rotation between cameras; 0: rotation fixed.")
       .integer("window_steps", &O::window_steps, 1, 30, "steps",
                "Maximum solver steps per window adjustment.")
       .number("keyframe_parallax", &O::keyframe_parallax, 0.005, 0.3, "rad",
@@ -422,7 +422,7 @@ Group calibration_options() {
       .integer("max_frames", &C::max_frames, 10, 150, "frames",
                "Maximum number of frames solved together; older ones are dropped.")
       .integer("adopt_after", &C::adopt_after, 0, 1000, "frames",
-               "Frames after its snapshot within which a result is adopted.")
+               "Frames after the snapshot of a solve within which its result is adopted.")
       .integer("max_observations", &C::max_observations, 10'000, 1'000'000, "",
                "Maximum observations per solve; beyond it frames are subsampled.")
       .choice("intrinsics", &C::intrinsics, {"fixed", "focal", "full"},
@@ -444,7 +444,7 @@ Group calibration_options() {
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
               "Maximum rotation from the nominal one.")
       .integer("min_near_points", &C::min_near_points, 0, 1000, "points",
-               "Minimum near points of the collected frames; below: `needs_near_structure`.")
+               "Minimum near points of a solve; below: `needs_near_structure`.")
       .number("near_baselines", &C::near_baselines, 5, 500, "baselines",
               "Maximum distance of a near point, in baselines.")
       .number("extrinsic_random_walk_mrad_per_sqrt_h", &C::extrinsic_random_walk_mrad_per_sqrt_h, 0,
@@ -452,7 +452,7 @@ Group calibration_options() {
       .number("max_depth_error_percent", &C::max_depth_error_percent, 0.1, 50, "%",
               "Maximum depth error of a verified calibration.")
       .number("reference_depth_m", &C::reference_depth_m, 0.5, 500, "m",
-              "Depth of that test; nearer on a short baseline.")
+              "Depth at which that error is evaluated; nearer on a short baseline.")
       .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
               "Maximum depth error at 20 m of the rating `good`.")
       .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
@@ -467,13 +467,12 @@ Group monitor() {
   return Rows("monitor", "Monitoring of the calibration in use.", &Configuration::monitor)
       .number("threshold", &M::threshold, 20, 500, "",
               "Test statistic that reports a knock or a drift; higher: fewer alarms.")
-      .number(
-          "bias_px", &M::bias_px, 0, 1, "px",
-          "Minimum slow error that imperfect intrinsics leave in stereo matches without a knock.")
+      .number("bias_px", &M::bias_px, 0, 1, "px",
+              "Minimum of the assumed slowly varying error of stereo matches, RMS over the image.")
       .number("verified_bias_px", &M::verified_bias_px, 0, 2, "px",
-              "Error of stereo matches by imperfect intrinsics, once verified.")
+              "Initial value of that error, for a verified calibration solved from images.")
       .number("unverified_bias_px", &M::unverified_bias_px, 0, 5, "px",
-              "The same with an unverified calibration.")
+              "Initial value of that error, for any other calibration.")
       .integer("min_matches", &M::min_matches, 12, 1000, "matches",
                "Frames with fewer stereo matches are not used.")
       .integer("short_window", &M::short_window, 1, 10, "frames",
@@ -481,8 +480,8 @@ Group monitor() {
       .integer("long_window", &M::long_window, 60, 1800, "frames",
                "Longest window of moving frames that is tested: for drift.")
       .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
-               "Consecutive frames without the expected stereo matches that are a `collapse`, or "
-               "over the threshold that are a knock at standstill.")
+               "Consecutive frames that raise a `collapse` (too few stereo matches), or a knock at "
+               "standstill (above the threshold).")
       .number("collapse_share", &M::collapse_share, 0.01, 0.9, "",
               "Share of the expected matches below which a frame counts towards a collapse.")
       .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",
