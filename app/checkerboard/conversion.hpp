@@ -37,7 +37,7 @@ enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
 [[nodiscard]] std::array<std::string, 2> format_opencv(const CalibrationFile& calibration,
                                                        Remarks* remarks);
 
-/// Files and their content: OUT, the two that it names with a comma between, or for ros left.yaml
+/// Files and their content: OUT, the two that it names, separated by a comma, or for ros left.yaml
 /// and right.yaml in the directory OUT. Throws InputError if the format has no second file.
 using WrittenFiles = std::vector<std::pair<std::filesystem::path, std::string>>;
 [[nodiscard]] WrittenFiles format_calibration_as(CalibrationFormat format, const std::string& out,
@@ -45,7 +45,7 @@ using WrittenFiles = std::vector<std::pair<std::filesystem::path, std::string>>;
                                                  Remarks* remarks);
 
 struct ConversionRequest {
-  /// A file, two with a comma between, or a directory with left.yaml and right.yaml.
+  /// A file, two separated by a comma, or a directory with left.yaml and right.yaml.
   std::string in{};
   /// As `in`.
   std::string out{};

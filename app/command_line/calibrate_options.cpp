@@ -25,8 +25,8 @@ ExitCode run_checkerboard_tool(const ProgramArguments& arguments) {
   const auto tool = find_checkerboard_tool(folder);
   if (!tool)
     throw InputError(
-        "calibrate: this needs {0}, which is not installed (looked beside the program in {1}, and "
-        "in {2}); install the package {0}, or build it: scripts/setup",
+        "calibrate: this needs {0}, which is not installed (it is neither in {1}, next to the "
+        "program, nor in {2}); install the package {0}, or build it: scripts/setup",
         kCheckerboardTool, folder.string(), (folder.parent_path() / "libexec/vergence").string());
   std::vector<char*> argv;
   // execv() only reads its arguments.
@@ -131,7 +131,7 @@ void declare_sequence(CLI::App& command, CalibrateOptions& o) {
 
 void declare_convert(CLI::App& command, CalibrateOptions& o) {
   add_option(command, "IN", o.in,
-             "Calibration to read, its format detected; two files with a comma between", "FILE")
+             "Calibration to read, of any supported format; two files separated by a comma", "FILE")
       ->required();
   add_option(command, "OUT", o.out, "File or files to write, or a directory for ROS", "FILE|DIR")
       ->required();

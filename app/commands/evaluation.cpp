@@ -281,7 +281,7 @@ std::string ins_mount_text(const InsMount& mount) {
   if (mount.axes_only)
     return "the data set has no INS-to-camera extrinsics: the camera is assumed at the INS, "
            "looking along its x axis; --estimate-ins-extrinsics estimates both\n";
-  return fmt::format("the INS is brought to the left camera by {}\n", mount.source);
+  return fmt::format("the INS is transformed to the left camera with {}\n", mount.source);
 }
 
 const char* mount_problem(MountStatus status) {

@@ -187,8 +187,8 @@ class Checks {
       else if (n.driver == "gige" && std::ranges::count(n.serial, '.') == 3)
         add("cameras", FindingState::advice,
             who + ": no camera at " + n.serial +
-                " answers a broadcast; this is normal behind a router, else check cable, power and "
-                "address",
+                " responds to a broadcast; this is normal behind a router, else check cable, power "
+                "and address",
             {"ping -c 3 " + n.serial});
       else
         add("cameras", FindingState::problem,

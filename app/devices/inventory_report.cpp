@@ -108,12 +108,12 @@ std::string udev_rules(const Inventory& inventory) {
   for (const iidc::FirewireNode& node : inventory.firewire) rules += firewire_rules(node);
 
   const std::string head =
-      "# Devices of this rig for members of the groups dialout (serial lines) and video (cameras), "
+      "# Devices of this rig for members of the groups dialout (serial ports) and video (cameras), "
       "by `vergence devices --write-udev`.\n"
       "# Install: copy to /etc/udev/rules.d/98-vergence-rig.rules, then: udevadm control --reload "
       "&& udevadm trigger\n";
   if (rules.empty())
-    return head + "# Nothing that needs a rule is plugged in. Network cameras need none.\n";
+    return head + "# No connected device needs a rule. Network cameras never need one.\n";
   return head + "\nACTION==\"remove\", GOTO=\"vergence_rig_end\"\n" + rules +
          "\nLABEL=\"vergence_rig_end\"\n";
 }

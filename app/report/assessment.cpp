@@ -26,13 +26,13 @@ constexpr std::array kAdvice{
     "inverted T_camera_left (X_camera = R X_left + t), distortion set for rectified images, wrong "
     "intrinsics, or cameras that do not expose together.",
     "Left and right are swapped, or T_camera_left is inverted: X_camera = R X_left + t.",
-    "Poses rested on few points: check the images for dirt, blur or a covered lens.",
+    "Few points constrained the poses: check the images for dirt, blur or a covered lens.",
     "One camera did not support the pose: check its images for dirt, blur or wrong exposure.",
     "Tracking failed: a shorter exposure or a higher frame rate helps in fast turns.",
-    "Frames are missing: check cables, trigger and the disk's speed; see the events for when.",
-    "After a gap the motion across it was extrapolated: use no distance that spans it.",
+    "Frames are missing: check cables, trigger and the disk's speed; the events state when.",
+    "The motion across a gap was extrapolated: do not use distances across it.",
     "The points constrained the pose poorly, as in tunnels, open fields and next to walls.",
-    "Much of the image moved independently: compare those sections with the map before use.",
+    "Much of the image moved independently: check those parts of the path before use.",
     "The calibration in use is not verified: turns and near objects at the roadside verify it.",
     "The rig did not fit its calibration: look for a camera that was knocked or is loose. If it "
     "never fitted, check the supplied calibration: T_camera_left or its rotation may be inverted, "

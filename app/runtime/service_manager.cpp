@@ -42,8 +42,8 @@ void ServiceManager::alive(std::uint64_t items, bool waiting, std::uint64_t roun
   any_ = true;
   last_ = now;
   beats_ = beats;
-  send(fmt::format("{}STATUS={} frames, readings and events handled", watched ? "WATCHDOG=1\n" : "",
-                   items));
+  send(fmt::format("{}STATUS={} frames, samples and events processed",
+                   watched ? "WATCHDOG=1\n" : "", items));
 }
 
 void ServiceManager::stopping() noexcept {

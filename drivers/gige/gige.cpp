@@ -20,7 +20,8 @@ class GigeDriver final : public CameraDriver {
     last_error_.clear();
     if (all.empty())
       last_error_ =
-          "no GigE camera answers a broadcast; check that its address is in the network of this "
+          "no GigE camera responds to a broadcast; check that its address is in the network of "
+          "this "
           "host and that no firewall blocks it";
     return all;
   }

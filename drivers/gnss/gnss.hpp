@@ -6,7 +6,7 @@
 
 namespace vergence::gnss {
 
-/// Satellite receivers on serial lines: the rows `nmea` and `ubx` of the table of INS drivers.
+/// Satellite receivers on serial links: the rows `nmea` and `ubx` of the table of INS drivers.
 [[nodiscard]] std::unique_ptr<InsDriver> make_driver(const Options& options);
 
 }  // namespace vergence::gnss

@@ -305,10 +305,9 @@ class Applier {
       // The gain is set by number.
       if (key == c->key) return;
     if (requested_.gain_db != 0 && options_.gain_step_db <= 0)
-      refuse(DeviceStatus::unsupported,
-             "how many dB a step of " + c->key + " (" + format_range(*c) +
-                 ") is, the camera does not report; set the option gain_step_db, or control_" +
-                 c->key);
+      refuse(DeviceStatus::unsupported, "the camera does not report the dB per step of " + c->key +
+                                            " (" + format_range(*c) +
+                                            "); set the option gain_step_db, or control_" + c->key);
     const double step = options_.gain_step_db > 0 ? options_.gain_step_db : 1;
     const std::int64_t value = c->least + std::llround(requested_.gain_db / step);
     if (value < c->least || value > c->most)

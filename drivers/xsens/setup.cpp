@@ -173,7 +173,7 @@ void Setup::fail(const char* what, DeviceStatus refused) {
   last_error_ = refused_by_device ? format_text("it refuses %s: %.*s (error %02X)", what,
                                                 static_cast<int>(error_text(reply_.error).size()),
                                                 error_text(reply_.error).data(), reply_.error)
-                                  : format_text("it does not answer to %s; check its cable", what);
+                                  : format_text("it does not respond to %s; check its cable", what);
   throw Refused{refused_by_device ? refused : to_status(reply_.answer)};
 }
 
@@ -187,7 +187,7 @@ DeviceStatus Setup::identify(Identity* identity) {
 }
 
 Identity Setup::identified() {
-  write(MessageId::device_id_request, {}, "the question for its id");
+  write(MessageId::device_id_request, {}, "the request for its id");
   if (reply_.size < 4)
     refuse(DeviceStatus::unsupported,
            "its identifier has fewer than four bytes, so it is not an XSens INS");
@@ -212,7 +212,7 @@ Identity Setup::identified() {
   } else if (reply_.answer == Answer::refused) {
     found.generation = Generation::legacy;
   } else {
-    fail("the question for its outputs");
+    fail("the request for its outputs");
   }
   return found;
 }
@@ -267,7 +267,7 @@ DeviceStatus Setup::measure() {
   return run_steps([&] {
     dialogue_.ask(MessageId::go_to_measurement, &reply_);
     if (reply_.answer == Answer::ok) return;
-    fail("to measure",
+    fail("the command to measure",
          reply_.error == kTooMuch ? DeviceStatus::no_bandwidth : DeviceStatus::failed);
   });
 }
@@ -298,7 +298,7 @@ void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
   if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.settings &= ~kSettingsUtc;
   check_load(line_budget(layout, rate_hz, baud_to_be()), rate_hz);
 
-  write(MessageId::configuration_request, {}, "the question for its configuration");
+  write(MessageId::configuration_request, {}, "the request for its configuration");
   DeviceConfiguration has;
   if (!read_configuration(reply_.bytes(), &has))
     refuse(DeviceStatus::unsupported,
@@ -315,7 +315,7 @@ void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
     write_u32(bytes, layout.settings);
     write(MessageId::output_settings, bytes, "the output settings");
   }
-  write(MessageId::data_length_request, {}, "the question for its message's length");
+  write(MessageId::data_length_request, {}, "the request for its message length");
   if (reply_.size != 2 || read_u16(reply_.bytes()) != layout.payload_size())
     refuse(DeviceStatus::unsupported,
            format_text("its messages have %u bytes, but its settings imply %zu; this firmware is "
@@ -330,7 +330,7 @@ void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
 
 void Setup::set_legacy_line(MessageId id, LegacySync parameter, std::uint32_t value) {
   const std::uint8_t which = static_cast<std::uint8_t>(parameter);
-  write(id, {&which, 1}, "the question for a synchronisation line");
+  write(id, {&which, 1}, "the request for a synchronisation line");
   LegacySync stored{};
   std::uint32_t has = 0;
   if (read_legacy_sync(reply_.bytes(), &stored, &has) && stored == parameter && has == value)
@@ -404,14 +404,14 @@ void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
   dialogue_.ask(MessageId::string_output, &reply_);
   if (reply_.answer == Answer::ok && reply_.size == 2 && read_u16(reply_.bytes()) != 0) {
     constexpr std::array<std::uint8_t, 2> kOff{0, 0};
-    write(MessageId::string_output, kOff, "to leave its text output");
+    write(MessageId::string_output, kOff, "the command to stop its text output");
   }
-  write(MessageId::output_configuration, {}, "the question for its outputs");
+  write(MessageId::output_configuration, {}, "the request for its outputs");
   OutputConfiguration has;
   if (!read_output_configuration(reply_.bytes(), &has) || !(has == requested)) {
     std::array<std::uint8_t, 4 * kMaxOutputs> bytes{};
     const std::size_t n = write_output_configuration(requested, bytes);
-    write(MessageId::output_configuration, std::span(bytes).first(n), "the outputs asked for");
+    write(MessageId::output_configuration, std::span(bytes).first(n), "the requested outputs");
     if (!read_output_configuration(reply_.bytes(), &has)) has = {};
   }
   // The response contains the applied values.
@@ -435,7 +435,7 @@ void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
 
 void Setup::set_mark4_lines(StreamSettings* stream) {
   if (options_.sync_out_hz == 0) return;
-  write(MessageId::sync_settings, {}, "the question for its synchronisation lines");
+  write(MessageId::sync_settings, {}, "the request for its synchronisation lines");
   SyncSettings has;
   if (!read_sync_settings(reply_.bytes(), &has))
     refuse(DeviceStatus::unsupported,

@@ -6,7 +6,7 @@
 
 namespace vergence::xsens {
 
-/// XSens INS on serial lines: the row `xsens` of the table of INS drivers.
+/// XSens INS on serial links: the row `xsens` of the table of INS drivers.
 [[nodiscard]] std::unique_ptr<InsDriver> make_driver(const Options& options = {});
 
 }  // namespace vergence::xsens
