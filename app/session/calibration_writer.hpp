@@ -7,11 +7,11 @@
 namespace vergence::app {
 
 /// Columns of calibrations.csv: rotation vectors and their sigmas in rad, lengths in m, image
-/// values in px; `sigma_` from noise only, `sigma_total_` with uncertain intrinsics. d0 … d3 are k1
-/// k2 p1 p2, or k1 … k4 of an equidistant lens. The latency is in frames since the alarm, the
-/// request or the start; held-out errors are medians before and after. Outcome `kept` means that
-/// the measurement was no better than the calibration in use. The last five columns are those of
-/// CalibrationDecision.
+/// values in px; `sigma_` by noise alone, `sigma_total_` including uncertain intrinsics. d0 … d3
+/// are k1 k2 p1 p2, or k1 … k4 of an equidistant lens. The latency is in frames since the alarm,
+/// the request or the start; held-out errors are medians before and after. Outcome `unchanged`
+/// means that the measurement was no better than the calibration in use. The last five columns are
+/// those of CalibrationDecision.
 inline constexpr const char* kCalibrationsHeader =
     "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_"
     "before_px,held_out_after_px,scale_sigma,camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,"
@@ -24,8 +24,8 @@ inline constexpr const char* kCalibrationsHeader =
 /// the one in use, and the state file for the next run. The state file gets an estimated
 /// calibration, or the initial one once verified.
 ///
-/// Threads  One producer calls on_…(), one consumer next(). An own thread (`vergence-state`) writes
-///          the files, because YAML allocates and a disk may block.
+/// Threads  One producer calls on_…(), one consumer next(). A separate thread (`vergence-state`)
+///          writes the files, because YAML allocates and a disk may block.
 /// Memory   Fixed for the producer.
 /// Full     A producer of a replay waits. In a live run the calibration is dropped and counted.
 /// Errors   The constructor throws InputError. Later failures are an event, or a fault of

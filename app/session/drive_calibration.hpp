@@ -16,7 +16,7 @@ struct DriveCalibration {
   bool verified = false;
   /// Moving frames with tracks.
   std::uint64_t frames = 0;
-  /// Independent solutions of parts of the drive.
+  /// Independent solutions of parts of the sequence.
   std::vector<calibration::RigSolution> stretches;
   /// agreement() of each solution with the one before, and the difference of their depths at 20 m
   /// in percent, for camera 1.
@@ -56,7 +56,7 @@ struct DrivePass {
                                                        Progress* progress);
 
 /// Text for the terminal: each parameter with its sigma, the depth error, and the agreement of the
-/// stretches.
+/// segments.
 [[nodiscard]] std::string describe(const DriveCalibration& found);
 
 /// Implements `vergence calibrate sequence`: calibrates from a recorded sequence instead of a

@@ -48,7 +48,7 @@ struct SourceIns {
   InsSource kind = InsSource::device;
   /// Origin of the INS extrinsics, in a few words.
   std::string mount_source{};
-  /// Memory of the readings, in addition to the comparison.
+  /// Memory of the samples, in addition to that of the comparison.
   std::size_t reading_bytes = 0;
 };
 
@@ -70,12 +70,12 @@ struct SourceFacts {
   /// Ground truth of a recording, the reference for an estimate without INS.
   Trajectory truth{};
   std::vector<SourceRemark> remarks{};
-  /// Assumptions about a recording where it lacks data, a phrase each.
+  /// Assumptions about a recording that replace missing data, one phrase each.
   std::vector<std::string> assumptions{};
   /// True if describe() compares the trajectory with ground truth.
   bool knows_truth = false;
   std::size_t image_bytes = 0, ring_bytes = 0;
-  /// Frame interval of a live drive, whose frames do not wait; zero if they wait.
+  /// Frame interval of a live run, whose frames do not wait; zero if they wait.
   Duration frame_interval{};
   /// Label of frames that were not used.
   const char* skipped_label = "skipped";
@@ -83,8 +83,8 @@ struct SourceFacts {
   bool on_request = false;
 };
 
-/// Source of a session's frames, readings and device events: devices (run_drive()) or a recorded
-/// drive (run_replay()). run_session() treats both alike.
+/// Source of a session's frames, INS samples and device events: devices (run_drive()) or a
+/// recording (run_replay()). run_session() treats both alike.
 ///
 /// next() and done() run on the estimator's thread, which is sealed. stop() is thread-safe. The
 /// caller makes the other calls; finish() and later ones after the estimator's thread was joined.

@@ -17,11 +17,13 @@ struct RunRequest {
   bool fast = false;
 };
 
-/// Drives: the cameras, INS and board of the configuration into a session folder (run_session()).
+/// Runs live on the cameras, INS and trigger board of the configuration and writes a session
+/// directory (run_session()).
 ///
-/// Errors   InputError, DeviceError before the session folder is made, for all that can be known by
-///          then. Afterwards messages on stderr.
-/// → as run_session(); device_failed: a camera was disconnected at the end
+/// Errors   Throws InputError or DeviceError before the directory is made, as far as possible.
+/// Later
+///          errors are messages on stderr.
+/// Returns  as run_session() does; device_failed if a camera was disconnected at the end.
 [[nodiscard]] ExitCode run_drive(const RunRequest& request);
 
 }  // namespace vergence::app

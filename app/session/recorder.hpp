@@ -67,7 +67,7 @@ class Recorder final : public SessionObserver {
   static constexpr std::chrono::seconds kRetry{3};
   // Number of records: 2 s of the fastest INS and its frames.
   static constexpr std::size_t kRing = 1024;
-  // Number of records that INS samples leave free.
+  // Number of records that INS samples must leave free for poses and events.
   static constexpr std::size_t kOfPoses = 128;
 
   using Record = std::variant<FrameReport, EventRecord, InsRecord>;

@@ -24,9 +24,9 @@ struct SessionStart {
   std::string name{};
   /// Camera names of the calibration, each once.
   std::vector<std::string> camera_names{};
-  /// First stamp of the drive.
+  /// First stamp of the run.
   Stamp first{};
-  /// Number of frames of the drive; 0 if unknown.
+  /// Number of frames of the run; 0 if unknown.
   std::uint64_t frames = 0;
   /// Empty in a replay and in virtual time.
   std::optional<ClockTie> tie{};

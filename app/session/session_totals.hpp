@@ -118,7 +118,7 @@ struct SessionTotals : FrameCounts, CalibrationTotals {
   std::vector<StampedPose> reference;
   /// Records dropped because their ring was full (live only).
   std::uint64_t dropped_records = 0;
-  /// INS readings dropped because their ring was full (live only).
+  /// INS samples dropped because their ring was full (live only).
   std::uint64_t dropped_readings = 0;
   /// Lines that the disk did not accept.
   std::uint64_t lost_lines = 0;

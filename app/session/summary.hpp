@@ -68,7 +68,7 @@ struct SummaryInput {
   std::optional<TruthMetrics> truth{};
   /// Assumptions about the recording.
   std::vector<std::string> assumptions{};
-  /// Timing statistics of a live drive; null in a replay.
+  /// Timing statistics of a live run; null in a replay.
   nlohmann::ordered_json time{};
 };
 
@@ -76,7 +76,7 @@ struct SummaryInput {
 /// (step 1), and these once more after one scale.
 [[nodiscard]] EvaluationOptions summary_evaluation_options();
 
-/// Prints the absolute and the relative error against what `reference` names, if there is one.
+/// Prints the absolute and the relative error, if there is a reference; `reference` is its name.
 void print_evaluation(const char* reference, const std::optional<TrajectoryEvaluation>& evaluation,
                       Progress* progress);
 

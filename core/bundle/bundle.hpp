@@ -233,7 +233,7 @@ struct BundleWorkspace;
 ///     BundleProblem problem;
 ///     problem.cameras = cameras;
 ///     problem.T_camera_left = T_camera_left;
-///     problem.T_left_world = poses;  // in/out; the first is held
+///     problem.T_left_world = poses;  // in/out; the first is constant
 ///     problem.points = points;       // in/out
 ///     problem.observations = observations;
 ///     const BundleResult result = adjuster.solve(problem, BundleOptions{});  // stereo odometry

@@ -9,7 +9,7 @@
 namespace vergence::calibration {
 namespace {
 
-// Usual rms shift of undisturbed frames at least, in pixels (build/bench/margin_bench).
+// Minimum of the usual rms shift of undisturbed frames, in px (build/bench/margin_bench).
 constexpr double kUsualShift = 0.12;
 // Number of measured frames over which the usual shift is averaged.
 constexpr int kScatterFrames = 20;

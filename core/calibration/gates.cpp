@@ -15,10 +15,10 @@
 namespace vergence::calibration {
 namespace {
 
-// Sigma in rad of the rotation that no epipolar line shows: for a calibration without sigmas that
-// is the rig's, and for one that is not. With the first, every published calibration of the seven
-// recorded sequences is verified (robustness_bench drives); the second is the size of a mounting
-// error.
+// Sigmas in rad of the rotation error that no epipolar line shows: of a calibration of this rig
+// without sigmas, and of a calibration of another rig. With the first, every published calibration
+// of the seven recorded sequences is verified (robustness_bench drives); the second is the size of
+// a mounting error.
 constexpr double kSuppliedYaw = 1e-3, kOtherYaw = 15e-3;
 // Prior probability that a supplied calibration is not the rig's, and rate of wrong decisions about
 // it; both are chosen.
@@ -162,7 +162,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     const double limit = source == CalibrationOrigin::this_drive ? m : m / kUnusualRatio;
     sharper = sharper && s < limit;
     a.nearer = a.nearer || (s < limit && difference > kChance * s);
-    // Evidence against one camera takes precedence over missing evidence about another.
+    // Evidence against one camera takes precedence over missing evidence for another.
     if (k > 1 && (contradicted == a.contradicted ? off <= worst : a.contradicted)) continue;
     worst = off;
     a.contradicted = contradicted;
@@ -189,7 +189,7 @@ const char* reason(Gate gate) noexcept {
   static constexpr std::array kReasons = {
       "",
       "the adjustment did not converge",
-      "the path driven is too short",
+      "the distance travelled is too short",
       "too few points are near enough to determine the depth",
       "the right camera is on the left: its cable or its order in the configuration is swapped",
       "the direction between the cameras is far from the configured one",

@@ -124,8 +124,8 @@ bool depth_difference(const Camera& left, const Camera& right, const Transform& 
                       const CovisiblePoint& p, double* relative) noexcept {
   Vec3 ray;
   if (!left.unproject(p.pixel, &ray)) return false;
-  // Find the point on the own ray that projects nearest to the match, by its inverse depth, so that
-  // points beyond infinity have a projection too.
+  // Find the point on the left ray that projects nearest to the match. The inverse depth is used
+  // because it also describes points beyond infinity.
   double inverse = 1.0 / p.depth_m;
   for (int step = 0; step < kDepthSteps; ++step) {
     Vec2 at;

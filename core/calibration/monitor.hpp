@@ -28,8 +28,8 @@ struct MonitorOptions {
   int short_window = 3;
   /// Moving frames of the longest window, which detects drift, 60 … 1800.
   int long_window = 300;
-  /// Consecutive frames without the expected matches that raise `collapse`, or over the threshold
-  /// that raise a knock at standstill, 2 … 60.
+  /// Consecutive frames that raise a `collapse` (without the expected matches), or a knock at
+  /// standstill (above the threshold), 2 … 60.
   int collapse_frames = 5;
   /// Share of the expected matches below which a frame counts towards a collapse, 0.01 … 0.9.
   double collapse_share = 0.2;

@@ -22,8 +22,8 @@ struct CalibrationOptions {
   /// Maximum number of observations of a solve, 10'000 … 1'000'000; beyond it frames are
   /// subsampled.
   int max_observations = 100'000;
-  /// Frames after a snapshot within which its solution is adopted or rejected, 0 … 1000; it needs
-  /// six at least.
+  /// Frames after a snapshot within which its solution is adopted or rejected, 0 … 1000; a decision
+  /// takes at least six frames.
   int adopt_after = 30;
   IntrinsicsEstimation intrinsics = IntrinsicsEstimation::full;
   /// Prior sigma of a focal length, 0.001 … 10.

@@ -12,8 +12,8 @@ namespace {
 
 // Noise of the distance in px, from two positions known to 0.15 px.
 constexpr double kNoise = 0.2;
-// Page's reference value: the log ratio by chance of two widths at standstill, each known to a
-// tenth. Without it the sum would drift above any bound.
+// Page's reference value: the log ratio that chance gives at standstill for two widths, each known
+// to a tenth. Without it the sum would drift above any bound.
 constexpr double kReference = 0.25;
 
 }  // namespace

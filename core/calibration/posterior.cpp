@@ -12,7 +12,7 @@ namespace vergence::calibration {
 namespace {
 
 // Random walk of a pinhole's parameters, in focal lengths, relative to the rotation's; temperature
-// causes both. Distortion coefficients walk as the rotation does.
+// causes both. Distortion coefficients have the random walk of the rotation.
 constexpr double kPinholeOfDrift = 0.3;
 
 void widen(RigCovariance* C, int row, double sigma) noexcept {
@@ -52,7 +52,7 @@ RigCovariance noise_only(const RigCovariance& wide) noexcept {
   RigCovariance noise = wide;
   for (int held = intrinsic_row(0); held < intrinsic_row(0) + 4; ++held) {
     const double variance = noise(held, held);
-    // Earlier parameters determine this one if only rounding is left of its variance.
+    // If only rounding is left of its variance, earlier parameters determine this one.
     constexpr double rounding = kRigSize * std::numeric_limits<double>::epsilon();
     if (!wide.known(held) || !(variance > rounding * wide(held, held))) continue;
     const RigCovariance before = noise;

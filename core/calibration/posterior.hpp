@@ -7,8 +7,8 @@ namespace vergence::calibration {
 /// Sigma of an unknown transform, rotation in rad and translation in baselines: wider than the
 /// error of any rig whose images still match.
 inline constexpr double kUnknownTransform = 0.2;
-/// Sigma of the transforms of a calibration that states none, in the same units: twice the yaw of
-/// 26 mrad that a recorded rig has in its principal points instead.
+/// Sigma of the transforms of a calibration without sigmas, in the same units: twice the yaw of 26
+/// mrad that the principal points of a recorded calibration contain.
 inline constexpr double kSuppliedTransform = 0.05;
 /// Usual RigCalibration::inflation of a solve of 15 to 25 frames: 5 to 37 on recorded sequences
 /// (build/bench/calibration_bench solves).
@@ -17,15 +17,15 @@ inline constexpr double kUsualInflation = 20;
 /// Widens the joint covariance of a calibration by the random walk of `hours`. Pure.
 void let_drift(double hours, const CalibrationOptions& options, RigCalibration* rig) noexcept;
 
-/// Replaces what is known of the transforms by `sigma`, rotation in rad and translation in
-/// baselines, and keeps the intrinsics. Pure.
+/// Sets the uncertainty of the transforms to `sigma`, rotation in rad and translation in baselines,
+/// and keeps that of the intrinsics. Pure.
 void assume_transforms(double sigma, RigCalibration* rig) noexcept;
 
 /// Squared difference of two calibrations' transforms of camera k ≥ 1 over its variance, mean over
 /// the five parameters that images determine; 1 on average for calibrations found from disjoint
 /// segments of one sequence if their sigmas are correct. No ground truth is needed.
 ///
-/// Both have their joint covariance. Sigmas are of noise alone, because both calibrations share the
+/// Both need a joint covariance. Sigmas are of noise alone, because both calibrations share the
 /// errors of fixed intrinsics. Pure.
 [[nodiscard]] double agreement(const RigCalibration& a, const RigCalibration& b, int k) noexcept;
 

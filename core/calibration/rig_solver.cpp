@@ -25,11 +25,11 @@ constexpr double kLossThreshold = 2.5;
 // Maximum number of steps of the last adjustment; a focal length with an error of a quarter takes
 // more than a hundred.
 constexpr int kMaxSteps = 200;
-// Last steps of the shared parameters, in standard deviations by white noise, which are usually a
-// fifth of the stated ones (inflation, calibration_bench solves): before outliers are removed; of
-// the result, whose error it is not to increase; and of a focal length, whose error lies along a
-// flat valley with small steps. With 1, KITTI 06 does not show a focal length that is a quarter too
-// long (calibration_bench focal).
+// Steps of the shared parameters at which a solve stops, in standard deviations by white noise,
+// which are usually a fifth of the stated ones (inflation, calibration_bench solves): before
+// outliers are removed; for the result, whose error must not increase; and for focal lengths, where
+// steps are small along a flat valley. With 1, KITTI 06 does not show a focal length that is a
+// quarter too long (calibration_bench focal).
 constexpr double kRough = 1, kPrecise = 0.2, kFlat = 0.1;
 
 // Maximum number of frames that a point is triangulated from.
@@ -40,7 +40,7 @@ constexpr double kWildResidual = 40.0;
 constexpr int kMinTies = 10;
 // Tracks share errors that clusters by track do not capture, so clusters are image cells (kCells a
 // side) and blocks of frames. kSharedErrors is the remaining ratio of the true variance of
-// transforms, on recorded and rendered sequences, to that by clusters (docs/calibration.md).
+// transforms, on recorded and rendered sequences, to that by clusters (docs/design.md).
 constexpr int kCells = 6;
 constexpr double kSharedErrors = 3.5;
 
@@ -374,7 +374,7 @@ double RigSolver::length_noise(const BundleResult& r) const noexcept {
   for (; first > 0 && held_[first] == 0; --first)
     driven += (poses_[first].centre() - poses_[first - 1].centre()).norm();
   if (!(driven > 0)) return 0;
-  // The pose's τ is in the axes of its own camera, and so is this direction.
+  // This direction, like the pose's τ, is in the axes of the pose's own camera.
   const Vec3 way = (poses_[r.pose] * poses_[first].inverse()).t.normalized();
   // Variance with inverse_sigma taken as true.
   const double believed = way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way);

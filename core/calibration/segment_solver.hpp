@@ -9,8 +9,7 @@ namespace vergence::calibration {
 /// full.
 ///
 /// Ownership  `given`, whose intrinsics are the priors, and `start`, the initial values of the
-/// first
-///            solve, are copied.
+///            first solve, are copied.
 /// Threads    One caller; solves run in add() and end(), some hundred milliseconds each.
 /// Memory     From the arena.
 class SegmentSolver {

@@ -59,8 +59,8 @@ class CalibrationFrames {
   [[nodiscard]] std::size_t min_frames() const noexcept {
     return static_cast<std::size_t>(options_.min_frames);
   }
-  /// Minimum number of frames of any solve: with the held-out frames, a supplied calibration is
-  /// evaluated as soon as a new one is solved.
+  /// Minimum number of frames of any solve: together with the held-out frames this makes
+  /// min_frames, so a supplied calibration is evaluated as early as possible.
   [[nodiscard]] std::size_t min_to_solve() const noexcept {
     return min_frames() - std::min<std::size_t>(min_frames(), kMinForMean);
   }

@@ -11,7 +11,7 @@ namespace vergence {
 /// Causes of `degraded` poses, strongest first: if several apply, the first one determines the
 /// reason.
 enum class Degradation : std::uint8_t {
-  /// The timing contradicts that this frame's images were exposed together.
+  /// According to the timing, this frame's images were not exposed together.
   pairing,
   /// The map was rebuilt in this frame or shortly before.
   scene,

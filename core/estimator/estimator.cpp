@@ -23,12 +23,12 @@ namespace {
 
 using Change = calibration::MonitorResult::Kind;
 
-// Number of frames in a window at speed, where each is a keyframe (the default of
-// odometry.window_keyframes). Whatever disturbs a frame is in the window for that long. A rebuilt
-// map and a dynamic scene are marked for as many frames, because a passing vehicle looks static in
-// single ones; a calibration with which so many good images in a row do not match is given up; and
-// a camera that repeated an image counts as in sync after as many moving frames, if the rig is not
-// monitored.
+// Number of frames in a window at speed, where every frame is a keyframe (the default of
+// odometry.window_keyframes). A disturbed frame stays in the window for this long. The same number
+// is used for other durations: a rebuilt map and a dynamic scene degrade this many frames, because
+// a passing vehicle looks static in single ones; a calibration is given up after this many
+// consecutive good image pairs without stereo matches; and without monitoring, a camera that
+// repeated an image counts as in sync after this many moving frames.
 constexpr int kWindowFrames = 10;
 // Relative uncertainty of lengths without a calibration, in percent. The baseline length then sets
 // the scale and is assumed, not measured; such poses are degraded.
@@ -197,8 +197,8 @@ struct Estimator::Parts {
     events.clear();
     decisions.clear();
     if (!options.online) return;
-    // At most: the solve that is running, one with the frames logged since, and a refinement with
-    // all frames.
+    // At most three solves: the running one, one with the frames logged since, and a refinement
+    // with all frames.
     while (!decisions.full()) {
       if (!calibrator.solving()) {
         if (!calibrator.start_last_solve()) return;
@@ -224,7 +224,7 @@ struct Estimator::Parts {
     return static_cast<double>(last_number - std::min(onset, last_number));
   }
 
-  /// Updates the state from whether there is a pose.
+  /// Updates the state according to whether the frame has a pose.
   void follow(const odometry::FrameOutcome& out) noexcept {
     // Report a gap once: with covered cameras every frame lies behind it.
     if (out.gap_s > 0 && !in_gap)
@@ -311,7 +311,7 @@ struct Estimator::Parts {
   }
 
   /// Detects a change of the rig during an estimation. Frames before and after the change must not
-  /// enter one solve, nor may later frames confirm a solution from earlier ones.
+  /// enter one solve, and later frames must not confirm a solution from earlier ones.
   void watch_estimate(const odometry::FrameOutcome& out) noexcept {
     const auto onset = calibrator.monitor().update_unlinked(odometry, out, last_number);
     if (!onset) return;
@@ -478,7 +478,7 @@ struct Estimator::Parts {
     if (decision.not_rigid && !std::exchange(not_rigid, true))
       record(Kind::rig_not_rigid,
              decision.offset_frames == 0
-                 ? "the extrinsics change all the time: a camera is loose"
+                 ? "the extrinsics keep changing: a camera is loose"
                  : "the images of the cameras are a fraction of a frame apart",
              decision.offset_frames);
     if (decision.is_refinement) {

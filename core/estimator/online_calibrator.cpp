@@ -253,7 +253,7 @@ void OnlineCalibrator::evaluate_estimate(CalibrationDecision* d) noexcept {
   d->accepted = gate_ == Gate::open;
   d->reason = calibration::reason(gate_);
   if (solved_.status == RigSolveStatus::ok) {
-    // The depth errors are those with the solution as the calibration in use.
+    // The depth errors are computed with the solution as the calibration in use.
     const calibration::Assessment then =
         assess(solved_.rig, calibration::CalibrationOrigin::this_drive);
     d->reference_depth_m = then.depth_m;

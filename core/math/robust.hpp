@@ -11,24 +11,24 @@ namespace vergence {
 inline constexpr double kMedianOfNormal = 0.6745;
 /// Thresholds of Huber's loss and of Tukey's biweight in scales; 95 % efficient for normal errors.
 inline constexpr double kHuber = 1.345, kTukey = 4.685;
-/// Minimum scale of residuals, in px or in sigmas of about as much; corners are not localised
-/// better.
+/// Minimum scale of residuals, in px or in sigmas of about that size; corners are not more
+/// accurate.
 inline constexpr double kMinScale = 0.05;
 /// Number of reweighting rounds; two reduce the scale from that of a shifted set to that of the
 /// noise.
 inline constexpr int kReweightings = 3;
-/// Number of standard errors that a single comparison needs.
+/// Number of standard errors that make a single comparison significant.
 inline constexpr double kChance = 2.0;
-/// Number of standard errors that a decision needs which is repeated with every frame or solve.
+/// Number of standard errors required for a decision that is repeated in every frame or solve.
 inline constexpr double kCertainSigmas = 3.0;
-/// Number of sigmas of a single value beyond which it has another cause than noise: not once in a
-/// million values, so in none of those of many frames.
+/// Number of sigmas beyond which a single value is not noise: noise exceeds it less than once in a
+/// million values.
 inline constexpr double kOutlierSigmas = 5.0;
-/// Minimum number of values, or frames, from which a mean and its standard error are known; the
-/// error is then known to a third.
+/// Minimum number of values or frames for a mean and its standard error, which is then accurate to
+/// a third.
 inline constexpr int kMinForMean = 6;
-/// Ratio of two widths (sigmas, median distances) above which they have different causes: of two
-/// that are known to a third, one in a hundred is three times the other.
+/// Ratio of two widths (sigmas, median distances) above which they have different causes: if both
+/// are accurate to a third, chance gives this ratio once in a hundred cases.
 inline constexpr double kUnusualRatio = 3.0;
 /// Minimum number of tracks for a median or a share of one frame; the median then has a quarter of
 /// a track's sigma, the share an error of 0.1.

@@ -19,8 +19,7 @@ struct RoughMatch {
 ///
 /// Threads  One caller.
 /// Memory   From the arena at construction. If there are more than kMaxPoints blobs, the weakest
-/// are
-///          dropped.
+///          are dropped.
 /// Errors   Images that are empty or too large give no matches.
 class BlobMatcher {
  public:

@@ -11,14 +11,14 @@ inline constexpr double kLongestExtrapolation = 2.0;
 /// axes.
 ///
 /// It is kFitInflation² times that of the frame's fit (`fit`: left perturbation φ rad, τ m), which
-/// takes the points as known although their errors last for many frames; the factor is measured
-/// (build/bench/covariance_bench). A motion extrapolated over `extrapolated_s` is uncertain by half
-/// of itself and by the unknown motion after kLongestExtrapolation. Pure.
+/// assumes exact points, although their errors last for many frames; the factor is measured
+/// (build/bench/covariance_bench). A motion extrapolated over `extrapolated_s` has a sigma of half
+/// its size, plus that of the unknown motion after kLongestExtrapolation. Pure.
 [[nodiscard]] Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                                      double extrapolated_s) noexcept;
-/// Covariance that the window's correction of a pose adds to the motion to it, because the
-/// correction belongs to earlier motions. T_adjusted_fitted is FrameOutcome::corrected; translation
-/// (m), then rotation (rad), about the left camera's axes. Pure.
+/// Covariance that the window's correction of a pose adds to the motion to it, because it corrects
+/// errors of earlier motions. T_adjusted_fitted is FrameOutcome::corrected; translation (m), then
+/// rotation (rad), about the left camera's axes. Pure.
 [[nodiscard]] Mat6 correction_covariance(const Transform& T_adjusted_fitted) noexcept;
 
 /// Returns true if a motion with covariance `motion` is consistent with standstill: within three

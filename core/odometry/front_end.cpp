@@ -147,7 +147,7 @@ bool FrontEnd::finish(int k, const Vec2& raw, double by_noise, double parallax,
   f->found = true;
   f->raw = raw.cast<float>();
   f->ideal = ideal.cast<float>();
-  // A sensor in daylight has a noise of about one grey level, for which `by_noise` is.
+  // `by_noise` is for a noise of one grey level, which is about that of a sensor in daylight.
   f->sigma = static_cast<float>(
       std::hypot(options_.pixel_sigma, by_noise, options_.parallax_sigma * parallax) *
       magnification);

@@ -26,8 +26,8 @@ inline constexpr double kImageMargin = 0.5 * features::kWindowStride + 1;
 struct ImageCheck {
   /// Bit k is set if camera k delivered an image.
   std::uint8_t given = 0;
-  /// Bit k is set if that image has structure and is from the left image's instant: repeated
-  /// exactly if the left one is.
+  /// Bit k is set if that image has structure and is from the left image's instant: it is a
+  /// repeated image if and only if the left one is.
   std::uint8_t structured = 0;
   /// True if a camera delivered its previous image or the left one's again, which noise makes
   /// impossible for a new image.
@@ -107,9 +107,9 @@ class FrontEnd {
   [[nodiscard]] int relocalise(Map& map, int k) noexcept;
 
   /// Matches corners of `left`, or blobs (OdometryOptions::init_features), in camera k without a
-  /// known rig, except that it rotates the image by less than about 20°. Descriptors are mutually
-  /// best and matches aligned; wrong ones remain. Takes about 10 ms, with blobs 30 ms. Valid until
-  /// the next call.
+  /// known rig; its images may be rotated by up to about 20° relative to the left ones. Descriptors
+  /// are mutually best and matches aligned; wrong ones remain. Takes about 10 ms, with blobs 30 ms.
+  /// Valid until the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
   /// Detects new corners of `left` where `map` has no points (null: everywhere). `effort` limits

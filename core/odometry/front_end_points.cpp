@@ -132,8 +132,7 @@ EpipolarEvidence FrontEnd::weigh_points(const Map& map) noexcept {
     if (!lenses_[0].ideal().unproject(p.now.pixel[0].cast<double>(), &curve.ray)) continue;
     const double off =
         features::fit_inverse_depth(curve, p.now.pixel[1].cast<double>(), &rho, &unused);
-    // Points are followed, not searched for in the band, so distances beyond it count, limited to
-    // it.
+    // Followed points may be outside the search band; larger distances count as its half width.
     if (off >= 0) (void)distances_.push(static_cast<float>(std::min(off, band_px_)));
   }
   return weigh_distances();

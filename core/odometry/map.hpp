@@ -14,7 +14,7 @@ inline constexpr std::size_t kMaxWindow = 20;
 /// Maximum number of points in the map: tracked ones and those that the window still observes.
 inline constexpr std::size_t kMaxPoints = 2048;
 
-/// Maximum number of consecutive frames for which a point may be hidden, or all of them lost.
+/// Maximum number of consecutive frames for which one point may be hidden, or all points lost.
 inline constexpr int kMissesAllowed = 2;
 /// Minimum number of frames in which a point was found before it constrains poses or tests the
 /// rig: a new point's match was searched for in the band of the calibration in use.

@@ -12,8 +12,8 @@ namespace vergence::odometry {
 
 namespace {
 
-// Number of frames without new points after which some are tried. A standing rig makes no keyframe,
-// and it also seems to stand next to a truck at its own speed.
+// Number of frames without new points after which some are tried: a standing rig makes no
+// keyframes, and a rig that follows a truck at its own speed seems to stand.
 constexpr int kFramesUntilTrial = 3;
 
 }  // namespace
@@ -184,7 +184,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const FrameWorkload effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
-  // A map with far points only continues but must not be rebuilt.
+  // A map can continue with far points only, but it must not be rebuilt from them.
   const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kMinAgreeing;
   if (next_rig_ && out.images_good) {
     out.relink_due = true;

@@ -12,7 +12,7 @@ namespace vergence::odometry {
 
 namespace {
 
-// Maximum rms residual in px, however many points agree; on a motorway wrong poses have such ones.
+// Maximum rms residual in px, whatever the number of inliers; wrong poses on a motorway exceed it.
 constexpr double kSampleResidual = 3.0;
 
 /// True if the pose of the sample is accurate enough to follow all points from it.
@@ -35,8 +35,8 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
-  // Try the prediction, then with a larger range, then the last pose as the image has turned since;
-  // but an attempt that gave a better pose is continued from there.
+  // Try the prediction, then the prediction with a larger range, then the last pose rotated by the
+  // image's shift since then. If an attempt improves the pose, the next one starts from it.
   PoseFit best;
   bool better = false, as_predicted = false;
   for (const int attempt : {0, 1, 2}) {
@@ -44,8 +44,8 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     Transform start = better ? best.T_left_world : predicted;
     if (attempt == 2 && !better)
       start = Transform{front_end_.turn_since_kept(), Vec3::Zero()} * motion_.T_left_world();
-    // A quarter of the points is enough for MLESAC, for a third of the work. An attempt that
-    // follows a failed one takes half of them, because few are found from a wrong prediction.
+    // A quarter of the points is enough for MLESAC and takes a third of the time. After a failed
+    // attempt half of the points are taken, because few are found from a wrong prediction.
     front_end_.follow_sample(map_, start, options_.features / (attempt == 0 ? 4 : 2), coarsest);
     clock.mark(Stage::track);
     fit = this->fit(start, true);
@@ -58,8 +58,9 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     if (sample_agrees(fit, kRigidShare)) break;
   }
   fit = best;
-  // Share of the points in view that must be found. Facades look alike; directly after a posed
-  // frame the right place is in view, too, and has more points than its likeness.
+  // Share of the points in view that must be found, because facades look alike. Directly after a
+  // posed frame none is required: the right place is then in view and has more matches than a
+  // similar one.
   double share = frames_lost_ > 0 || out->gap_s > 0 ? kMajority : 0;
   std::bitset<kMaxPoints> revived;
   if (!sample_agrees(fit, kChanceShare)) {
@@ -78,9 +79,9 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   };
   Transform start = fit.T_left_world;
   fit = follow_all(start);
-  // A pose that was not predicted may be rough: from there the finest level finds few points, and
-  // some at wrong places. Continue from the better pose while more points are found; each round
-  // reduces the error as one of a reweighted fit does.
+  // A pose that was not predicted may be rough: the finest level then finds few points, some of
+  // them at wrong places. Continue from the better pose while more points are found; each round
+  // reduces the error like a step of a reweighted fit.
   for (int round = 0; !as_predicted && fit.found && round < kReweightings; ++round) {
     const PoseFit before = fit;
     fit = follow_all(before.T_left_world);

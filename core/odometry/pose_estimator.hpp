@@ -6,9 +6,9 @@
 
 namespace vergence::odometry {
 
-/// Share of the found points that may agree with a wrong pose. Chosen: with a quarter, KITTI 01
-/// rotated by 0.3° of yaw has 1.08 % of segment error, with a fifth 0.84 % (calibration_bench
-/// drives).
+/// Share of the found points that may agree with a wrong pose. The value is chosen: with a quarter,
+/// KITTI 01 rotated by 0.3° of yaw has 1.08 % of segment error, with a fifth 0.84 %
+/// (calibration_bench drives).
 inline constexpr double kChanceShare = 0.2;
 /// Minimum share of points that are seen where pose and rig expect them: in a static scene it is
 /// 0.5 to 0.9, and 0.05 if the pose follows a moving object.

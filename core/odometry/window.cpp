@@ -181,9 +181,9 @@ WindowOutcome WindowAdjuster::solve(bool linked, const FrameWorkload& effort) no
   how.loss = BundleLoss::huber;
   how.loss_threshold = kHuber;
   how.max_steps = std::min<int>(options_.window_steps, effort.window_steps);
-  // An error of that many sigmas adds 5 % to that of the pose.
+  // A remaining error of this many sigmas increases the pose's error by 5 %.
   how.tolerance_sigmas = 0.3;
-  // The window starts near its optimum, which needs a step less than with the default.
+  // The window starts near its optimum, so less damping than the default saves a step.
   how.initial_damping = 1e-6;
   if (how.configuration == BundleConfiguration::stereo_calibration)
     how.shared_prior = {&prior_rig_, kInflation};

@@ -39,7 +39,8 @@ struct FocalMeasurement {
   /// True if the measurement is more probable with another focal length than with the configured
   /// one. Nothing is verified then, because the focal length scales all distances.
   bool doubted = false;
-  /// True if the configured value certainly does not fit the images; it is then doubted, too.
+  /// True if the configured value certainly does not fit the images; `doubted` is then true as
+  /// well.
   bool contradicted = false;
 };
 

@@ -3,7 +3,7 @@
 namespace vergence {
 
 /// Statistics of the decisions on one frame, each divided by its bound: 1 or more decides. They
-/// show how near an undisturbed drive comes to a false alarm (build/bench/margin_bench).
+/// show how close an undisturbed run comes to a false alarm (build/bench/margin_bench).
 struct DecisionMargins {
   /// Change of the rig, from the distances to epipolar lines: a knock or a drift.
   double change = 0;

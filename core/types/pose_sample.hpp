@@ -34,8 +34,8 @@ enum class Reason : std::uint8_t {
   no_image,
   /// An image has no structure: covered, black or saturated.
   image_no_contrast,
-  /// A camera delivered its previous image again, now or recently, while others went on. It may be
-  /// an exposure late until a dozen frames in motion show otherwise.
+  /// A camera delivered its previous image again, now or recently, while others delivered new ones.
+  /// It may be an exposure late until a dozen moving frames show otherwise.
   image_repeated,
   /// There is too little texture to start from.
   few_features,

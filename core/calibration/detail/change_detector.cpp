@@ -18,7 +18,7 @@ constexpr double kSpreadOutlier = 5;
 // Share of the threshold below which an alarm ends.
 constexpr double kRelease = 0.5;
 // Ratio of gains by which a drift must exceed a knock. The best step explains 8/9 of a ramp; this
-// is the middle between that and a ramp that explains nothing more, on a logarithmic scale.
+// ratio is the geometric mean of 9/8 and 1.
 constexpr double kRampGain = 1.06;
 // Ratio to the expected scatter above which a block's offset is a change of the rig.
 constexpr double kMaxOfExpected = 20;

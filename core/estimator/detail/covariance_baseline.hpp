@@ -12,9 +12,9 @@ namespace vergence {
 /// Baseline of the motions' uncertainty: the median over recent motions. A motion whose sigma is
 /// several times larger is unusual, until such motions have lasted so long that they are usual.
 ///
-/// Without faults the ratio is at most 2.0 on the recorded sequences but the rover's, where some
-/// motions exceed the limit, as on the rendered street (build/bench/margin_bench,
-/// robustness_bench drives). Cameras out of sync give more than 4 times, a tunnel 3 times
+/// Without faults the ratio is at most 2.0 on the recorded sequences except `sand_rover`; there and
+/// on the rendered street some motions exceed the limit (build/bench/margin_bench, robustness_bench
+/// drives). Cameras out of sync give more than 4 times, a tunnel 3 times
 /// (FaultPairs.imageLateAfterALostOneIsNotOk).
 ///
 /// Not thread-safe. Does not allocate.
@@ -43,8 +43,9 @@ class CovarianceBaseline {
  private:
   // Number of motions in the baseline: six seconds at 10 Hz.
   static constexpr std::size_t kKept = 61;
-  // Number of unusual motions in a row that are usual: a minute at 10 Hz, longer than most tunnels.
-  // After an hour's stand at dusk no motion is as certain as before.
+  // Number of consecutive unusual motions after which they count as usual: a minute at 10 Hz,
+  // longer than most tunnels. For example, after an hour's stand into dusk no motion is as certain
+  // as before.
   static constexpr int kUsual = 600;
 
   // The standard error of the median of a quarter of the motions is a third of their scatter.
@@ -57,7 +58,7 @@ class CovarianceBaseline {
 
   std::array<double, kKept> sigma_{};
   std::size_t next_ = 0, kept_ = 0;
-  // Number of unusual motions in a row.
+  // Number of consecutive unusual motions.
   int unusual_ = 0;
   // Sigma of the last motion over the baseline.
   double ratio_ = 0;
