@@ -225,12 +225,12 @@ std::string processor() {
 void print(const std::vector<Measured>& all, const Arguments& arguments, double yardstick) {
   fmt::print(
       "# Benchmarks\n\nWritten by `scripts/bench` (`build/bench/odometry_bench`), version {}, {}, "
-      "{} threads.\nMedian of {} replays' means; images decoded beforehand, the clock runs from "
-      "the decoded pair to the pose.\n"
+      "{} threads.\nTimes are from the decoded pair to the pose, with images decoded beforehand; "
+      "mean times are the median over {} replays.\n"
       "Accuracy and times are of odometry alone (`calibration.online: off`); the last column is "
       "the mean with monitoring and online calibration, the default.\n"
-      "Reference: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the same "
-      "run; only the ratio compares between machines.\n\n"
+      "The reference is OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the "
+      "same run; only the ratio can be compared between machines.\n\n"
       "| data | frames posed | ATE SE(3) mm | ATE Sim(3) mm | scale | segments % | after one scale "
       "% | after one scale and mounting % | °/m |\n|---|---|---|---|---|---|---|---|---|\n",
       app::version(), processor(), arguments.threads, arguments.repeats);
@@ -242,14 +242,14 @@ void print(const std::vector<Measured>& all, const Arguments& arguments, double 
                1e2 * m.evaluation.segments[1].translation, 1e2 * m.without_mount,
                m.evaluation.segments[0].rotation * 180.0 / std::numbers::pi);
   fmt::print(
-      "\nSegments: 0.2, 0.5, 1 m on EuRoC, 10 to 50 m on KITTI, every frame a start.\n\n| data | "
+      "\nSegments: 0.2, 0.5, 1 m on EuRoC, 10 to 50 m on KITTI, from every frame.\n\n| data | "
       "mean ms | p50 | p99 | max | reference ms | mean / reference | mean ms with online "
       "calibration |\n|---|---|---|---|---|---|---|---|\n");
   for (const Measured& m : all)
     fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.3f} | {:.2f} |\n", m.name,
                m.mean_ms, m.p50_ms, m.p99_ms, m.max_ms, yardstick,
                yardstick > 0 ? m.mean_ms / yardstick : 0, m.online_mean_ms);
-  fmt::print("\n| stage, ms a frame |");
+  fmt::print("\n| stage, ms per frame |");
   for (const Measured& m : all) fmt::print(" {} |", m.name);
   fmt::print("\n|---|");
   for (std::size_t i = 0; i < all.size(); ++i) fmt::print("---|");
@@ -259,8 +259,7 @@ void print(const std::vector<Measured>& all, const Arguments& arguments, double 
     fmt::print("\n| {} |", to_string(static_cast<Stage>(k)));
     for (const Measured& m : all) fmt::print(" {:.2f} |", m.stage_ms[k]);
   }
-  fmt::print(
-      "\n\nDecode runs on its own thread ahead of the estimator and is not in the times above.\n");
+  fmt::print("\n\nDecoding runs ahead on its own thread and is not included in the times above.\n");
 }
 
 Arguments parse(int argc, char** argv) {
