@@ -9,7 +9,7 @@
 
 namespace vergence::app {
 
-/// BackgroundRunner on its own thread. Both sides spin for 20 µs before they sleep in the kernel:
+/// BackgroundRunner on its own thread. Both sides spin for 50 µs before they sleep in the kernel:
 /// a task often ends, or follows, within microseconds, and waking a sleeper costs more.
 ///
 /// Threads  One thread calls start(), busy() and wait(); the task runs on the other. The

@@ -56,18 +56,21 @@ void lay_out(BundleWorkspace& w, const BundleCapacities& c, Arena& arena) {
   take(w.poses, c.poses, "bundle: poses");
   take(w.point_free, batches * kBatch, "bundle: free points");
   take(w.y, w.block_capacity * kYTop, "bundle: Y of poses");
-  take(w.y_group, std::min(kGroupLimit * c.poses, w.block_capacity) * kYSize,
-       "bundle: Y of a group");
   take(w.y_shared, batches * shared_blocks * kYSize, "bundle: Y of shared parameters");
   take(w.factors, batches * kFactorRows * kBatch, "bundle: point factors");
-  take(w.sums, c.poses * c.cameras * kPoseSums * kBatch, "bundle: sums of poses");
-  take(w.intrinsic_sums, c.shared ? c.poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch : 0,
-       "bundle: sums of intrinsics");
-  take(w.intrinsic_own,
-       c.shared ? kMaxCameras * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch : 0,
-       "bundle: intrinsics");
-  take(w.reduced, w.reduced_capacity * kBatch, "bundle: reduced gradient");
-  take(w.A, ld * w.reduced_capacity, "bundle: reduced system");
+  for (BundleSums* s : {static_cast<BundleSums*>(&w), &w.second_half}) {
+    if (s == &w.second_half && w.runner == nullptr) break;
+    take(s->y_group, std::min(kGroupLimit * c.poses, w.block_capacity) * kYSize,
+         "bundle: Y of a group");
+    take(s->sums, c.poses * c.cameras * kPoseSums * kBatch, "bundle: sums of poses");
+    take(s->intrinsic_sums, c.shared ? c.poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch : 0,
+         "bundle: sums of intrinsics");
+    take(s->intrinsic_own,
+         c.shared ? kMaxCameras * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch : 0,
+         "bundle: intrinsics");
+    take(s->reduced, w.reduced_capacity * kBatch, "bundle: reduced gradient");
+    take(s->A, ld * w.reduced_capacity, "bundle: reduced system");
+  }
   take(w.rhs, ld, "bundle: right-hand side");
   take(w.delta, ld, "bundle: step");
   take(w.squared, w.slot_capacity * kBatch, "bundle: squared residuals");
@@ -274,7 +277,8 @@ class Solve {
 
 }  // namespace
 
-BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
+BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena, PairRunner* runner)
+    : workspace_(nullptr) {
   // Limits of the index types.
   constexpr std::size_t kMaxPoses = 65535, kMaxObservations = 1U << 28U;
   if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMaxPoses ||
@@ -282,6 +286,7 @@ BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : worksp
     throw std::invalid_argument(
         "bundle adjustment: capacities out of range (cameras 1 … 4, poses 1 … 65535)");
   workspace_ = arena.make<BundleWorkspace>(1, "bundle: workspace").data();
+  workspace_->runner = runner;
   lay_out(*workspace_, c, arena);
 }
 

@@ -215,6 +215,7 @@ struct BundleCapacities {
   std::size_t blocks = 0;
 };
 
+class PairRunner;
 namespace detail {
 struct BundleWorkspace;
 }
@@ -239,7 +240,8 @@ struct BundleWorkspace;
 ///     const BundleResult result = adjuster.solve(problem, BundleOptions{});  // stereo odometry
 ///
 /// Ownership  The problem's arrays are the caller's; no reference is kept after solve().
-/// Threads    solve() by one thread at a time; adjusters are independent of each other.
+/// Threads    solve() by one thread at a time; adjusters are independent of each other. A runner
+///            outlives the adjuster.
 /// Memory     From the arena at construction, nothing in solve().
 /// Time       One pass over the observations per step, at most max_steps. Deterministic on one
 ///            machine; SIMD targets differ by rounding.
@@ -250,7 +252,9 @@ struct BundleWorkspace;
 ///            (core/README.md).
 class BundleAdjuster {
  public:
-  BundleAdjuster(const BundleCapacities& capacities, Arena& arena);
+  /// `runner` (optional): linearises half of the points on either thread, which takes a second
+  /// reduced system of memory. Results depend on whether there is one, not on its threads.
+  BundleAdjuster(const BundleCapacities& capacities, Arena& arena, PairRunner* runner = nullptr);
   [[nodiscard]] BundleResult solve(const BundleProblem& problem,
                                    const BundleOptions& options) noexcept;
 

@@ -26,7 +26,7 @@ Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bo
       rig_known_(known),
       front_end_(options, rig_, arena, runner, masks),
       map_(static_cast<std::size_t>(options.window_keyframes), arena),
-      window_(options, rig_, arena),
+      window_(options, rig_, arena, runner),
       poses_(options, rig_, arena),
       initialiser_(static_cast<std::size_t>(options.features), options.seed, arena) {
   if (known) return;

@@ -37,8 +37,8 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options,
 }
 
 WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig,
-                               Arena& arena)
-    : options_(options), rig_(rig), adjuster_(capacities(options, rig), arena) {
+                               Arena& arena, PairRunner& runner)
+    : options_(options), rig_(rig), adjuster_(capacities(options, rig), arena, &runner) {
   const BundleCapacities c = capacities(options, rig);
   points_ = BoundedVector<Vec3>(arena.make<Vec3>(c.points, "window points"));
   owner_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.points, "window points"));

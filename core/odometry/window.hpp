@@ -25,7 +25,8 @@ struct WindowOutcome {
 /// Memory  From the arena at construction. Observations beyond its capacity are left out.
 class WindowAdjuster {
  public:
-  WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
+  WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
+                 PairRunner& runner);
 
   /// Adjusts the newest keyframes within the limits of `effort`. Writes poses and points back if
   /// the result is usable, and drops observations beyond the robust limit. T_camera_left() has the

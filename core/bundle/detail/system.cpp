@@ -35,13 +35,8 @@ System::System(BundleWorkspace& workspace, const BundleProblem& problem,
   job_.poses = w_.poses.data();
   job_.point_free = w_.point_free.data();
   job_.y = w_.y.data();
-  job_.y_group = w_.y_group.data();
   job_.y_shared = w_.y_shared.data();
   job_.factors = w_.factors.data();
-  job_.sums = w_.sums.data();
-  job_.intrinsic_sums = w_.intrinsic_sums.data();
-  job_.intrinsic_own = w_.intrinsic_own.data();
-  job_.reduced = w_.reduced.data();
   job_.loss = options.loss;
   job_.threshold2 = options.loss_threshold * options.loss_threshold;
   job_.free_poses = w_.free_poses;
@@ -94,30 +89,61 @@ void System::prepare(const BundleState& state) noexcept {
   job_.behind = false;
 }
 
+std::array<std::span<double>, 5> System::used(const BundleSums& sums) const noexcept {
+  const std::size_t poses = problem_.T_left_world.size();
+  const auto classes = static_cast<std::size_t>(job_.classes);
+  const bool intrinsics =
+      std::any_of(std::begin(job_.shared.intrinsic_count), std::end(job_.shared.intrinsic_count),
+                  [](int count) { return count > 0; });
+  return {sums.A.first(ld_ * rows_), sums.sums.first(poses * classes * kPoseSums * kBatch),
+          sums.reduced.first(rows_ * kBatch),
+          sums.intrinsic_sums.first(intrinsics ? poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch
+                                               : 0),
+          sums.intrinsic_own.first(intrinsics ? sums.intrinsic_own.size() : 0)};
+}
+
+void System::linearise_part(KernelJob& job, const BundleSums& sums, std::size_t first,
+                            std::size_t last) noexcept {
+  for (const std::span<double> all : used(sums)) std::fill(all.begin(), all.end(), 0.0);
+  job.y_group = sums.y_group.data();
+  job.sums = sums.sums.data();
+  job.intrinsic_sums = sums.intrinsic_sums.data();
+  job.intrinsic_own = sums.intrinsic_own.data();
+  job.reduced = sums.reduced.data();
+  for (std::size_t b = first; b < last;) {
+    std::size_t end = b + 1;
+    while (end < last && w_.batches[end].group == w_.batches[b].group) ++end;
+    job.group_begin = w_.batches[b].block_begin;
+    detail::linearise(job, b, end);
+    if (rows_ > 0) subtract_points(job, b, end, sums.A.data(), ld_);
+    b = end;
+  }
+}
+
+void System::linearise_halves() noexcept {
+  // Time is spent on the blocks, so either half has as many of them.
+  std::size_t middle = 0;
+  while (middle < w_.batch_count && w_.batches[middle].block_end <= w_.block_count / 2) ++middle;
+  KernelJob second = job_;
+  auto here = [&]() noexcept { linearise_part(job_, w_, 0, middle); };
+  auto there = [&]() noexcept { linearise_part(second, w_.second_half, middle, w_.batch_count); };
+  w_.runner->run(TaskRef(here), TaskRef(there));
+  const auto to = used(w_), from = used(w_.second_half);
+  for (std::size_t k = 0; k < to.size(); ++k)
+    for (std::size_t i = 0; i < to[k].size(); ++i) to[k][i] += from[k][i];
+  job_.cost += second.cost;
+  job_.squared_px += second.squared_px;
+  job_.weighted += second.weighted;
+  job_.behind = job_.behind || second.behind;
+}
+
 bool System::linearise(const BundleState& state, double damping) noexcept {
   prepare(state);
   job_.damping = damping;
-  std::fill_n(w_.A.begin(), ld_ * rows_, 0.0);
-  std::fill_n(
-      w_.sums.begin(),
-      problem_.T_left_world.size() * static_cast<std::size_t>(job_.classes) * kPoseSums * kBatch,
-      0.0);
-  std::fill_n(w_.reduced.begin(), rows_ * kBatch, 0.0);
-  bool any_intrinsics = false;
-  for (const int count : job_.shared.intrinsic_count) any_intrinsics = any_intrinsics || count > 0;
-  if (any_intrinsics) {
-    std::fill_n(w_.intrinsic_sums.begin(),
-                problem_.T_left_world.size() * kMaxCameras * kIntrinsicsSize * 6 * kBatch, 0.0);
-    std::fill(w_.intrinsic_own.begin(), w_.intrinsic_own.end(), 0.0);
-  }
-  for (std::size_t b = 0; b < w_.batch_count;) {
-    std::size_t end = b + 1;
-    while (end < w_.batch_count && w_.batches[end].group == w_.batches[b].group) ++end;
-    job_.group_begin = w_.batches[b].block_begin;
-    detail::linearise(job_, b, end);
-    if (rows_ > 0) subtract_points(job_, b, end, w_.A.data(), ld_);
-    b = end;
-  }
+  if (w_.runner == nullptr)
+    linearise_part(job_, w_, 0, w_.batch_count);
+  else
+    linearise_halves();
   cost_ = job_.cost + prior_cost(state);
   if (job_.behind || !std::isfinite(cost_) || !std::isfinite(job_.squared_px)) return false;
   assemble(state);

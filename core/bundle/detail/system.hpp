@@ -1,4 +1,7 @@
 #pragma once
+#include <array>
+#include <span>
+
 #include "core/bundle/detail/kernels.hpp"
 #include "core/bundle/detail/shared_prior.hpp"
 #include "core/bundle/detail/workspace.hpp"
@@ -39,6 +42,11 @@ class System {
 
  private:
   void prepare(const BundleState& state) noexcept;
+  /// The parts of the arrays that the problem uses.
+  [[nodiscard]] std::array<std::span<double>, 5> used(const BundleSums& sums) const noexcept;
+  void linearise_part(KernelJob& job, const BundleSums& sums, std::size_t first,
+                      std::size_t last) noexcept;
+  void linearise_halves() noexcept;
   void assemble(const BundleState& state) noexcept;
   void assemble_pose(std::size_t pose) noexcept;
   void assemble_intrinsics() noexcept;

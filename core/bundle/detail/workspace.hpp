@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/bundle/bundle.hpp"
+#include "core/types/parallel.hpp"
 
 namespace vergence::detail {
 
@@ -158,8 +159,13 @@ struct BundleState {
   Camera cameras[kMaxCameras];
 };
 
+/// Outputs of linearise() and subtract_points() that all batches add to.
+struct BundleSums {
+  std::span<double> y_group, sums, intrinsic_sums, intrinsic_own, reduced, A;
+};
+
 /// Memory of one adjuster, laid out once for its capacities.
-struct BundleWorkspace {
+struct BundleWorkspace : BundleSums {
   BundleCapacities capacity;
   std::size_t block_capacity = 0, slot_capacity = 0, reduced_capacity = 0;
 
@@ -177,11 +183,12 @@ struct BundleWorkspace {
   std::span<PoseBlock> blocks;
   std::span<Slot> slots;
   std::span<KernelPose> poses;
-  std::span<double> point_free, y, y_group, y_shared, factors, sums, intrinsic_sums, intrinsic_own,
-      reduced;
-  std::span<double> A, rhs, delta;
+  std::span<double> point_free, y, y_shared, factors, rhs, delta;
   std::span<float> squared;
   BundleState states[2];
+  /// Null if all batches are summed in turn, else the second half of them has sums of its own.
+  PairRunner* runner = nullptr;
+  BundleSums second_half;
 
   /// Sizes of the current problem; points have observations.
   std::size_t batch_count = 0, block_count = 0, slot_count = 0, point_count = 0;

@@ -1,12 +1,14 @@
 #pragma once
 
 #include "app/simulation/rig_simulation.hpp"
+#include "core/types/parallel.hpp"
 
 namespace vergence {
 
 /// An adjuster with an arena of its own.
 struct OwnAdjuster {
-  explicit OwnAdjuster(const BundleCapacities& c) : adjuster(c, arena) {}
+  explicit OwnAdjuster(const BundleCapacities& c, PairRunner* runner = nullptr)
+      : adjuster(c, arena, runner) {}
   Arena arena;
   BundleAdjuster adjuster;
 };

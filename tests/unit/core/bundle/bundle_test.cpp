@@ -17,11 +17,13 @@ TEST(Bundle, calibrationIsExactOnNoiseFreeData) {
                       .noise = 0,
                       .start_translation = 0.5,
                       .start_points = -1};
-  OwnAdjuster own(capacities_for(s));
+  SequentialRunner runner;
+  OwnAdjuster whole(capacities_for(s)), halves(capacities_for(s), &runner);
   Random random(11);
   for (int run = 0; run < 100; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
-    const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
+    const BundleResult r =
+        (run % 2 == 0 ? whole : halves).adjuster.solve(rig.problem(), calibration_options());
     ASSERT_TRUE(r.converged()) << run;
     EXPECT_LT(r.rms_px, kExactPixel) << run;
     EXPECT_LT(rotation_error(rig, 1), kExactRadian) << run;

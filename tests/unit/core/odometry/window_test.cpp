@@ -30,7 +30,8 @@ struct Bend {
   OdometryOptions options = many_steps();
   Arena arena;
   Map map{6, arena};
-  WindowAdjuster adjuster{options, calibration, arena};
+  SequentialRunner runner;
+  WindowAdjuster adjuster{options, calibration, arena, runner};
   std::vector<Transform> poses;
   std::vector<Vec3> points;
 
