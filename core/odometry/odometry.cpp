@@ -115,7 +115,7 @@ void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::single_camera;
   else if (stereo_fails_ || !fit.confirmed_stereo())
     out->reason = Reason::no_stereo_matches;
-  else if (fit.inliers < options_.ok_inliers)
+  else if (fit.inliers < options_.ok_inliers || fit.scale > kOutlierSigmas)
     out->reason = Reason::few_inliers;
   else if (fit.near < kMinAgreeing)
     out->reason = Reason::weak_geometry;

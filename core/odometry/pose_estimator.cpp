@@ -83,6 +83,7 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample,
   s.found = true;
   s.T = r.T_left_world;
   s.rms_px = r.rms_px;
+  s.scale = r.scale;
   s.inliers = r.inliers;
   // It stays zero if the observations do not determine the pose.
   if (const Cholesky<6> factor(r.information); factor.ok()) s.covariance = factor.inverse();
@@ -131,6 +132,7 @@ PoseFit PoseEstimator::fit_all(const Map& map, const Transform& start, bool samp
   if (s.found) {
     fit.T_left_world = s.T;
     fit.rms_px = s.rms_px;
+    fit.scale = s.scale;
     fit.covariance = s.covariance;
     for (std::size_t i = 0; i < owner_.size(); ++i) agrees_[owner_[i]] = refiner_.flags()[i];
   }

@@ -33,6 +33,8 @@ struct PoseFit {
   /// Number of points found in the images.
   int given = 0;
   double rms_px = 0;
+  /// Median residual in sigmas of the observations; 1 if they have the noise that they state.
+  double scale = 1;
   /// Bit k is set if camera k has at least a few of the inliers.
   std::uint8_t cameras = 0;
   /// Covariance of T_left_world with fixed points: left perturbation (φ rad, τ m), about the left
@@ -84,7 +86,7 @@ class PoseEstimator {
     bool found = false;
     int inliers = 0;
     Transform T{};
-    double rms_px = 0;
+    double rms_px = 0, scale = 1;
     Mat6 covariance = Mat6::Zero();
   };
   /// Fills the table with the observations of every point in the cameras that `cameras_of` selects
