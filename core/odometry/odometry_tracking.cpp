@@ -12,13 +12,10 @@ namespace vergence::odometry {
 
 namespace {
 
-// Maximum rms residual in px, whatever the number of inliers; wrong poses on a motorway exceed it.
-constexpr double kSampleResidual = 3.0;
-
 /// True if the pose of the sample is accurate enough to follow all points from it.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
   return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given &&
-         fit.rms_px < kSampleResidual;
+         fit.scale < kOutlierSigmas;
 }
 
 }  // namespace
