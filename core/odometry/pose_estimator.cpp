@@ -196,6 +196,7 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
     } else {
       T_camera_left[c] = s.T * fit.T_left_world.inverse();
     }
+    fit.scale = std::max(fit.scale, s.scale);
     squares += s.rms_px * s.rms_px;
     ++cameras;
   }
