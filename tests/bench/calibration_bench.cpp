@@ -14,14 +14,12 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
-#include <span>
 
 #include <fmt/format.h>
 
 #include "app/runtime/background_thread.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "core/calibration/health.hpp"
-#include "core/calibration/posterior.hpp"
 #include "core/calibration/segment_solver.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"

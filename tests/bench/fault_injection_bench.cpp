@@ -4,7 +4,6 @@
 // Ends with 1 where an `ok` pose was wrong, a session is not whole, the program failed, did not say
 // it or is not usable any more, and with 2 where there is nothing to drive or to judge by.
 #include <algorithm>
-#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>

@@ -17,7 +17,6 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "app/config/configuration.hpp"
-#include "app/datasets/image_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/background_thread.hpp"

@@ -1,8 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <span>
 
 #include "firmware_iface/nmea/nmea.hpp"
 #include "firmware_iface/ubx/ubx.hpp"

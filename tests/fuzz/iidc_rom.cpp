@@ -1,7 +1,5 @@
 /// Any bytes as a camera's configuration ROM. Entry point of libFuzzer; the unit tests call it with
 /// seeded mutations.
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <vector>

@@ -1,9 +1,6 @@
 /// Any bytes as an image file. Entry point of libFuzzer; the unit tests call it with seeded
 /// mutations.
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
-#include <vector>
 
 #include "app/datasets/image_file.hpp"
 

@@ -1,7 +1,6 @@
 /// Any bytes as drive.mcap of a session, read for a replay. Entry point of libFuzzer.
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "app/datasets/recorded_session.hpp"
 #include "tests/fuzz/input_errors.hpp"

@@ -8,8 +8,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
-#include <string>
 
 #include "tests/support/mutated.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "app/datasets/times_file.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/fuzz/input_errors.hpp"
 #include "tests/fuzz/scratch_folder.hpp"

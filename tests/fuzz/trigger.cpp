@@ -77,14 +77,9 @@ class Bench {
 
   /// As a host would: 100 Hz, feedback and PPS, and off.
   void begin() {
-    TriggerConfig config{};
-    config.rate_millihertz = 100'000;
-    config.pulse_us = 100;
-    config.dither_us = script_.byte();
-    config.lines = 0x3;
-    config.feedback_inputs = script_.byte() % 4;
-    config.pps_edge = trigger_edge_rising;
-    config.ins_edge = trigger_edge_falling;
+    const std::uint8_t dither_us = script_.byte(), inputs = script_.byte() % 4;
+    const TriggerConfig config{
+        100'000, 100, dither_us, 0x3, 0, inputs, 0, trigger_edge_rising, trigger_edge_falling};
     std::uint8_t payload[trigger_config_payload_size], frame[trigger_max_frame];
     trigger_put_config(&config, payload);
     std::size_t n = trigger_write_frame(trigger_config, 0, payload, sizeof payload, frame);

@@ -1,11 +1,8 @@
 #pragma once
 #include <atomic>
-#include <cstdint>
 #include <functional>
 #include <span>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include "drivers/v4l2/node.hpp"
 

@@ -2,9 +2,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "app/datasets/detail/formats.hpp"
 #include "tests/support/temporary_folder.hpp"

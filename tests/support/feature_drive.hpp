@@ -1,7 +1,4 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/geometry/observations.hpp"

@@ -30,14 +30,10 @@ GvspFrame GigeCamera::make_frame(std::uint64_t number, HostStamp when) {
   if (!options_.extended_ids && block_ > 0xFFFFU) block_ = 1;
   f.ticks = ticks(when);
   f.pixel_format = word(pixel_format);
-  f.width = static_cast<int>(word(width));
-  f.height = static_cast<int>(word(height));
+  f.width = lie_width_ > 0 ? lie_width_ : static_cast<int>(word(width));
+  f.height = lie_width_ > 0 ? lie_height_ : static_cast<int>(word(height));
   f.offset_x = static_cast<int>(word(offset_x));
   f.offset_y = static_cast<int>(word(offset_y));
-  if (lie_width_ > 0) {
-    f.width = lie_width_;
-    f.height = lie_height_;
-  }
   const std::size_t bytes = static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) *
                             (f.pixel_format >> 16U & 0xFFU) / 8;
   const std::uint8_t* given = options_.images ? options_.images(number) : nullptr;

@@ -8,7 +8,6 @@
 
 #include "app/session/drive_calibration.hpp"
 #include "app/session/summary.hpp"
-#include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/shared_data.hpp"

@@ -1,14 +1,9 @@
 #pragma once
-#include <array>
-#include <filesystem>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "app/config/configuration.hpp"
-#include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "core/types/pose_sample.hpp"

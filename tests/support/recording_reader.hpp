@@ -1,8 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <vector>
 
 #include "app/datasets/detail/bag_scan.hpp"
 

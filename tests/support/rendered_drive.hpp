@@ -1,10 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <functional>
-#include <memory>
-#include <vector>
 
-#include "core/types/calibration.hpp"
 #include "core/types/rig_frame.hpp"
 #include "drivers/mock/world/drive.hpp"
 #include "drivers/mock/world/renderer.hpp"

@@ -1,14 +1,7 @@
 #pragma once
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <filesystem>
 #include <fstream>
 #include <initializer_list>
 #include <numbers>
-#include <string>
-
-#include <fmt/format.h>
 
 #include "app/session/calibration_writer.hpp"
 #include "app/session/records.hpp"

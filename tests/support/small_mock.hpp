@@ -1,7 +1,5 @@
 #pragma once
-#include <memory>
 #include <string>
-#include <vector>
 
 #include "drivers/mock/mock_rig.hpp"
 #include "tests/support/parallel_rig.hpp"

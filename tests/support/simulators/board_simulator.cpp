@@ -1,7 +1,6 @@
 #include "tests/support/simulators/board_simulator.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <utility>
 

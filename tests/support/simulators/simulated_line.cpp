@@ -1,7 +1,6 @@
 #include "tests/support/simulators/simulated_line.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <mutex>
 #include <utility>
 

@@ -1,8 +1,5 @@
 #pragma once
-#include <cstddef>
 #include <deque>
-#include <memory>
-#include <string>
 
 #include "drivers/serial/serial_link.hpp"
 #include "tests/support/simulators/device_model.hpp"

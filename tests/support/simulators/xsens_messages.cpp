@@ -1,7 +1,6 @@
 #include "tests/support/simulators/xsens_messages.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "core/math/types.hpp"

@@ -1,7 +1,6 @@
 #include "tests/support/simulators/xsens_simulator.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 

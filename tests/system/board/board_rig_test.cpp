@@ -4,11 +4,8 @@
 #include <errno.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <atomic>
 #include <fstream>
 #include <map>
-#include <string_view>
 
 #include "drivers/serial/serial.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"

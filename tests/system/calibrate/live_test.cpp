@@ -1,6 +1,5 @@
 // `vergence calibrate live CONFIG` on real GigE Vision over the loopback: a drawn board before two
 // simulated cameras.
-#include <gtest/gtest.h>
 
 #include "app/config/calibration_file.hpp"
 #include "tests/support/gige_pair.hpp"

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "core/math/se3.hpp"
 #include "tests/system/odometry/estimator_run.hpp"

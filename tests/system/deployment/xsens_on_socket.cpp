@@ -2,17 +2,12 @@
 // serial line.
 //   xsens_on_socket PATH
 // Connects (waiting up to a minute), and ends when the other side closes.
-#include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
 #include <sys/socket.h>
 #include <sys/un.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdio>
-#include <string>
-#include <thread>
 
 #include "tests/support/xsens_terminal.hpp"
 

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstddef>
 
 #include "tests/system/faults/fault_drive.hpp"
 

@@ -2,9 +2,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <cstdint>
-#include <string>
-
 #include "drivers/gige/detail/link.hpp"
 
 namespace vergence::test {

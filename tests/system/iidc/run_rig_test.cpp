@@ -1,7 +1,6 @@
 // `vergence run` on emulated IIDC cameras that look at a rendered drive: what the example
 // configurations do on real stacks.
 
-#include <atomic>
 #include <cstdlib>
 
 #include "app/report/session.hpp"

@@ -1,6 +1,5 @@
 // A simulated XSens INS at the far end of an emulated FTDI converter, behind the kernel's ftdi_sio
 // and libserialport.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -1,8 +1,6 @@
 #include "tests/system/odometry/estimator_run.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include <fmt/format.h>
 

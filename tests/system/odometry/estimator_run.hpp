@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <limits>
 #include <memory>
 #include <string>
 

@@ -1,15 +1,9 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
 #include "core/camera/camera.hpp"
-#include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "core/odometry/odometry.hpp"
 #include "tests/system/odometry/estimator_run.hpp"
-#include "tests/system/odometry/stereo_drive.hpp"
 
 namespace vergence::test {
 namespace {

@@ -26,15 +26,13 @@ StereoDrive render(const RenderedDriveOptions& options, std::size_t frames) {
 
 RigCalibration distorted_rig() {
   RigCalibration rig{.cameras = 2};
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& c = rig.intrinsics[k];
-    c.width = 640;
-    c.height = 480;
-    c.fx = c.fy = 550.0;
-    c.cx = k == 0 ? 318.7 : 323.1;
-    c.cy = k == 0 ? 241.2 : 237.9;
-    c.distortion = {-0.21, 0.06, 0.0004, -0.0003, 0};
-  }
+  rig.intrinsics[0] = rig.intrinsics[1] = {.width = 640,
+                                           .height = 480,
+                                           .fx = 550,
+                                           .fy = 550,
+                                           .distortion = {-0.21, 0.06, 0.0004, -0.0003, 0}};
+  rig.intrinsics[0].cx = 318.7, rig.intrinsics[0].cy = 241.2;
+  rig.intrinsics[1].cx = 323.1, rig.intrinsics[1].cy = 237.9;
   rig.T_camera_left[1] = {exp_so3(Vec3(0.004, -0.006, 0.003)), Vec3(-0.75, 0.003, 0.005)};
   rig.baseline = rig.T_camera_left[1].t.norm();
   return rig;

@@ -1,7 +1,5 @@
 // Small copies of inputs that users have: what is read, reported or refused, and why.
-#include <gtest/gtest.h>
 
-#include <cmath>
 #include <functional>
 
 #include <fmt/format.h>

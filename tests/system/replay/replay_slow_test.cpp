@@ -1,7 +1,6 @@
 // A first drive of which nothing is known but focal length and baseline, on recorded images.
 #include "app/config/calibration_file.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <fmt/format.h>
@@ -10,7 +9,6 @@
 #include "tests/support/shared_data.hpp"
 #include "tests/system/replay/quick_start.hpp"
 #include "tests/system/run/session.hpp"
-#include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {
 namespace {

@@ -1,5 +1,3 @@
-#include <array>
-
 #include "tests/support/child_program.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/ros_messages.hpp"

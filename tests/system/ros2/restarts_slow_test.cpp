@@ -2,9 +2,6 @@
 #include <fcntl.h>
 #include <sched.h>
 
-#include <algorithm>
-#include <fstream>
-
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>

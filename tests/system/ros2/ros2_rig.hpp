@@ -169,12 +169,10 @@ class StreamSession {
       : publisher_(app::make_line_publisher(
             app::open_line_socket({app::LineAddress::Kind::unix_socket, socket, {}}, "test"),
             &requests, {})) {
-    app::SessionStart start;
-    start.name = "session";
-    start.camera_names = {"left", "right"};
-    start.can_recalibrate = true;
-    start.image_bytes = kWidth * kHeight;
-    publisher_->on_start(start);
+    publisher_->on_start({.name = "session",
+                          .camera_names = {"left", "right"},
+                          .image_bytes = kWidth * kHeight,
+                          .can_recalibrate = true});
   }
 
   void calibrate(double fx) {

@@ -1,7 +1,6 @@
 // The resident memory of a run of twenty minutes does not grow.
 #include <gtest/gtest.h>
 #include <sys/types.h>
-#include <unistd.h>
 
 #include <cstdint>
 #include <optional>

@@ -1,8 +1,5 @@
-#include <gtest/gtest.h>
-
 #include <chrono>
 #include <cmath>
-#include <cstdint>
 #include <utility>
 
 #include "app/datasets/trajectory_files.hpp"

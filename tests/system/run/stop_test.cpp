@@ -1,11 +1,6 @@
 // SIGTERM before a drive has begun, SIGHUP in the middle of it.
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <csignal>
-#include <thread>
-
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/live_drive.hpp"
 
 namespace vergence {

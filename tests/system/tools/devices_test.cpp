@@ -1,11 +1,8 @@
-#include <gtest/gtest.h>
-
 #include <algorithm>
 
 #include <nlohmann/json.hpp>
 
 #include "tests/support/gige_camera.hpp"
-#include "tests/support/mentions.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 

@@ -1,9 +1,6 @@
-
-
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/image_file.hpp"
-#include "core/math/random.hpp"
 #include "tests/support/gige_pair.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"

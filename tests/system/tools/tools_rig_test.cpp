@@ -1,6 +1,5 @@
 // `vergence devices`, `doctor` and `snap` on the kernel's real stacks: two cameras of each kind and
 // an INS on an FTDI converter (tests/rigs/README.md).
-#include <fcntl.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

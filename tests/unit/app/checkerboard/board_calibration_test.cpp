@@ -1,7 +1,5 @@
 #include "app/checkerboard/board_calibration.hpp"
 
-#include <gtest/gtest.h>
-
 #include "app/checkerboard/board_detector.hpp"
 #include "app/checkerboard/board_images.hpp"
 #include "tests/support/refusal.hpp"

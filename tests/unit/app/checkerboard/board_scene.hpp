@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <cmath>
 #include <string>
 #include <vector>
 
@@ -16,14 +15,9 @@ inline RigCalibration known_rig(int cameras, CameraModelKind kind) {
   RigCalibration rig{.cameras = cameras};
   for (int k = 0; k < cameras; ++k) {
     Intrinsics& lens = rig.intrinsics[static_cast<std::size_t>(k)];
-    lens.kind = kind;
-    lens.width = 640;
-    lens.height = 480;
     const bool radtan = kind == CameraModelKind::pinhole_radtan;
-    lens.fx = (radtan ? 520.0 : 290.0) + 3 * k;
-    lens.fy = (radtan ? 521.0 : 291.0) + 2 * k;
-    lens.cx = 322.0 - 2 * k;
-    lens.cy = 238.0 + 3 * k;
+    const double f = radtan ? 520 : 290;
+    lens = {kind, 640, 480, f + 3 * k, f + 1 + 2 * k, 322.0 - 2 * k, 238.0 + 3 * k};
     lens.distortion = radtan ? std::array{-0.28, 0.09, 0.0008, -0.0005, 0.0}
                              : std::array{-0.02, 0.008, -0.004, 0.0008, 0.0};
     if (k > 0)

@@ -1,7 +1,5 @@
 #include "app/checkerboard/conversion.hpp"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 
 #include <fmt/format.h>

@@ -7,8 +7,6 @@
 
 #include "app/session/ins_file.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/comparison/geodesy.hpp"
-#include "core/math/se3.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -196,6 +194,5 @@ TEST(EvaluateCommand, refusesInvalidArguments) {
   EXPECT_EQ(evaluate_command({a}).code, 2);
 }
 
-// Without times row belongs to row, and that takes as many.
 }  // namespace
 }  // namespace vergence::app

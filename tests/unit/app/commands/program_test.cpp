@@ -1,7 +1,3 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/nearest.hpp"

@@ -1,10 +1,6 @@
 #include "app/config/calibration_file.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <tuple>
-#include <vector>
 
 #include "app/config/calibration_checks.hpp"
 #include "core/math/random.hpp"
@@ -72,12 +68,9 @@ CalibrationFile awkward() {
     const auto number = [&random](double size) { return size * (random.uniform() - 0.5); };
     Intrinsics& i = c.rig.intrinsics[k];
     i.kind = k % 2 == 0 ? CameraModelKind::pinhole_radtan : CameraModelKind::pinhole_equidistant;
-    i.width = 1024;
-    i.height = 768;
-    i.fx = 980 + number(1);
-    i.fy = 980 + number(1);
-    i.cx = 512 + number(1);
-    i.cy = 384 + number(1);
+    i.width = 1024, i.height = 768;
+    i.fx = 980 + number(1), i.fy = 980 + number(1);
+    i.cx = 512 + number(1), i.cy = 384 + number(1);
     for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d) i.distortion[d] = number(0.1);
     i.sigma = {number(1) + 1, 1e-300, 1.0 / 3.0, 0.1};
     for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d)

@@ -1,7 +1,5 @@
 #include "app/config/calibration_state.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cstdlib>
 
 #include "tests/support/parallel_rig.hpp"

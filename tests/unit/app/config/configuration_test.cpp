@@ -1,15 +1,10 @@
 #include "app/config/configuration.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <limits>
-#include <utility>
-
-#include <fmt/format.h>
 
 #include "app/config/schema.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 

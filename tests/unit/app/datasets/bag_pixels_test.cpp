@@ -1,5 +1,4 @@
 // Decoded pixels of each encoding of sensor_msgs/Image and CompressedImage, in both containers.
-#include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
 

@@ -1,9 +1,5 @@
 #include "app/datasets/detail/bag_scan.hpp"
 
-#include <gtest/gtest.h>
-
-#include <span>
-
 #include "tests/support/bag_writer.hpp"
 #include "tests/support/refusal.hpp"
 

@@ -1,7 +1,4 @@
-#include <gtest/gtest.h>
 #include <sqlite3.h>
-
-#include <memory>
 
 #include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/ros_camera.hpp"

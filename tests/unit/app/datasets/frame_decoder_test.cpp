@@ -1,7 +1,5 @@
 #include "app/datasets/frame_decoder.hpp"
 
-#include <gtest/gtest.h>
-
 #include <tuple>
 
 #include <opencv2/core.hpp>

@@ -5,8 +5,6 @@
 #include <zlib.h>
 
 #include <array>
-#include <string_view>
-#include <vector>
 
 #include "app/datasets/image_file.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"

@@ -2,7 +2,6 @@
 
 #include <sys/stat.h>
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include "app/datasets/image_writer.hpp"

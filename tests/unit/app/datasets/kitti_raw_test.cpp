@@ -1,9 +1,5 @@
-#include <gtest/gtest.h>
-
 #include <cmath>
-#include <functional>
 #include <numbers>
-#include <vector>
 
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/times_file.hpp"

@@ -1,17 +1,10 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
 #include <numbers>
 
 #include <fmt/format.h>
 #include <GeographicLib/LocalCartesian.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/frame_decoder.hpp"
-#include "app/datasets/image_file.hpp"
-#include "app/datasets/stereo_sequence.hpp"
 #include "core/math/random.hpp"
 #include "core/types/bayer.hpp"
 #include "tests/support/refusal.hpp"

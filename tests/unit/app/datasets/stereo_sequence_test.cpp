@@ -1,7 +1,5 @@
 #include "app/datasets/stereo_sequence.hpp"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 
 #include "tests/support/refusal.hpp"

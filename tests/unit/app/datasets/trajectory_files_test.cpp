@@ -1,12 +1,8 @@
 #include "app/datasets/trajectory_files.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <array>
-
 #include "app/datasets/text_file.hpp"
-#include "app/datasets/times_file.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 

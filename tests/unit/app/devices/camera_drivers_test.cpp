@@ -1,9 +1,5 @@
 #include "app/devices/camera_drivers.hpp"
 
-#include <gtest/gtest.h>
-
-#include <array>
-
 #include "app/devices/drive_sync.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/refusal.hpp"
@@ -14,14 +10,13 @@ namespace {
 /// GigE cameras of 320 x 240 pixels with these serials.
 Configuration gige(const std::vector<std::string>& serials) {
   Configuration c;
-  for (std::size_t k = 0; k < serials.size(); ++k) {
-    CameraSettings& s = c.cameras[k];
-    s.driver = "gige";
-    s.serial = serials[k];
-    s.width = 320, s.height = 240;
-    s.exposure_us = 2000;
-    s.trigger = CameraTrigger::software;
-  }
+  for (std::size_t k = 0; k < serials.size(); ++k)
+    c.cameras[k] = {.driver = "gige",
+                    .serial = serials[k],
+                    .width = 320,
+                    .height = 240,
+                    .trigger = CameraTrigger::software,
+                    .exposure_us = 2000};
   c.trigger.rate = 30;
   return c;
 }

@@ -1,7 +1,5 @@
 #include "app/devices/camera_masks.hpp"
 
-#include <gtest/gtest.h>
-
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/parallel_rig.hpp"

@@ -1,7 +1,5 @@
 #include "app/devices/doctor_checks.hpp"
 
-#include <gtest/gtest.h>
-
 #include <functional>
 
 #include <nlohmann/json.hpp>

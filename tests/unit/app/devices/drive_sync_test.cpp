@@ -1,7 +1,5 @@
 #include "app/devices/drive_sync.hpp"
 
-#include <gtest/gtest.h>
-
 #include <filesystem>
 #include <set>
 #include <utility>

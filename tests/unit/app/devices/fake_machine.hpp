@@ -35,10 +35,7 @@ struct FakeMachine {
   }
   /// A camera of 1280 x 960 pixels in the configuration.
   void need(const std::string& driver, const std::string& serial) {
-    app::CameraSettings& c = drive.cameras[cameras++];
-    c.driver = driver;
-    c.serial = serial;
-    c.width = 1280, c.height = 960;
+    drive.cameras[cameras++] = {.driver = driver, .serial = serial, .width = 1280, .height = 960};
     given = true;
   }
   [[nodiscard]] app::CheckContext context() const {

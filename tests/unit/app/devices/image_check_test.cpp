@@ -1,9 +1,5 @@
 #include "app/devices/image_check.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cstdint>
-
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "core/math/random.hpp"

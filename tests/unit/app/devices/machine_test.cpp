@@ -1,6 +1,5 @@
 #include "app/devices/inventory.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,13 +1,6 @@
 #include "app/devices/serial_devices.hpp"
 
-#include <gtest/gtest.h>
-
-#include <utility>
-#include <vector>
-
 #include "app/devices/camera_drivers.hpp"
-#include "app/runtime/errors.hpp"
-#include "tests/support/mentions.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/xsens_terminal.hpp"
 

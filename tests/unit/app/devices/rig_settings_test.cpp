@@ -1,7 +1,5 @@
 #include "app/devices/rig_settings.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <numbers>
 #include <vector>

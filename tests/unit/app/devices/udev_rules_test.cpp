@@ -1,9 +1,6 @@
 #include "app/devices/inventory_report.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cstdlib>
-#include <sstream>
 
 #include "tests/unit/app/devices/fake_machine.hpp"
 

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <span>
 #include <utility>
 
 #include "app/datasets/image_file.hpp"

@@ -3,8 +3,6 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-#include <gtest/gtest.h>
-
 #include <array>
 #include <random>
 #include <vector>

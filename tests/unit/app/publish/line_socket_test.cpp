@@ -9,7 +9,6 @@
 
 #include <array>
 
-#include "app/runtime/errors.hpp"
 #include "drivers/clock.hpp"
 #include "tests/support/temporary_folder.hpp"
 

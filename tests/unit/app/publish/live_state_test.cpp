@@ -46,10 +46,7 @@ void add_frame(LiveState* state, const FrameReport& report) {
 
 TEST(LiveState, sendsChangesSinceAVersion) {
   LiveState state;
-  SessionStart start;
-  start.name = "a drive";
-  start.frames = 100;
-  state.begin(start);
+  state.begin({.name = "a drive", .frames = 100});
   add_frame(&state, at(0));
   // This motion is too short for a step of the trail.
   add_frame(&state, at(0.1));

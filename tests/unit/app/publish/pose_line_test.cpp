@@ -46,10 +46,9 @@ nlohmann::json line_of(const PoseSample& pose, const std::optional<EnuPose>& ear
 }
 
 TEST(PoseLine, hasEveryKeyOfTheSchema) {
-  EnuPose earth;
-  earth.T_enu_left.t = {1, 2, 3};
-  earth.position = {-27.4975, 153.0137, 60};
-  earth.yaw = (90 - 358.25) * std::numbers::pi / 180;
+  const EnuPose earth{{Mat3::Identity(), {1, 2, 3}},
+                      {-27.4975, 153.0137, 60},
+                      (90 - 358.25) * std::numbers::pi / 180};
   auto j = line_of(sample(), earth, 21.5);
   const Eigen::Quaterniond q = quaternion(sample().T_world_left.R);
   for (std::size_t i = 0; i < 4; ++i)

@@ -10,7 +10,6 @@
 
 #include <gtest/gtest.h>
 
-#include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
 #include "tests/support/quantile.hpp"
 #include "tests/support/recording_reader.hpp"

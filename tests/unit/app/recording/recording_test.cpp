@@ -1,12 +1,9 @@
 #include "app/recording/recording.hpp"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 
-#include "app/recording/messages.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/mentions.hpp"
@@ -58,11 +55,9 @@ using test::TemporaryFolder;
 constexpr std::size_t kText = 0, kImage = 1;
 
 Recording::Options options() {
-  Recording::Options o;
-  o.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}};
-  o.queues = {4U << 20U};
-  o.when_full = WhenFull::wait;
-  return o;
+  return {.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}},
+          .queues = {4U << 20U},
+          .when_full = WhenFull::wait};
 }
 
 std::string text_of(int n) { return "message " + std::to_string(n); }

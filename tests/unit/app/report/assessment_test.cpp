@@ -25,10 +25,9 @@ struct Case {
 
   Case() {
     for (int i = 0; i < 1000; ++i) {
-      Frame f{.stamp = at(0.05 * i), .posed = true};
-      f.status = PoseStatus::ok;
-      f.estimate_ms = 10;
-      session.frames.push_back(f);
+      session.frames.push_back({.stamp = at(0.05 * i), .posed = true});
+      session.frames.back().status = PoseStatus::ok;
+      session.frames.back().estimate_ms = 10;
     }
     session.summary = {{"calibration", {{"rating", "good"}}},
                        {"timing_ms", {{"p99", 20.0}}},
@@ -42,11 +41,12 @@ struct Case {
   }
   nlohmann::json& calibration() { return session.summary["calibration"]; }
   CalibrationRow& attempt(bool accepted, const char* cause, double before_px, double after_px) {
-    CalibrationRow row{.accepted = accepted, .decided = true, .cause = cause};
-    row.reason = accepted ? "" : "it is worse";
-    row.held_out_before_px = before_px;
-    row.held_out_after_px = after_px;
-    session.calibrations.push_back(row);
+    session.calibrations.push_back({.accepted = accepted,
+                                    .decided = true,
+                                    .cause = cause,
+                                    .reason = accepted ? "" : "it is worse",
+                                    .held_out_before_px = before_px,
+                                    .held_out_after_px = after_px});
     return session.calibrations.back();
   }
   void event(double s, const char* kind, const std::string& message = "") {

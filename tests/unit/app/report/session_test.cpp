@@ -1,7 +1,5 @@
 #include "app/report/session.hpp"
 
-#include <gtest/gtest.h>
-
 #include <fmt/ranges.h>
 
 #include "app/runtime/errors.hpp"

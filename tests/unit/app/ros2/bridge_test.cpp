@@ -4,7 +4,6 @@
 
 #include <map>
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "app/datasets/detail/ros_reader.hpp"

@@ -4,8 +4,6 @@
 #include <array>
 #include <map>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

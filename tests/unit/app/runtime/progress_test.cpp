@@ -1,7 +1,5 @@
 #include "app/runtime/progress.hpp"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <sstream>
 

@@ -1,7 +1,6 @@
 #include "app/runtime/realtime.hpp"
 #include "tests/support/mentions.hpp"
 
-#include <gtest/gtest.h>
 #include <pthread.h>
 #include <unistd.h>
 

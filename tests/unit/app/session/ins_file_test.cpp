@@ -1,7 +1,5 @@
 #include "app/session/ins_file.hpp"
 
-#include <gtest/gtest.h>
-
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 

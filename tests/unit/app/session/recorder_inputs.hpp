@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 
 #include "app/session/records.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -3,17 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
-#include <functional>
 #include <future>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/session/session_quota.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "tests/support/within.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 

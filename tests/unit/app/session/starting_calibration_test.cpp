@@ -1,7 +1,5 @@
 #include "app/session/starting_calibration.hpp"
 
-#include <gtest/gtest.h>
-
 #include "app/config/calibration_state.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"

@@ -1,7 +1,5 @@
 #include "app/session/summary.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <memory>
 
@@ -23,12 +21,11 @@ TEST(TimeHistogram, meanAndMaxAreExactAndPercentilesWithinTheirBin) {
 }
 
 SummaryInput input() {
-  SummaryInput in;
-  in.calibration.cameras = 2;
+  SummaryInput in{.skipped = 2,
+                  .calibration = {.cameras = 2},
+                  .memory = {{"a_bytes", 3}, {"b_bytes", 4}},
+                  .configuration_hash = "0123"};
   in.calibration.T_camera_left[1].t = {-0.5, 0, 0};
-  in.memory = {{"a_bytes", 3}, {"b_bytes", 4}};
-  in.skipped = 2;
-  in.configuration_hash = "0123";
   return in;
 }
 

@@ -26,15 +26,14 @@ struct Review {
     test::FeatureDrive d(drive);
     test::log_drive(d, 20, {}, log);
     in_use.T_camera_left[1].R = exp_so3(turned) * truth.T_camera_left[1].R;
-    RigSolution& s = solved;
-    s.status = RigSolveStatus::ok;
-    s.rig = truth;
-    s.newest = kNewest;
-    s.frames = options.max_frames;
-    s.travelled_m = 100;
-    s.near = 1000;
+    solved = {.status = RigSolveStatus::ok,
+              .rig = truth,
+              .newest = kNewest,
+              .frames = options.max_frames,
+              .near = 1000,
+              .travelled_m = 100};
     for (int row = extrinsic_row(1); row < extrinsic_row(1) + 3; ++row)
-      s.rig.covariance.set(row, row, kSigma * kSigma);
+      solved.rig.covariance.set(row, row, kSigma * kSigma);
   }
   [[nodiscard]] Gate gate() const {
     return check_acceptance(

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <cmath>
 
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"

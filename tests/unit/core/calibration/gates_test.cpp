@@ -27,18 +27,16 @@ struct Case {
   explicit Case(const test::FurtherCamera* further) {
     test::FeatureDrive d(drive);
     test::log_drive(d, 50, {}, log, further);
-    solution.status = RigSolveStatus::ok;
-    const RigCalibration rig =
-        further != nullptr ? test::rig_of(drive, *further) : test::rig_of(drive);
-    solution.rig = rig;
+    solution = {.status = RigSolveStatus::ok,
+                .rig = further != nullptr ? test::rig_of(drive, *further) : test::rig_of(drive),
+                .newest = 29,
+                .frames = 30,
+                .tracks = 900,
+                .near = 500,
+                .travelled_m = 8};
     for (std::size_t k = 1; k < static_cast<std::size_t>(solution.rig.cameras); ++k)
       solution.rig.sigma_noise[k] =
           solution.rig.sigma_total[k] = {1e-4, 1e-4, 1e-4, 1e-3, 2e-3, 2e-3};
-    solution.newest = 29;
-    solution.frames = 30;
-    solution.tracks = 900;
-    solution.near = 500;
-    solution.travelled_m = 8;
     nominal = solution.rig;
     nominal.T_camera_left[1] = {Mat3::Identity(), {-0.75, 0, 0}};
     in_use = solution.rig;

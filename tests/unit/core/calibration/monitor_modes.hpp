@@ -1,10 +1,7 @@
 #pragma once
 #include <Eigen/Cholesky>
 
-#include <cstdint>
-
 #include "core/calibration/detail/change_detector.hpp"
-#include "core/math/random.hpp"
 #include "tests/unit/core/calibration/monitor_trial.hpp"
 
 namespace vergence::test {
@@ -89,11 +86,7 @@ class ModeDrive {
     o.drive_s = 60, o.stop_s = 15;
     int moving = 0;
     watch(o, 2250, [&](const calibration::MonitorFrame& frame, const auto& stereo) {
-      Frame f;
-      f.moving = frame.moving;
-      f.spread_now = stereo.spread_now;
-      f.evidence = stereo;
-      frames_.push_back(f);
+      frames_.push_back({stereo, frame.moving, stereo.spread_now});
       if (!frame.moving || frame.frame < 100) return;
       ++moving, spread_now_ += stereo.spread_now, spread_life_ += stereo.spread_life;
     });

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <cmath>
 
 #include "core/math/random.hpp"
 

@@ -1,13 +1,10 @@
 #pragma once
-#include <cmath>
 #include <functional>
 #include <memory>
 #include <numbers>
 #include <optional>
 
 #include "core/calibration/detail/monitor_residuals.hpp"
-#include "core/calibration/monitor.hpp"
-#include "core/geometry/epipolar.hpp"
 #include "tests/support/feature_drive.hpp"
 
 namespace vergence::test {

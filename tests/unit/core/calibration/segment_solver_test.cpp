@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <vector>
 
 #include "core/calibration/health.hpp"
 #include "tests/unit/core/calibration/feature_log.hpp"

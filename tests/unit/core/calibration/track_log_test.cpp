@@ -16,11 +16,10 @@ struct Log {
   Log(std::size_t frames, std::size_t observations) : log(frames, observations, arena) {}
   /// A frame with as many observations; tracks are numbered 100 · frame + i.
   void frame(std::uint64_t number, std::uint32_t observations) {
-    LoggedFrame f;
-    f.number = number;
-    f.T_left_world.t = Vec3(0, 0, -static_cast<double>(number));
-    f.stereo = 7;
-    log.begin(f);
+    log.begin({.number = number,
+               .T_left_world = {Mat3::Identity(), {0, 0, -static_cast<double>(number)}},
+               .stereo = 7,
+               .observations = {}});
     for (std::uint32_t i = 0; i < observations; ++i) {
       LoggedObservation s{.track = static_cast<std::uint32_t>(100 * number) + i, .cameras = 0b11};
       log.push(s);

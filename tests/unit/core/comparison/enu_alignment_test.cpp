@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <vector>
 
 #include "core/math/random.hpp"
@@ -22,14 +21,9 @@ std::vector<EnuAlignmentPair> drive(double length, double bend, int count,
   std::vector<EnuAlignmentPair> pairs;
   for (int i = 0; i < count; ++i) {
     const double s = length * i / (count - 1);
-    EnuAlignmentPair p{.stamp = Stamp{} + Duration::seconds(s / 10.0),
-                       .p_world_left = {bend * s * s / length, -0.01 * s, s}};
-    p.p_enu_left = truth() * p.p_world_left;
-    p.R_enu_world = truth().R;
-    p.position_sigma = sigma[0];
-    p.height_sigma = sigma[1];
-    p.tilt_sigma = sigma[2];
-    pairs.push_back(p);
+    const Vec3 place(bend * s * s / length, -0.01 * s, s);
+    pairs.push_back({Stamp{} + Duration::seconds(s / 10.0), place, truth() * place, truth().R,
+                     sigma[0], sigma[1], sigma[2]});
   }
   return pairs;
 }

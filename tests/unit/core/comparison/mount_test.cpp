@@ -2,12 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "core/comparison/comparison.hpp"
-#include "core/comparison/geodesy.hpp"
-#include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "drivers/mock/ins_model.hpp"
 #include "tests/support/small_mock.hpp"

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <span>
 #include <utility>
 
 #include "tests/unit/core/estimator/corridor_drive.hpp"

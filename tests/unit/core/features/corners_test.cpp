@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include <algorithm>
 #include <map>
 #include <utility>
 

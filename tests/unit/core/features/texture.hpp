@@ -3,8 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <new>
 #include <numbers>
 #include <vector>
@@ -12,7 +10,6 @@
 #include "core/features/pyramid.hpp"
 #include "core/math/random.hpp"
 #include "core/math/types.hpp"
-#include "core/types/image.hpp"
 #include "tests/support/simd_targets.hpp"
 
 namespace vergence::features::test {

@@ -1,12 +1,8 @@
 #include "core/geometry/epipolar.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <vector>
 
 #include "core/geometry/epipolar_evidence.hpp"
-#include "core/math/random.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/unit/core/geometry/random_scene.hpp"
 

@@ -1,10 +1,6 @@
 #include "core/geometry/three_point.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <limits>
-#include <vector>
 
 #include "core/geometry/epipolar.hpp"
 #include "core/geometry/five_point.hpp"

@@ -1,12 +1,8 @@
 #include "core/geometry/mlesac.hpp"
 
-#include <gtest/gtest.h>
-
 #include <limits>
-#include <vector>
 
 #include "core/geometry/stereo_mlesac.hpp"
-#include "tests/unit/core/geometry/random_scene.hpp"
 #include "tests/unit/core/geometry/rig_scene.hpp"
 
 namespace vergence {

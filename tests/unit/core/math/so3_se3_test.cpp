@@ -1,5 +1,3 @@
-#include "core/math/so3.hpp"
-
 #include <gtest/gtest.h>
 
 #include <array>

@@ -2,18 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
-#include <cstdint>
 #include <deque>
 #include <limits>
 #include <thread>
-#include <vector>
 
 #include "core/math/random.hpp"
-#include "core/memory/arena.hpp"
 #include "core/memory/frame_pool.hpp"
-#include "core/memory/ring.hpp"
 
 namespace vergence {
 namespace {

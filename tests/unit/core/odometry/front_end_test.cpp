@@ -1,7 +1,5 @@
 #include "core/odometry/front_end.hpp"
 
-#include <gtest/gtest.h>
-
 #include <utility>
 
 #include "tests/support/no_allocations.hpp"

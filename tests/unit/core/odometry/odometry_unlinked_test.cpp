@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/unit/core/odometry/corridor.hpp"
 
 namespace vergence::odometry {

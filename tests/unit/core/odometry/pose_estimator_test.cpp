@@ -1,9 +1,7 @@
 #include "core/odometry/pose_estimator.hpp"
 
 #include <algorithm>
-#include <cmath>
 
-#include "core/math/random.hpp"
 #include "tests/unit/core/geometry/rig_scene.hpp"
 
 namespace vergence::odometry {

@@ -1,8 +1,5 @@
-#include "core/types/time.hpp"
-
 #include <gtest/gtest.h>
 
-#include <array>
 #include <concepts>
 #include <vector>
 

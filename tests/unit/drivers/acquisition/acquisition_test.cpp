@@ -3,11 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <thread>
 
 #include "core/memory/allocation_guard.hpp"
-#include "drivers/acquisition/acquired_queue.hpp"
-#include "drivers/acquisition/clock_record.hpp"
 #include "drivers/sync/durations.hpp"
 #include "tests/support/acquired.hpp"
 #include "tests/support/idle_camera.hpp"

@@ -1,8 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "drivers/camera.hpp"
 

@@ -1,12 +1,9 @@
-#include <arv.h>
-#include <gtest/gtest.h>
 #include <sys/socket.h>
 
 #include <bit>
 
 #include "drivers/gige/detail/glib.hpp"
 #include "drivers/gige/detail/link.hpp"
-#include "drivers/gige/gige.hpp"
 #include "tests/support/camera_options.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"
@@ -22,10 +19,7 @@ TEST(GigeCamera, isConfiguredByOldAndNewFeatureNames) {
   for (const bool old_names : {false, true}) {
     GigeBench b({.old_names = old_names});
     CameraConfiguration c = b.wish();
-    c.width = 160;
-    c.height = 120;
-    c.offset_x = 64;
-    c.offset_y = 32;
+    c.width = 160, c.height = 120, c.offset_x = 64, c.offset_y = 32;
     c.exposure = Duration::microseconds(1234);
     c.rate_hz = 40;
     CameraConfiguration actual;

@@ -1,9 +1,6 @@
 #pragma once
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <vector>
-
 #include "drivers/gige/gige.hpp"
 #include "tests/support/gige_camera.hpp"
 

@@ -1,11 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <vector>
-
 #include "drivers/gige/detail/frame_receiver.hpp"
 #include "drivers/gige/detail/grey.hpp"
 #include "drivers/gige/detail/link.hpp"
-#include "drivers/gige/detail/slot_returns.hpp"
 
 namespace vergence::gige {
 namespace {

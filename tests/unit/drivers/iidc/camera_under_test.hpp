@@ -1,8 +1,6 @@
 #pragma once
 #include <gtest/gtest.h>
 
-#include <memory>
-
 #include "drivers/iidc/iidc_camera.hpp"
 #include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/iidc/fake_bus.hpp"

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/math/random.hpp"
-#include "drivers/iidc/camera_plan.hpp"
 
 namespace vergence::iidc {
 namespace {

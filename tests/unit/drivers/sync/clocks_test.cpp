@@ -1,10 +1,5 @@
 /// Accuracy of the clocks over a link with delays of a constant floor and exponential jitter, and
 /// that the bounds they state hold.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <vector>
 
 #include "core/math/random.hpp"
 #include "drivers/sync/clock_mapper.hpp"

@@ -59,11 +59,10 @@ inline void expect_never_wrong(std::uint64_t seed, double seconds) {
   const auto often = [&](std::initializer_list<double> values) {
     return values.begin()[random.below(static_cast<std::uint32_t>(values.size()))];
   };
-  PulseRigOptions o;
-  o.seed = seed;
-  o.rate_hz = often({15, 20, 25, 30, 60});
-  o.vary = Duration::seconds(often({0, 0.0005, 0.001, 0.002}));
-  o.cameras = 2 + static_cast<int>(random.below(3));
+  PulseRigOptions o{.rate_hz = often({15, 20, 25, 30, 60}),
+                    .vary = Duration::seconds(often({0, 0.0005, 0.001, 0.002})),
+                    .cameras = 2 + static_cast<int>(random.below(3)),
+                    .seed = seed};
   o.lost = often({0, 0.001, 0.02, 0.1});
   o.unreported = often({0, 0.001, 0.02, 0.1});
   o.duplicated = often({0, 0.02, 0.2});

@@ -1,11 +1,5 @@
 #include "drivers/trigger_board/board_receiver.hpp"
 
-#include <gtest/gtest.h>
-
-#include <optional>
-#include <vector>
-
-#include "core/math/random.hpp"
 #include "tests/support/mentions.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
@@ -32,10 +26,7 @@ struct Receiving : ::testing::Test {
     receiver.stream(HostStamp(0));
   }
   void event(std::uint32_t number, std::uint64_t tick, std::uint32_t boot = kBoot) {
-    TriggerEvent e{};
-    e.boot_id = boot;
-    e.pulse = number;
-    e.tick = tick;
+    TriggerEvent e{boot, number, tick, 0, 0, {}};
     for (TriggerExposure& x : e.exposure) x = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
     TriggerFrame frame = frame_of(trigger_event, trigger_event_payload_size);
     trigger_put_event(&e, frame.payload);

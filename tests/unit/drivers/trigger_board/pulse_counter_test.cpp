@@ -8,11 +8,7 @@ namespace {
 constexpr std::uint64_t kPeriod = 33'333;
 
 TriggerEvent event(std::uint32_t number, std::uint64_t tick, std::uint8_t flags = 0) {
-  TriggerEvent e{};
-  e.boot_id = 7;
-  e.pulse = number;
-  e.tick = tick;
-  e.flags = flags;
+  TriggerEvent e{7, number, tick, 0, flags, {}};
   for (TriggerExposure& x : e.exposure) x = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
   return e;
 }

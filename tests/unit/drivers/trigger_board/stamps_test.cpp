@@ -1,7 +1,3 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "tests/support/quantile.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include <Eigen/Geometry>
 
 #include "core/math/random.hpp"

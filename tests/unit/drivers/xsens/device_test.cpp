@@ -1,9 +1,5 @@
 #include "drivers/xsens/device.hpp"
 
-#include <array>
-#include <span>
-#include <utility>
-
 #include "tests/support/mentions.hpp"
 #include "tests/support/quantile.hpp"
 #include "tests/unit/drivers/xsens/rig.hpp"

@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 #include <vector>
 
 #include "firmware_iface/iidc/config_rom.hpp"

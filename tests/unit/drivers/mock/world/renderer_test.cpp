@@ -1,7 +1,6 @@
 #include "drivers/mock/world/renderer.hpp"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <vector>

@@ -102,13 +102,8 @@ struct TriggerBoardImage : testing::Test {
           << "needs qemu-system-arm: sudo apt install qemu-system-arm, then configure again";
   }
   static Bytes config(std::uint32_t millihertz, std::uint32_t dither_us = 0) {
-    TriggerConfig c{};
-    c.rate_millihertz = millihertz;
-    c.pulse_us = 2000;
-    c.dither_us = dither_us;
-    c.lines = 0x3;
-    c.pps_edge = trigger_edge_rising;
-    c.ins_edge = trigger_edge_falling;
+    const TriggerConfig c{millihertz,          2000, dither_us, 0x3, 0, 0, 0, trigger_edge_rising,
+                          trigger_edge_falling};
     Bytes payload(trigger_config_payload_size);
     trigger_put_config(&c, payload.data());
     return payload;

@@ -60,13 +60,7 @@ struct BoardPort : testing::Test {
     pulses_start();
   }
   static TriggerConfig config() {
-    TriggerConfig c{};
-    c.lines = 0x5;
-    c.active_low = 0x4;
-    c.feedback_inputs = 0x3;
-    c.pps_edge = trigger_edge_rising;
-    c.ins_edge = trigger_edge_falling;
-    return c;
+    return {0, 0, 0, 0x5, 0x4, 0x3, 0, trigger_edge_rising, trigger_edge_falling};
   }
   static void configure() {
     const TriggerConfig c = config();

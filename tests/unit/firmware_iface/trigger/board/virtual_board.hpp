@@ -27,11 +27,7 @@ class VirtualBoard {
   }
 
   static TriggerConfig config(std::uint32_t millihertz) {
-    TriggerConfig c{};
-    c.rate_millihertz = millihertz;
-    c.pulse_us = 200;
-    c.lines = 0x3;
-    return c;
+    return {millihertz, 200, 0, 0x3, 0, 0, 0, 0, 0};
   }
 
   void bytes(const Bytes& sent) {
