@@ -81,6 +81,8 @@ std::string Emulator::finish() {
   return report;
 }
 
+bool inside_rig() { return std::getenv("VERGENCE_RIGS") != nullptr; }
+
 std::int64_t count_of(const std::string& report, int camera, std::string_view word) {
   std::istringstream lines(report);
   const std::string name = "camera " + std::to_string(camera) + " ";

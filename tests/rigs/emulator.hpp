@@ -8,6 +8,11 @@
 
 namespace vergence::test {
 
+/// True inside the rig's kernel; there, a device that is missing is a failure and no reason to
+/// skip.
+[[nodiscard]] bool inside_rig();
+inline constexpr const char* kNeedsRig = "needs the rig's kernel: run it by ctest -L rig";
+
 /// One emulator of tests/rigs, running beside the test inside the rig's kernel.
 ///
 /// Ownership  The process is ended by finish() or the destructor.

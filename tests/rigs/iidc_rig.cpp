@@ -138,6 +138,4 @@ Holdings Holdings::now() {
   return h;
 }
 
-bool inside_rig() { return std::getenv("VERGENCE_RIGS") != nullptr; }
-
 }  // namespace vergence::test

@@ -77,8 +77,4 @@ struct Holdings {
   [[nodiscard]] bool operator==(const Holdings&) const = default;
 };
 
-/// Returns true inside the rig's kernel; there, a device that is missing is a failure and no
-/// reason to skip.
-[[nodiscard]] bool inside_rig();
-
 }  // namespace vergence::test

@@ -87,6 +87,7 @@ def main():
     parser.add_argument("--frames", type=int, default=0, help="0: all")
     parser.add_argument("--bound-mm", type=float, default=0.1)
     given = parser.parse_args()
+    given.shared = os.environ.get("VERGENCE_SHARED") or given.shared
     arm = emulated(given.build)
     if arm is None:
         return SKIPPED
@@ -94,7 +95,7 @@ def main():
         results = [compare(given, arm, name, form, work) for name, form in DRIVES]
     results = [result for result in results if result is not None]
     if not results:
-        print("skipped: no recorded drive is here (VERGENCE_SHARED)")
+        print("skipped: needs recorded drives: put them into ../shared or name their place in VERGENCE_SHARED")
         return SKIPPED
     return 0 if all(results) else 1
 

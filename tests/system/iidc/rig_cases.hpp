@@ -21,7 +21,7 @@ namespace vergence::test {
 class IidcRig : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!inside_rig()) GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
+    if (!inside_rig()) GTEST_SKIP() << kNeedsRig;
   }
   /// The emulator, and its two cameras configured.
   void begin(const CameraConfiguration& requested, std::vector<std::string> arguments = {}) {

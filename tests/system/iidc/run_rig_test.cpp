@@ -89,9 +89,9 @@ struct Bus {
 class IidcRun : public ::testing::TestWithParam<Bus> {};
 
 TEST_P(IidcRun, exampleConfigurationPosesEveryPair) {
+  if (!inside_rig()) GTEST_SKIP() << kNeedsRig;
   const char* film_folder = std::getenv("VERGENCE_FILM");
-  if (!inside_rig() || film_folder == nullptr)
-    GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
+  ASSERT_NE(film_folder, nullptr);
   const Film film(film_folder);
   std::vector<std::string> arguments{"--cameras", "2", "--film", film_folder, "--film-hz", "10"};
   if (GetParam().pulses) arguments.insert(arguments.end(), {"--trigger-hz", "10"});
@@ -127,9 +127,9 @@ TEST_P(IidcRun, exampleConfigurationPosesEveryPair) {
 }
 
 TEST(BoardRun, triggerBoardCamerasAndInsMakeOneSession) {
+  if (!inside_rig()) GTEST_SKIP() << kNeedsRig;
   const char* film_folder = std::getenv("VERGENCE_FILM");
-  if (!inside_rig() || film_folder == nullptr)
-    GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
+  ASSERT_NE(film_folder, nullptr);
   const Film film(film_folder);
   auto driver = iidc::make_usb_driver();
   // Slower than the other drives: two serial lines cost the one processor as much as the

@@ -8,7 +8,7 @@ here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 package="$(ls "$packages"/vergence_*_"$(dpkg --print-architecture)".deb)"
 for tool in mmdebstrap dpkg-deb; do
   command -v "$tool" >/dev/null || {
-    echo "skipped: $tool is not installed"
+    echo "skipped: needs $tool: sudo apt install mmdebstrap dpkg"
     exit 77
   }
 done

@@ -5,7 +5,7 @@
 set -euo pipefail
 packaging="$1"
 if ! systemd-analyze security --help >/dev/null 2>&1; then
-  echo "skipped: systemd-analyze is not installed"
+  echo "skipped: needs systemd-analyze: sudo apt install systemd"
   exit 77
 fi
 work="$(mktemp -d)"

@@ -5,7 +5,7 @@ set -eu
 vergence=$1 configuration=$2 script=$3 folder=$4
 
 command -v node >/dev/null && command -v npm >/dev/null || {
-  echo "SKIPPED: node and npm are not installed: the recording is read by the project's own reader only"
+  echo "skipped: needs node and npm: sudo apt install nodejs npm"
   exit 77
 }
 mkdir -p "$folder"
@@ -15,7 +15,7 @@ if ! [ -d node_modules/@mcap/core ]; then
   echo '{"private": true, "type": "module"}' > package.json
   timeout 100 npm install --no-audit --no-fund --silent \
     @mcap/core@2.2.2 @foxglove/rosmsg@5.0.5 @foxglove/rosmsg2-serialization@3.1.0 || {
-    echo "SKIPPED: npm reaches no registry: the recording is read by the project's own reader only"
+    echo "skipped: npm reaches no registry: run it with a network, or set npm's registry"
     exit 77
   }
 fi

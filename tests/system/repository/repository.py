@@ -352,7 +352,7 @@ def main():
     parser.add_argument("--root", default=".")
     given = parser.parse_args()
     if given.check == "format" and shutil.which("clang-format") is None:
-        print("skipped: clang-format is not installed")
+        print("skipped: needs clang-format: sudo apt install clang-format")
         return SKIPPED
     checks = {"arrows": arrows, "cycles": cycles, "words": words, "safety": safety, "format": format_files, "self-test": lambda _: self_test()}
     findings = checks[given.check](given.root)

@@ -221,7 +221,7 @@ def main():
     if given.self_test:
         found = self_test()
     elif shutil.which("clang-tidy") is None or shutil.which("clang++") is None:
-        print("skipped: clang-tidy or clang++ is not installed")
+        print("skipped: needs clang-tidy and clang++: sudo apt install clang-tidy clang")
         return SKIPPED
     else:
         todo = part_of(batches(given.root, configured(given.root, given.build), given.prefixes), given.part)

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cstring>
-#include <filesystem>
 #include <limits>
 #include <utility>
 
 #include "drivers/v4l2/v4l2.hpp"
+#include "tests/rigs/emulator.hpp"
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/camera_options.hpp"
 
@@ -44,8 +44,7 @@ std::int64_t number_in(const ImageView& view, std::size_t output) {
 class V4l2Loop : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists("/dev/video3"))
-      GTEST_SKIP() << "needs looped video nodes of the rig's kernel: run it by ctest -L rig";
+    if (!test::inside_rig()) GTEST_SKIP() << test::kNeedsRig;
     for (int k = 0; k < 2; ++k) test::loop(node(2 * k), node(2 * k + 1));
   }
   static std::string node(int number) { return "/dev/video" + std::to_string(number); }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "drivers/v4l2/v4l2.hpp"
+#include "tests/rigs/emulator.hpp"
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/camera_options.hpp"
 
@@ -29,8 +30,7 @@ CameraConfiguration webcam() {
 class V4l2Rig : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists("/dev/video0"))
-      GTEST_SKIP() << "needs the video nodes of the rig's kernel: run it by ctest -L rig";
+    if (!test::inside_rig()) GTEST_SKIP() << test::kNeedsRig;
     for (const DeviceInfo& d : driver_->enumerate()) serials_.push_back(d.serial);
     ASSERT_EQ(serials_.size(), 2U) << "two test cameras";
   }

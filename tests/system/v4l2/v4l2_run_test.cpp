@@ -2,6 +2,7 @@
 #include <signal.h>
 
 #include "app/datasets/trajectory_files.hpp"
+#include "tests/rigs/emulator.hpp"
 #include "tests/rigs/film.hpp"
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/child_program.hpp"
@@ -18,8 +19,7 @@ constexpr std::int64_t kInterval_ns = 100'000'000;
 class V4l2Run : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists("/dev/video3"))
-      GTEST_SKIP() << "needs looped video nodes of the rig's kernel: run it by ctest -L rig";
+    if (!test::inside_rig()) GTEST_SKIP() << test::kNeedsRig;
     std::filesystem::remove_all(session_);
   }
   static std::string node(int number) { return "/dev/video" + std::to_string(number); }

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/math/random.hpp"
+#include "tests/rigs/emulator.hpp"
 #include "tests/unit/drivers/conformance/shadow_camera.hpp"
 
 namespace vergence::test {
@@ -39,20 +40,17 @@ class CameraConformance : public ::testing::Test {
   ConformanceRig* make(std::uint64_t seed) {
     // Only one such camera may exist at a time.
     rig_.reset();
-    std::string why = "this machine has no such rig";
-    rig_ = make_conformance_rig(seed, &why);
-    why_ = why;
+    rig_ = make_conformance_rig(seed);
     return rig_.get();
   }
   std::unique_ptr<ConformanceRig> rig_;
-  std::string why_;
 };
 
 TEST_F(CameraConformance, randomCallsKeepTheContract) {
   const int seeds = asked_for("VERGENCE_CONFORMANCE_SEEDS", 3),
             steps = asked_for("VERGENCE_CONFORMANCE_STEPS", 60);
   for (int seed = 1; seed <= seeds && !HasFailure(); ++seed) {
-    if (make(static_cast<std::uint64_t>(seed)) == nullptr) GTEST_SKIP() << why_;
+    if (make(static_cast<std::uint64_t>(seed)) == nullptr) GTEST_SKIP() << kNeedsRig;
     const auto possible = rig_->possible();
     auto impossible = nonsense(possible.front());
     for (const CameraConfiguration& c : rig_->impossible()) impossible.push_back(c);
@@ -94,7 +92,7 @@ TEST_F(CameraConformance, randomCallsKeepTheContract) {
 }
 
 TEST_F(CameraConformance, invalidConfigurationChangesNothing) {
-  if (make(11) == nullptr) GTEST_SKIP() << why_;
+  if (make(11) == nullptr) GTEST_SKIP() << kNeedsRig;
   ShadowCamera camera(rig_.get());
   const auto possible = rig_->possible();
   for (const CameraConfiguration& c : nonsense(possible.front())) camera.refuse(c);
@@ -112,7 +110,7 @@ TEST_F(CameraConformance, invalidConfigurationChangesNothing) {
 }
 
 TEST_F(CameraConformance, newestIsDroppedAndCountedWithoutFreeSlot) {
-  if (make(14) == nullptr) GTEST_SKIP() << why_;
+  if (make(14) == nullptr) GTEST_SKIP() << kNeedsRig;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
   camera.start();
@@ -134,7 +132,7 @@ TEST_F(CameraConformance, newestIsDroppedAndCountedWithoutFreeSlot) {
 }
 
 TEST_F(CameraConformance, exposuresThatNeverArriveAreCounted) {
-  if (make(15) == nullptr) GTEST_SKIP() << why_;
+  if (make(15) == nullptr) GTEST_SKIP() << kNeedsRig;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
   camera.start();
@@ -164,7 +162,7 @@ bool reaches(ConformanceRig& rig, const CameraConfiguration& c, const ExposureSe
 }
 
 TEST_F(CameraConformance, exposureSetWhileStreamingPersists) {
-  if (make(18) == nullptr) GTEST_SKIP() << why_;
+  if (make(18) == nullptr) GTEST_SKIP() << kNeedsRig;
   CameraDevice& camera = rig_->camera();
   const auto c = rig_->possible().front();
   ASSERT_EQ(camera.configure(c, nullptr), DeviceStatus::ok) << camera.last_error();
@@ -199,7 +197,7 @@ TEST_F(CameraConformance, exposureSetWhileStreamingPersists) {
 }
 
 TEST_F(CameraConformance, unpluggedCameraIsDisconnectedAndReturns) {
-  if (make(16) == nullptr) GTEST_SKIP() << why_;
+  if (make(16) == nullptr) GTEST_SKIP() << kNeedsRig;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
   camera.start();
@@ -211,7 +209,7 @@ TEST_F(CameraConformance, unpluggedCameraIsDisconnectedAndReturns) {
 }
 
 TEST_F(CameraConformance, threeThreadsMayShareACamera) {
-  if (make(17) == nullptr) GTEST_SKIP() << why_;
+  if (make(17) == nullptr) GTEST_SKIP() << kNeedsRig;
   CameraDevice& camera = rig_->camera();
   const auto configuration = rig_->possible().front();
   ASSERT_EQ(camera.configure(configuration, nullptr), DeviceStatus::ok) << camera.last_error();

@@ -42,8 +42,7 @@ class MockConformance final : public ConformanceRig {
 
 }  // namespace
 
-std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t seed, std::string* why) {
-  (void)why;
+std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t seed) {
   return std::make_unique<MockConformance>(seed);
 }
 

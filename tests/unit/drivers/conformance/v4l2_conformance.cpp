@@ -1,9 +1,8 @@
 // V4L2 on the kernel's test camera, inside the rig's kernel (tests/rigs/README.md).
 #include <fcntl.h>
 
-#include <filesystem>
-
 #include "drivers/v4l2/v4l2.hpp"
+#include "tests/rigs/emulator.hpp"
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"
@@ -55,17 +54,13 @@ class V4l2Rig final : public ConformanceRig {
 
 }  // namespace
 
-std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t, std::string* why) {
-  if (!std::filesystem::exists("/dev/video0")) {
-    *why = "no video node: ctest runs this inside the rig's kernel";
-    return nullptr;
-  }
+std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t) {
+  if (!inside_rig()) return nullptr;
   DeviceStatus status = DeviceStatus::ok;
   auto camera = v4l2::make_driver()->open("", &status);
-  if (camera == nullptr) {
-    *why = "the first video node cannot be opened: " + std::string(to_string(status));
-    return nullptr;
-  }
+  if (camera == nullptr)
+    throw std::runtime_error("the first video node does not open: " +
+                             std::string(to_string(status)));
   return std::make_unique<V4l2Rig>(std::move(camera));
 }
 

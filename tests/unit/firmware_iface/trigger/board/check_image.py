@@ -67,7 +67,7 @@ def main():
     folder = sys.argv[1]
     image = os.path.join(folder, "trigger_board.elf")
     if not os.path.exists(image) or shutil.which("arm-none-eabi-nm") is None:
-        print("no image of the trigger board: gcc-arm-none-eabi was not there to build it")
+        print("skipped: needs the trigger board's image: sudo apt install gcc-arm-none-eabi, then configure again")
         return 77
     findings = []
     symbols = {}
