@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/calibration/posterior.hpp"
 #include "tests/unit/core/calibration/feature_log.hpp"
 
 namespace vergence::test {
@@ -170,6 +171,25 @@ TEST(RigSolver, solveIsIndependentOfThePreviousOne) {
   EXPECT_EQ(s.rig.T_camera_left[1].R, t.rig.T_camera_left[1].R);
   EXPECT_EQ(s.rig.T_camera_left[1].t, t.rig.T_camera_left[1].t);
   EXPECT_EQ(s.rig.sigma_total[1], t.rig.sigma_total[1]);
+}
+
+// Five frames of a rig that hardly moves, lenses free: pitch and centre, yaw and centre go
+// together.
+TEST(RigSolver, transformWithoutSigmasIsAPriorOfASolveFromLittleMotion) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const FeatureDriveOptions drive{.speed = 0.05, .seed = seed};
+    Logged s(drive, 5, {.max_frames = 60});
+    const RigCalibration rig = rig_of(drive, {drive.left, drive.right}, {0, 0, 0, 0});
+    RigCalibration prior = rig;
+    prior.inflation = kUsualInflation;
+    assume_transforms(kSuppliedTransform, &prior);
+    const auto displaced = [&](const RigCalibration* known) {
+      const RigSolution found = s.solver.solve({.rig = rig, .from_rig = true, .known = known});
+      EXPECT_EQ(found.status, RigSolveStatus::ok);
+      return five_errors(found.rig, drive.T_right_left).norm();
+    };
+    EXPECT_LT(displaced(&prior), 0.6 * displaced(nullptr)) << seed;
+  }
 }
 
 TEST(RigSolver, lagOfTheSecondOrThirdCameraIsFound) {

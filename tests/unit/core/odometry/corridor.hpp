@@ -110,8 +110,8 @@ class Corridor {
 
 /// An odometry of a calibrated rig.
 struct LinkedOdometry {
-  explicit LinkedOdometry(const RigCalibration& rig)
-      : odometry(options, rig, true, arena, runner) {}
+  explicit LinkedOdometry(const RigCalibration& rig, const OdometryOptions& o = {})
+      : options(o), odometry(options, rig, true, arena, runner) {}
   OdometryOptions options;
   SequentialRunner runner;
   Arena arena;
