@@ -12,12 +12,13 @@
 //          window with the calibration given and `calibration.online=off`.
 // times    Faults of time, with the calibration given, online and off.
 // scenes   Harder scenes, the same.
-// unseen   Whole drives played backwards, and mirrored with the cameras swapped: rigs and motions
-//          that no default was chosen on.
+// unseen   Whole drives played backwards, mirrored with the cameras swapped, and with the rig on
+//          its side: rigs and motions that no default was chosen on.
 // planar   `sand_rover` against its planar truth: similarity and an offset of time are fitted.
 //
 // Tables are markdown, for docs/benchmarks.md. Settings apply to every run.
 #include <algorithm>
+#include <numbers>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -25,6 +26,7 @@
 #include "app/session/drive_calibration.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
+#include "core/math/so3.hpp"
 #include "tests/bench/integrity_variants.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -215,6 +217,36 @@ RecordedSequence mirrored(const RecordedSequence& from, const std::filesystem::p
   return d;
 }
 
+/// The drive with its rig on the side, one camera above the other.
+RecordedSequence on_its_side(const RecordedSequence& from, const std::filesystem::path& folder) {
+  RecordedSequence d = from;
+  d.sequence = spoil(from,
+                     {"on its side",
+                      [](cv::Mat* left, cv::Mat* right, std::size_t, std::size_t) {
+                        for (cv::Mat* image : {left, right})
+                          cv::rotate(*image, *image, cv::ROTATE_90_CLOCKWISE);
+                      },
+                      nullptr},
+                     folder);
+  const Transform turn{exp_so3(Vec3(0, 0, std::numbers::pi / 2)), Vec3::Zero()};
+  RigCalibration& rig = d.sequence.calibration;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Intrinsics& before = from.sequence.calibration.intrinsics[k];
+    Intrinsics& lens = rig.intrinsics[k] = before;
+    std::swap(lens.width, lens.height);
+    std::swap(lens.fx, lens.fy);
+    lens.cx = before.height - 1 - before.cy;
+    lens.cy = before.cx;
+    if (lens.kind != CameraModelKind::pinhole_radtan) continue;
+    lens.distortion[2] = before.distortion[3];
+    lens.distortion[3] = -before.distortion[2];
+  }
+  rig.T_camera_left[1] = turn * rig.T_camera_left[1] * turn.inverse();
+  for (StampedPose& p : d.truth) p.T_world_body = p.T_world_body * turn.inverse();
+  d.name += " on its side";
+  return d;
+}
+
 /// Alignment of positions of frames in [first, last): rotated, moved, scaled and shifted in time
 /// onto the track, which is flat.
 struct PlanarFit {
@@ -305,7 +337,8 @@ int main(int argc, char** argv) {
   section("unseen", drives_heading, 12, [&](const RecordedSequence& d) {
     const test::TemporaryFolder folder;
     whole(b, backwards(d));
-    whole(b, mirrored(d, folder.path()));
+    whole(b, mirrored(d, folder.path() / "mirrored"));
+    whole(b, on_its_side(d, folder.path() / "side"));
   });
   section(
       "planar",
