@@ -105,7 +105,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
              "Trajectory file, KITTI or EuRoC directory, or ins.csv", "DIR|FILE");
   command->add_flag("--json", a->request.json, "Print JSON");
   add_option(*command, "--lengths", a->lengths,
-             "Segment lengths in metres [100 to 800; shorter ones for short paths]", "M,…");
+             "Segment lengths in metres [100 to 800; shorter ones for short paths]", "M,...");
   add_option(*command, "--step", a->step,
              "Start a segment at every Nth pose [10; 1 for short segments]", "N")
       ->check(in_range(1, 1e9, "poses"));
