@@ -45,7 +45,7 @@ using WrittenFiles = std::vector<std::pair<std::filesystem::path, std::string>>;
                                                  Remarks* remarks);
 
 struct ConversionRequest {
-  /// A file, two separated by a comma, or a directory with left.yaml and right.yaml.
+  /// A file, two separated by a comma, or a directory with the two.
   std::string in{};
   /// As `in`.
   std::string out{};

@@ -22,7 +22,7 @@ std::string camera_namespace(std::string_view topic) {
 /// or where the RealSense viewer has it (`CAMERA/image/data`, `CAMERA/info/camera_info`).
 std::string camera_info_topic(const BagIndex& bag, const std::string& topic) {
   const std::string space = camera_namespace(topic);
-  for (const std::string& name : {topic, camera_namespace(space) + "/info"})
+  for (const std::string& name : {topic, space, camera_namespace(space) + "/info"})
     if (bag.infos.contains(name + "/camera_info")) return name + "/camera_info";
   return space + "/camera_info";
 }

@@ -101,11 +101,11 @@ std::string set_ros_distortion(std::string_view model, std::span<const double> d
         "rational_polynomial",
         model.substr(0, 60));
   const bool equidistant = *kind == CameraModelKind::pinhole_equidistant;
-  // Drivers with a fixed number of five pad with zeros.
+  // Drivers with a fixed number of coefficients pad with zeros.
+  const std::size_t given = d.size();
   while (equidistant && d.size() > 4 && d.back() == 0) d = d.first(d.size() - 1);
   if (equidistant ? d.size() != 4 && !d.empty() : d.size() > 14)
-    return fmt::format("has {} numbers; equidistant (fisheye) has 4, other models up to 14",
-                       d.size());
+    return fmt::format("has {} numbers; equidistant (fisheye) has 4, other models up to 14", given);
   const auto used = d.first(std::min<std::size_t>(5, d.size()));
   const auto zero = [](double v) { return v == 0; };
   if (const auto rest = d.subspan(used.size()); !std::ranges::all_of(rest, zero))

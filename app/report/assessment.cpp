@@ -26,7 +26,7 @@ constexpr std::array kAdvice{
     "inverted T_camera_left (X_camera = R X_left + t), distortion set for rectified images, wrong "
     "intrinsics, or cameras that do not expose together.",
     "Left and right are swapped, or T_camera_left is inverted: X_camera = R X_left + t.",
-    "Few points constrained the poses: check the images for dirt, blur or a covered lens.",
+    "Few points constrained the poses, or none fitted well: check the images for dirt or blur.",
     "One camera did not support the pose: check its images for dirt, blur or wrong exposure.",
     "Tracking failed: a shorter exposure or a higher frame rate helps in fast turns.",
     "Frames are missing: check cables, trigger and the disk's speed; the events state when.",

@@ -71,7 +71,7 @@ class ThreadRunner final : public PairRunner {
   std::thread thread_;
 };
 
-/// Runner of a front end for one thread, or for two if there are two or more.
+/// Runner of the odometry for one thread, or for two if there are two or more.
 [[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
 
 /// The calibration solver's runner, with a note of the frames at which it was found idle: the one

@@ -153,7 +153,8 @@ PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
                                    const PoseFit& all) noexcept {
   std::swap(agrees_, agrees_all_);
   PoseFit left = fit_left(map, start);
-  if (left.found && left.inliers >= options_.ok_inliers) return left;
+  if (left.found && left.inliers >= options_.ok_inliers && left.scale <= kOutlierSigmas)
+    return left;
   std::swap(agrees_, agrees_all_);
   return all;
 }
@@ -196,7 +197,6 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
     } else {
       T_camera_left[c] = s.T * fit.T_left_world.inverse();
     }
-    fit.scale = std::max(fit.scale, s.scale);
     squares += s.rms_px * s.rms_px;
     ++cameras;
   }

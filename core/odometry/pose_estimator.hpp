@@ -33,7 +33,8 @@ struct PoseFit {
   /// Number of points found in the images.
   int given = 0;
   double rms_px = 0;
-  /// Median residual in sigmas of the observations; 1 if they have the noise that they state.
+  /// Robust scale of the residuals of linked cameras, in sigmas of their observations, ≥ 1
+  /// (RefinedPose).
   double scale = 1;
   /// Bit k is set if camera k has at least a few of the inliers.
   std::uint8_t cameras = 0;

@@ -43,7 +43,7 @@ enum class Reason : std::uint8_t {
   no_stereo_matches,
   /// Points would lie behind the rig: left and right are swapped.
   cameras_swapped,
-  /// The pose is based on few points.
+  /// The pose is based on few points, or they fit it much worse than their noise.
   few_inliers,
   /// Only one camera supports the pose; its scale is that of earlier points.
   single_camera,

@@ -121,7 +121,7 @@ void System::linearise_part(KernelJob& job, const BundleSums& sums, std::size_t 
 }
 
 void System::linearise_halves() noexcept {
-  // Time is spent on the blocks, so either half has as many of them.
+  // Time is spent on the blocks, so the batches are divided where half of them are.
   std::size_t middle = 0;
   while (middle < w_.batch_count && w_.batches[middle].block_end <= w_.block_count / 2) ++middle;
   KernelJob second = job_;
