@@ -13,9 +13,10 @@ namespace vergence::odometry {
 namespace {
 
 /// True if the pose of the sample is accurate enough to follow all points from it. MLESAC's inliers
-/// are within three sigmas, so only their number can be too low.
+/// are within three sigmas; the points of a left camera that is preferred may not be.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
-  return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given;
+  return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given &&
+         fit.scale < kOutlierSigmas;
 }
 
 }  // namespace
