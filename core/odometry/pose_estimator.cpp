@@ -153,8 +153,7 @@ PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
                                    const PoseFit& all) noexcept {
   std::swap(agrees_, agrees_all_);
   PoseFit left = fit_left(map, start);
-  if (left.found && left.inliers >= options_.ok_inliers && left.scale <= kOutlierSigmas)
-    return left;
+  if (left.found && left.inliers >= options_.ok_inliers) return left;
   std::swap(agrees_, agrees_all_);
   return all;
 }
