@@ -58,19 +58,20 @@ void lay_out(BundleWorkspace& w, const BundleCapacities& c, Arena& arena) {
   take(w.y, w.block_capacity * kYTop, "bundle: Y of poses");
   take(w.y_shared, batches * shared_blocks * kYSize, "bundle: Y of shared parameters");
   take(w.factors, batches * kFactorRows * kBatch, "bundle: point factors");
-  for (BundleSums* s : {static_cast<BundleSums*>(&w), &w.second_half}) {
-    if (s == &w.second_half && w.runner == nullptr) break;
-    take(s->y_group, std::min(kGroupLimit * c.poses, w.block_capacity) * kYSize,
+  const auto take_sums = [&](BundleSums& s) {
+    take(s.y_group, std::min(kGroupLimit * c.poses, w.block_capacity) * kYSize,
          "bundle: Y of a group");
-    take(s->sums, c.poses * c.cameras * kPoseSums * kBatch, "bundle: sums of poses");
-    take(s->intrinsic_sums, c.shared ? c.poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch : 0,
+    take(s.sums, c.poses * c.cameras * kPoseSums * kBatch, "bundle: sums of poses");
+    take(s.intrinsic_sums, c.shared ? c.poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch : 0,
          "bundle: sums of intrinsics");
-    take(s->intrinsic_own,
+    take(s.intrinsic_own,
          c.shared ? kMaxCameras * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch : 0,
          "bundle: intrinsics");
-    take(s->reduced, w.reduced_capacity * kBatch, "bundle: reduced gradient");
-    take(s->A, ld * w.reduced_capacity, "bundle: reduced system");
-  }
+    take(s.reduced, w.reduced_capacity * kBatch, "bundle: reduced gradient");
+    take(s.A, ld * w.reduced_capacity, "bundle: reduced system");
+  };
+  take_sums(w);
+  if (w.runner != nullptr) take_sums(w.second_half);
   take(w.rhs, ld, "bundle: right-hand side");
   take(w.delta, ld, "bundle: step");
   take(w.squared, w.slot_capacity * kBatch, "bundle: squared residuals");
