@@ -146,8 +146,8 @@ constexpr auto whole = [](auto& c) -> auto& { return c; };
 Group general() {
   return Rows("", "Keys that belong to no group.", whole)
       .integer("threads", &Configuration::threads, 1, 2, "",
-               "Threads of the estimator: 2 share images, points and the window's "
-               "adjustment; the poses are the same.");
+               "Threads of the estimator: two divide the images, the points and the window between "
+               "them; the poses are the same.");
 }
 
 Group kitti_raw() {
