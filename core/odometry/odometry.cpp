@@ -115,6 +115,8 @@ void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::single_camera;
   else if (stereo_fails_ || !fit.confirmed_stereo())
     out->reason = Reason::no_stereo_matches;
+  // At a wrong place, for example a period of a regular texture away, most points fit, but much
+  // worse than their noise.
   else if (fit.inliers < options_.ok_inliers || fit.scale > kOutlierSigmas)
     out->reason = Reason::few_inliers;
   else if (fit.near < kMinAgreeing)

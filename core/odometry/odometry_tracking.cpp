@@ -12,8 +12,9 @@ namespace vergence::odometry {
 
 namespace {
 
-/// True if the pose of the sample is accurate enough to follow all points from it. MLESAC's inliers
-/// are within three sigmas; the points of a left camera that is preferred may not be.
+/// True if the pose of the sample is accurate enough to follow all points from it. The scale can
+/// exceed the limit only if the left camera alone was preferred, whose pose is fitted to all of its
+/// points; MLESAC's inliers are within three sigmas.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
   return fit.inliers >= kMinAgreeing && fit.inliers > share * fit.given &&
          fit.scale < kOutlierSigmas;

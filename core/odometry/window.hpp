@@ -22,7 +22,10 @@ struct WindowOutcome {
 /// calibration's depths as prior. Each window starts from the calibration, so that nothing counts
 /// twice, and the estimate never leaves the odometry.
 ///
-/// Memory  From the arena at construction. Observations beyond its capacity are left out.
+/// Ownership  Options, rig and runner are the caller's and outlive the object.
+/// Threads    One caller; the runner takes half of the points. Results do not depend on its
+/// threads. Memory     From the arena at construction. Observations beyond its capacity are left
+/// out.
 class WindowAdjuster {
  public:
   WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,

@@ -252,7 +252,8 @@ TEST(Odometry, firstMotionIsRightIfItIsOk) {
   EXPECT_GE(ok, 8);
 }
 
-// Of 24 points a quarter are fewer than a pose takes (kMinAgreeing), half of them are enough.
+// The map has 24 points. A pose needs eight (kMinAgreeing): a quarter of the points is too few,
+// half of them is enough.
 TEST(OdometryTracking, failedAttemptIsFollowedByOneWithTwiceThePoints) {
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig(), {.features = 24, .min_inliers = kMinAgreeing});
